@@ -1,0 +1,128 @@
+"""Lawnmower: the waypoints row by row, back and forth, cut into one run per UAS."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.targets import Targets
+from uas_coverage_env.flight import AssistedOptions
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Command, SwarmState
+
+# Share of the cruise speed that is left on average by turns, climbs and stops.
+_PACE = 0.8
+# Share of the charge that a run may be planned to use.
+_USABLE = 0.8
+
+
+class Lawnmower:
+    """Flies back and forth over the rows of waypoints, each UAS its own part; home in the end."""
+
+    Options = AssistedOptions
+
+    def __init__(self, options: AssistedOptions | None = None) -> None:
+        self.options = options or AssistedOptions()
+        self.assistants = self.options.assistants
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Order the waypoints and cut the order into runs of about equal time."""
+        self._targets = Targets(scenario)
+        waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+        self._runs = plan_runs(scenario, back_and_forth(waypoints_m))
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Fly the own run in order; who has finished helps with what is nearest."""
+        return self._targets.commands(swarm, self._next)
+
+    def _next(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
+        own = [waypoint for waypoint in self._runs[uas] if candidates[waypoint]]
+        return own[0] if own else self._targets.nearest(swarm, uas, candidates)
+
+
+def back_and_forth(waypoints_m: NDArray[np.float64]) -> list[int]:
+    """Order waypoints (W, 3) [m] row by row, along the longer side of the area."""
+    size_m = np.ptp(waypoints_m[:, :2], axis=0) + 1.0
+    along = int(size_m.argmax())
+    across = 1 - along
+    n_rows = max(1, round(np.sqrt(len(waypoints_m) * size_m[across] / size_m[along])))
+    # rows are centred on the first and last waypoints: a wobble of half a pitch does no harm
+    pitch_m = size_m[across] / max(1, n_rows - 1)
+    row = np.rint((waypoints_m[:, across] - waypoints_m[:, across].min()) / pitch_m).astype(int)
+    forth = 1 - 2 * (row % 2)
+    return np.lexsort([waypoints_m[:, along] * forth, row]).tolist()
+
+
+def plan_runs(scenario: Scenario, order: Sequence[int]) -> list[list[int]]:
+    """Cut an order of waypoints into one run per UAS: the slowest one as quick as can be.
+
+    No run takes longer than the charge of its UAS allows, unless all charges together are too
+    little: then the cut is that of a fleet with endless batteries.
+    """
+    cuts = _Cuts(scenario, order)
+    allowed_s = _allowed_times_s(scenario)
+    if not cuts.complete(cuts.within(allowed_s)):
+        allowed_s = np.full(len(allowed_s), np.inf)
+    best = cuts.within(allowed_s)
+    low_s, high_s = 0.0, cuts.longest_s
+    while high_s - low_s > 1.0:
+        middle_s = (low_s + high_s) / 2
+        runs = cuts.within(np.minimum(allowed_s, middle_s))
+        if cuts.complete(runs):
+            best, high_s = runs, middle_s
+        else:
+            low_s = middle_s
+    return best
+
+
+class _Cuts:
+    """Ways to cut an order of waypoints; times are those of straight flight."""
+
+    def __init__(self, scenario: Scenario, order: Sequence[int]) -> None:
+        limits = [vehicle.limits for vehicle in scenario.vehicles]
+        speed_mps = _PACE * min(limit.v_cruise_mps for limit in limits)
+        route_m = np.array([scenario.waypoints[waypoint].position_m for waypoint in order])
+        homes_m = np.array([uas.start_m for uas in scenario.uas])
+        between_m = np.linalg.norm(np.diff(route_m, axis=0), axis=1)
+        self._at_s = np.concatenate([[0.0], np.cumsum(between_m)]) / speed_mps
+        self._home_s = np.linalg.norm(route_m - homes_m[:, None], axis=2) / speed_mps
+        self._order = list(order)
+        # whoever starts nearer to the beginning of the order takes the earlier part
+        self._takers = self._home_s[:, 0].argsort(kind="stable")
+
+    @property
+    def longest_s(self) -> float:
+        """More than the time of any cut."""
+        return float(self._at_s[-1] + 2.0 * self._home_s.max() + 1.0)
+
+    def within(self, limits_s: NDArray[np.float64]) -> list[list[int]]:
+        """Give each UAS in turn the longest run that its limit (U,) [s] allows."""
+        runs: list[list[int]] = [[] for _ in limits_s]
+        first = 0
+        for uas in self._takers:
+            rest = slice(first, None)
+            run_s = self._at_s[rest] - self._at_s[rest][:1]
+            run_s += self._home_s[uas, rest][:1] + self._home_s[uas, rest]
+            allowed = np.maximum.accumulate(run_s) <= limits_s[uas]
+            runs[uas] = self._order[first : first + int(allowed.sum())]
+            first += len(runs[uas])
+        return runs
+
+    def complete(self, runs: list[list[int]]) -> bool:
+        """Whether every waypoint belongs to a run."""
+        return sum(map(len, runs)) == len(self._order)
+
+
+def _allowed_times_s(scenario: Scenario) -> NDArray[np.float64]:
+    """(U,) [s] flight that the charge of each UAS allows, at the power of hovering."""
+    return np.array(
+        [
+            _USABLE
+            * (uas.dod_max - (1.0 - uas.soc_0))
+            * vehicle.battery.capacity_Ah
+            * vehicle.battery.voltage_nominal_V
+            * 3600.0
+            / vehicle.power.hover_W
+            for uas, vehicle in zip(scenario.uas, scenario.vehicles, strict=True)
+        ]
+    )

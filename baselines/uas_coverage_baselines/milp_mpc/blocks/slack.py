@@ -1,0 +1,47 @@
+"""Slack variables and their cost (OCP_4, part I of the objective)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uas_coverage_baselines.milp_mpc.milp import Milp
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
+from uas_coverage_env.vehicle import DOD, LIFT, PSI, TAU_X, TAU_Y, TAU_Z, WX, WY, WZ
+
+
+class Slack:
+    """-a_s <= a <= a_s, with a_s penalised: steady flight and little energy (Sec. III-C.1, OCP_4).
+
+    Penalised are |L|, |tau|, |omega|, |psi| and DoD (which is its own absolute value), each
+    normalised by its largest value; DoD by what a step of hovering takes.
+    """
+
+    def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
+        """Add slack columns, their rows and part I of the objective."""
+        w = problem.weights
+        limit, torque = problem.limit, problem.torque_max_Nm
+        for name, columns, weight, largest in (
+            ("lift", v.u[:, :, LIFT], w.lift, limit("lift_max_N")),
+            ("torque_x", v.u[:, :, TAU_X], w.torque, torque(0)),
+            ("torque_y", v.u[:, :, TAU_Y], w.torque, torque(1)),
+            ("torque_z", v.u[:, :, TAU_Z], w.torque, torque(2)),
+            ("rate_x", v.x[:, 1:, WX], w.rate, limit("rate_max_radps")),
+            ("rate_y", v.x[:, 1:, WY], w.rate, limit("rate_max_radps")),
+            ("rate_z", v.x[:, 1:, WZ], w.rate, limit("yaw_rate_max_radps")),
+            ("yaw", v.x[:, 1:, PSI], w.yaw, limit("yaw_max_rad")),
+        ):
+            slack = milp.variables(f"slack.{name}", columns.shape, lower=0.0)
+            for side, sign in (("above", -1.0), ("below", 1.0)):
+                milp.subject_to(
+                    f"slack.{name}_{side}",
+                    (1.0, slack[..., None]),
+                    (sign, columns[..., None]),
+                    lower=0.0,
+                )
+            milp.minimize(weight / largest[:, None], slack)
+        hovering = np.array([model.E[DOD] for model in problem.models])
+        milp.minimize(w.energy / hovering[:, None], v.x[:, 1:, DOD])
+        # what hovering takes in any case: left out, so that J is what the plan can influence
+        steps = np.arange(1, problem.horizon + 1)
+        in_any_case = problem.x0[:, DOD, None] + hovering[:, None] * steps
+        milp.add_constant(-float((w.energy / hovering[:, None] * in_any_case).sum()))

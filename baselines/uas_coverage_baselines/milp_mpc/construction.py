@@ -1,0 +1,319 @@
+"""Construction: flights along short waypoint sequences, simulated with the world's inner loop.
+
+A MILP solver finds its first good solution of the joint OCP late. Flying every short sequence of
+reachable waypoints through the vehicle's own velocity loop takes milliseconds and says which
+waypoints can be had when; around the best of these flights a restricted MILP is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem
+from uas_coverage_env.geometry import closed_cylinder_faces, signed_distance
+from uas_coverage_env.vehicle import (
+    VX,
+    VY,
+    VZ,
+    X,
+    Y,
+    Z,
+    compile_vehicle,
+    fly_kinematics,
+    velocity_climb_wrench,
+)
+
+FloatArray = NDArray[np.float64]
+NEVER = 10_000
+_DEPTH = 4
+_BRANCHES = (10, 5, 4, 3)
+_LEADS_S = (1.0, 2.0)  # how far ahead of itself the UAS aims; which is better depends on the turn
+_ROOF_LOOKAHEAD = 4
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One UAS's simulated flight over the horizon.
+
+    Attributes:
+        positions_m: (N+1, 3).
+        visit: (W,) first step at which each waypoint of the problem is covered, `NEVER` if not.
+        target_cost: what its target distance would cost.
+        too_close_m: how deep it enters keep-out zones, summed over samples; 0 where clear.
+    """
+
+    positions_m: FloatArray
+    visit: NDArray[np.int64]
+    target_cost: float
+    too_close_m: float
+
+
+def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> list[Flight]:
+    """The most promising flights of one UAS, best first, no two covering the same waypoints.
+
+    Args:
+        problem: the decision.
+        uas: row of the UAS.
+        dt_s: sampling time.
+        keep: how many at most.
+    """
+    sequences = _sequences(problem, uas)
+    vehicle = compile_vehicle(problem.vehicles[uas], dt_s)[()]
+    normals, offsets, first, last, clearance = _stacked_hulls(problem, uas)
+    target = problem.targets[uas]
+    aim = np.full(3, np.nan) if target is None else target.position_m
+    best: dict[bytes, tuple[float, Flight]] = {}
+    for lead_s in _LEADS_S:
+        positions, visits, depth = _fly_all(
+            vehicle,
+            problem.x0[uas],
+            sequences,
+            problem.waypoints_m,
+            problem.waypoint_reach_m,
+            normals,
+            offsets,
+            first,
+            last,
+            clearance,
+            aim,
+            lead_s,
+            problem.horizon,
+        )
+        costs = _target_costs(problem, uas, positions, visits)
+        values = _rewards(problem, visits).sum(axis=1) - costs - depth
+        for row in np.argsort(-values, kind="stable")[: 4 * keep]:
+            key = (visits[row] < NEVER).tobytes()
+            if key not in best or best[key][0] < values[row]:
+                flight = Flight(positions[row], visits[row], costs[row], depth[row])
+                best[key] = (float(values[row]), flight)
+    ranked = sorted(best.values(), key=lambda pair: -pair[0])
+    return [flight for _, flight in ranked[:keep]]
+
+
+def teams(
+    problem: PlanningProblem, pools: Sequence[Sequence[Flight]], keep: int
+) -> list[tuple[Flight, ...]]:
+    """Good combinations of one flight per UAS, best first.
+
+    A waypoint counts once, for who gets there first; flights that come too close to each other
+    are charged. Coordinate ascent from each UAS's leading flights.
+    """
+    rewards = [np.array([_rewards(problem, f.visit[None])[0] for f in pool]) for pool in pools]
+    costs = [np.array([f.target_cost + f.too_close_m for f in pool]) for pool in pools]
+    clashes = _clashes(problem, pools)
+    found: dict[tuple[int, ...], float] = {}
+    for leader in range(len(pools)):
+        for first in range(min(keep, len(pools[leader]))):
+            chosen = [0] * len(pools)
+            chosen[leader] = first
+            for _ in range(4):
+                before = list(chosen)
+                for uas in range(len(pools)):
+                    if uas == leader:
+                        continue
+                    others = [rewards[j][chosen[j]] for j in range(len(pools)) if j != uas]
+                    covered = np.max(others, axis=0) if others else 0.0
+                    gain = np.maximum(rewards[uas] - covered, 0.0).sum(axis=1) - costs[uas]
+                    for j in range(len(pools)):
+                        if j != uas:
+                            gain = gain - clashes[uas][j][:, chosen[j]]
+                    chosen[uas] = int(np.argmax(gain))
+                if chosen == before:
+                    break
+            together = np.max([rewards[j][chosen[j]] for j in range(len(pools))], axis=0).sum()
+            together -= sum(costs[j][chosen[j]] for j in range(len(pools)))
+            together -= sum(
+                clashes[j][k][chosen[j], chosen[k]] for j in range(len(pools)) for k in range(j)
+            )
+            found[tuple(chosen)] = float(together)
+    ranked = sorted(found, key=lambda key: -found[key])
+    return [tuple(pools[j][row] for j, row in enumerate(key)) for key in ranked[:keep]]
+
+
+def _rewards(problem: PlanningProblem, visits: NDArray[np.int64]) -> FloatArray:
+    """(S, W) what covering at those steps takes off part III of the objective."""
+    return problem.waypoint_weight * np.maximum(problem.horizon - visits, 0)
+
+
+def _target_costs(
+    problem: PlanningProblem, uas: int, positions: FloatArray, visits: NDArray[np.int64]
+) -> FloatArray:
+    target = problem.targets[uas]
+    if target is None:
+        return np.zeros(len(positions))
+    faces = closed_cylinder_faces(problem.physical_sides)
+    distance = ((positions[:, 1:] - target.position_m) @ faces.T).max(axis=2)
+    if target.waypoint is not None:
+        steps = np.arange(1, problem.horizon + 1)
+        distance = np.where(steps > visits[:, [target.waypoint]], 0.0, distance)
+    return target.weight * np.maximum(distance, 0.0).sum(axis=1)
+
+
+def _clashes(problem: PlanningProblem, pools: Sequence[Sequence[Flight]]) -> list[list[FloatArray]]:
+    """[j][k] (flights of j, flights of k) how deep they come too close, summed over samples."""
+    paths = [np.array([f.positions_m[1:] for f in pool]) for pool in pools]
+    result = []
+    for j, mine in enumerate(paths):
+        row = []
+        for k, theirs in enumerate(paths):
+            apart = np.abs(mine[:, None] - theirs[None])
+            distance = np.maximum(np.hypot(apart[..., 0], apart[..., 1]), apart[..., 2])
+            short = np.maximum(problem.separation_m[j, k] - distance, 0.0)
+            row.append(10.0 * short.sum(axis=2))
+        result.append(row)
+    return result
+
+
+def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
+    """(S, _DEPTH) waypoint sequences, padded with -1: near ones first, then their neighbours."""
+    if not problem.n_waypoints:
+        return np.full((1, _DEPTH), -1, np.int64)
+    waypoints = problem.waypoints_m
+    ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, 3:6]
+    near = np.argsort(_travel_m(waypoints - ahead), kind="stable")[: _BRANCHES[0]]
+    between = _travel_m(waypoints[:, None] - waypoints[None])
+    neighbours = np.argsort(between, axis=1, kind="stable")
+    sequences: list[tuple[int, ...]] = [()]
+    open_ends: list[tuple[int, ...]] = [(int(w),) for w in near]
+    for branches in _BRANCHES[1:]:
+        sequences += open_ends
+        open_ends = [
+            (*sequence, int(w))
+            for sequence in open_ends
+            for w in neighbours[sequence[-1]][: branches + len(sequence)]
+            if w not in sequence
+        ]
+    sequences += open_ends
+    padded = np.full((len(sequences), _DEPTH), -1, np.int64)
+    for row, sequence in enumerate(sequences):
+        padded[row, : len(sequence)] = sequence
+    return padded
+
+
+def _travel_m(away: FloatArray) -> FloatArray:
+    """Horizontal distance, or the height that takes as long to climb or descend."""
+    return np.maximum(np.hypot(away[..., 0], away[..., 1]), 4.0 * np.abs(away[..., 2]))
+
+
+def _stacked_hulls(problem: PlanningProblem, uas: int):
+    """Faces of the fence and of all obstacles in one array, the fence's turned outward last."""
+    hulls = [hull for _, hull in problem.obstacles]
+    counts = np.array([hull.n_faces for hull in hulls], np.int64)
+    last = np.cumsum(counts)
+    normals = np.concatenate([hull.normals for hull in hulls] + [problem.fence.normals])
+    offsets = np.concatenate([hull.offsets_m for hull in hulls] + [problem.fence.offsets_m])
+    first = np.concatenate([last - counts, [last[-1] if len(last) else 0]]).astype(np.int64)
+    last = np.concatenate([last, [len(offsets)]]).astype(np.int64)
+    clearance = np.concatenate([problem.obstacle_clearance_m[uas], [problem.fence_margin_m]])
+    return normals, offsets, first, last, clearance
+
+
+@njit(cache=True, error_model="numpy")
+def _aim_at(box, half_m, x, following, lead_s):
+    """A point of the box on the way to what follows."""
+    point = np.empty(3)
+    for axis in range(3):
+        middle = 0.5 * (x[axis] + following[axis])
+        low, high = box[axis] - 0.8 * half_m, box[axis] + 0.8 * half_m
+        point[axis] = min(max(middle, low), high)
+    return point
+
+
+@njit(cache=True, error_model="numpy")
+def _over_roofs(x, down_mps, normals, offsets, first, last, clearance):
+    """Climb instead where the way ahead leads into an obstacle."""
+    for step in range(1, _ROOF_LOOKAHEAD + 1):
+        north, east = x[X] + step * x[VX], x[Y] + step * x[VY]
+        for o in range(len(first) - 1):
+            height = x[Z] + step * down_mps
+            d = signed_distance(normals, offsets, first[o], last[o], north, east, height)
+            if d < clearance[o] + 0.5:
+                return -3.0
+    return down_mps
+
+
+@njit(cache=True, error_model="numpy")
+def _depth_inside(x, normals, offsets, first, last, clearance):
+    """How far the position is inside keep-out zones or outside the fence [m]."""
+    depth = 0.0
+    fence = len(first) - 1
+    for o in range(fence):
+        d = signed_distance(normals, offsets, first[o], last[o], x[X], x[Y], x[Z])
+        depth += max(clearance[o] - d, 0.0)
+    d = signed_distance(normals, offsets, first[fence], last[fence], x[X], x[Y], x[Z])
+    return depth + max(d + clearance[fence], 0.0)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _fly_all(
+    vehicle,
+    x0,
+    sequences,
+    waypoints,
+    half_m,
+    normals,
+    offsets,
+    first,
+    last,
+    clearance,
+    target,
+    lead_s,
+    horizon,
+):
+    """Fly every sequence; positions (S, N+1, 3), first visits (S, W), depth inside (S,)."""
+    S, W = sequences.shape[0], waypoints.shape[0]
+    positions = np.empty((S, horizon + 1, 3))
+    visits = np.full((S, W), NEVER, np.int64)
+    depths = np.zeros(S)
+    x = np.empty(x0.shape[0])
+    u = np.zeros(5)
+    reference = np.empty(2)
+    has_target = not np.isnan(target[0])
+    for s in range(S):
+        x[:] = x0
+        reference[0], reference[1] = x0[VX], x0[VY]
+        positions[s, 0] = x[:3]
+        leg = 0
+        for n in range(horizon):
+            for w in range(W):
+                if visits[s, w] == NEVER:
+                    inside = True
+                    for axis in range(3):
+                        inside = inside and abs(x[axis] - waypoints[w, axis]) <= half_m[w]
+                    if inside:
+                        visits[s, w] = n
+            while leg < sequences.shape[1] and (
+                sequences[s, leg] >= 0 and visits[s, sequences[s, leg]] < NEVER
+            ):
+                leg += 1
+            w = sequences[s, leg] if leg < sequences.shape[1] else -1
+            speed = 12.0
+            if w >= 0:
+                nxt = sequences[s, leg + 1] if leg + 1 < sequences.shape[1] else -1
+                following = waypoints[nxt] if nxt >= 0 else waypoints[w]
+                aim = _aim_at(waypoints[w], half_m[w], x, following, lead_s)
+            elif has_target:
+                aim = target.copy()
+            else:
+                aim = x[:3] + 60.0 * x[3:6] + 1e-9
+            dx, dy = aim[0] - x[X], aim[1] - x[Y]
+            away = np.hypot(dx, dy) + 1e-9
+            lead = lead_s if away > 15.0 else 0.0
+            ex, ey = dx - lead * x[VX], dy - lead * x[VY]
+            length = np.hypot(ex, ey) + 1e-9
+            if w < 0 and has_target:
+                speed = min(speed, 0.3 * away)
+            down = min(max(0.6 * (aim[2] - x[Z]) - 0.2 * x[VZ], -3.0), 1.5)
+            down = _over_roofs(x, down, normals, offsets, first, last, clearance)
+            velocity_climb_wrench(
+                vehicle, x, reference, speed * ex / length, speed * ey / length, down, u
+            )
+            fly_kinematics(vehicle, x, u)
+            positions[s, n + 1] = x[:3]
+            depths[s] += _depth_inside(x, normals, offsets, first, last, clearance)
+    return positions, visits, depths

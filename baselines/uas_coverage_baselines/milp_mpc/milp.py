@@ -1,0 +1,288 @@
+"""A mixed-integer linear program that blocks fill with whole families of rows at a time.
+
+Four verbs: `variables`, `subject_to`, `minimize`, `build`. Columns are handed around as integer
+index arrays with the shape of the mathematics; a family of rows is one NumPy expression. The index
+`ABSENT` stands for a variable that is known to be zero: its terms vanish, so that pruned variables
+need no special case in the formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+ABSENT = -1
+INFINITY = float("inf")
+Columns = NDArray[np.int64]
+Term = tuple[ArrayLike, Columns]
+
+
+@dataclass(frozen=True)
+class BuiltMilp:
+    """min cost·x + constant  subject to  row_lower <= matrix x <= row_upper, bounds, integrality.
+
+    Attributes:
+        cost: (C,) objective coefficients.
+        constant: part of the objective that no column changes.
+        lower: (C,) column bounds.
+        upper: (C,) column bounds.
+        integer: (C,) True where the column takes whole numbers.
+        matrix: (R, C) rows, compressed by row.
+        row_lower: (R,) row bounds.
+        row_upper: (R,) row bounds.
+    """
+
+    cost: NDArray[np.float64]
+    constant: float
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    integer: NDArray[np.bool_]
+    matrix: sparse.csr_matrix
+    row_lower: NDArray[np.float64]
+    row_upper: NDArray[np.float64]
+
+    def objective(self, values: NDArray[np.float64]) -> float:
+        """Objective at `values` (C,)."""
+        return float(self.cost @ values) + self.constant
+
+    def violation(self, values: NDArray[np.float64]) -> float:
+        """Largest violation of any bound, row or integrality at `values` (C,), by our arithmetic.
+
+        Rows are scaled by their largest coefficient where that exceeds one, so that the figure is
+        in the unit of the row's variables rather than of its big M.
+        """
+        if not np.isfinite(values).all():
+            return INFINITY
+        worst = [0.0]
+        if len(values):
+            worst.append(float(np.max(self.lower - values)))
+            worst.append(float(np.max(values - self.upper)))
+        if self.integer.any():
+            whole = values[self.integer]
+            worst.append(float(np.max(np.abs(whole - np.round(whole)))))
+        if self.matrix.shape[0]:
+            activity = self.matrix @ values
+            excess = np.maximum(self.row_lower - activity, activity - self.row_upper)
+            worst.append(float(np.max(excess)))
+        return max(worst)
+
+
+class Milp:
+    """Accumulates named groups of columns and rows; `build` turns them into one sparse program."""
+
+    def __init__(self) -> None:
+        self._columns: dict[str, Columns] = {}
+        self._lower: list[NDArray[np.float64]] = []
+        self._upper: list[NDArray[np.float64]] = []
+        self._integer: list[NDArray[np.bool_]] = []
+        self._implied: list[Columns] = []
+        self._n_columns = 0
+        self._row_names: list[tuple[str, NDArray[np.int64]]] = []
+        self._entries: list[tuple[NDArray[np.int64], Columns, NDArray[np.float64]]] = []
+        self._row_lower: list[NDArray[np.float64]] = []
+        self._row_upper: list[NDArray[np.float64]] = []
+        self._n_rows = 0
+        self._cost: list[tuple[Columns, NDArray[np.float64]]] = []
+        self._constant = 0.0
+
+    def variables(
+        self,
+        name: str,
+        shape: tuple[int, ...],
+        *,
+        lower: ArrayLike = -INFINITY,
+        upper: ArrayLike = INFINITY,
+        integer: bool = False,
+        where: NDArray[np.bool_] | None = None,
+    ) -> Columns:
+        """Add a group of columns and return their indices.
+
+        Args:
+            name: dotted name of the group, unique in the program.
+            shape: shape of the returned index array.
+            lower: bound, broadcast to `shape`.
+            upper: bound, broadcast to `shape`.
+            integer: whether the columns take whole numbers.
+            where: (shape) mask; where False no column is made and the index is `ABSENT` (zero).
+
+        Returns:
+            Index array of the given shape.
+
+        Raises:
+            ValueError: if the name is taken or a lower bound exceeds its upper bound.
+        """
+        if name in self._columns:
+            raise ValueError(f"columns '{name}' exist already")
+        made = np.ones(shape, bool) if where is None else np.broadcast_to(where, shape)
+        count = int(made.sum())
+        columns = np.full(shape, ABSENT, np.int64)
+        columns[made] = np.arange(self._n_columns, self._n_columns + count)
+        low = np.broadcast_to(np.asarray(lower, float), shape)[made]
+        high = np.broadcast_to(np.asarray(upper, float), shape)[made]
+        if (low > high).any():
+            raise ValueError(f"columns '{name}': a lower bound exceeds its upper bound")
+        self._lower.append(low)
+        self._upper.append(high)
+        self._integer.append(np.full(count, integer))
+        self._n_columns += count
+        self._columns[name] = columns
+        return columns
+
+    def drop_integrality(self, columns: Columns) -> None:
+        """Let columns take any value within their bounds: rows added now make them whole."""
+        self._implied.append(columns[columns != ABSENT])
+
+    def columns(self, name: str) -> Columns:
+        """Index array of a group added before; blocks find each other's columns by name."""
+        return self._columns[name]
+
+    def subject_to(
+        self,
+        name: str,
+        *terms: Term,
+        lower: ArrayLike = -INFINITY,
+        upper: ArrayLike = INFINITY,
+        where: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Add the rows  lower <= sum of the terms <= upper.
+
+        Args:
+            name: dotted name of the family, for messages and LP files.
+            terms: pairs (coefficients, columns), broadcast together; the last axis is summed, the
+                leading axes of all terms broadcast to the shape of the family.
+            lower: bound, broadcast to the shape of the family.
+            upper: bound, broadcast to the shape of the family.
+            where: mask in the shape of the family; rows are made only where it is True.
+        """
+        shapes = [np.broadcast_shapes(np.shape(c), np.shape(k)) for c, k in terms]
+        masks = () if where is None else (np.shape(where),)
+        shape = np.broadcast_shapes(*(s[:-1] for s in shapes), *masks)
+        made = np.ones(shape, bool) if where is None else np.broadcast_to(where, shape)
+        count = int(made.sum())
+        if count == 0:
+            return
+        rows = np.arange(self._n_rows, self._n_rows + count)
+        for (coefficients, columns), full in zip(terms, shapes, strict=True):
+            wide = (*shape, full[-1])
+            picked = np.broadcast_to(columns, wide)[made]
+            values = np.broadcast_to(np.asarray(coefficients, float), wide)[made]
+            keep = (picked != ABSENT) & (values != 0.0)
+            repeated = np.broadcast_to(rows[:, None], picked.shape)
+            self._entries.append((repeated[keep], picked[keep], values[keep]))
+        self._row_lower.append(np.broadcast_to(np.asarray(lower, float), shape)[made])
+        self._row_upper.append(np.broadcast_to(np.asarray(upper, float), shape)[made])
+        self._row_names.append((name, np.argwhere(made)))
+        self._n_rows += count
+
+    def minimize(self, coefficients: ArrayLike, columns: Columns) -> None:
+        """Add coefficients · columns (broadcast together) to the objective."""
+        shape = np.broadcast_shapes(np.shape(coefficients), columns.shape)
+        picked = np.broadcast_to(columns, shape).ravel()
+        values = np.broadcast_to(np.asarray(coefficients, float), shape).ravel()
+        keep = picked != ABSENT
+        self._cost.append((picked[keep], values[keep]))
+
+    def add_constant(self, value: float) -> None:
+        """Add a constant to the objective."""
+        self._constant += value
+
+    def build(self) -> BuiltMilp:
+        """Assemble everything added so far."""
+        cost = np.zeros(self._n_columns)
+        for picked, values in self._cost:
+            np.add.at(cost, picked, values)
+        rows, picked, values = (
+            np.concatenate([entry[k] for entry in self._entries]) if self._entries else np.zeros(0)
+            for k in range(3)
+        )
+        integer = _joined(self._integer).astype(bool)
+        for columns in self._implied:
+            integer[columns] = False
+        shape = (self._n_rows, self._n_columns)
+        matrix = sparse.csr_matrix((values, (rows, picked)), shape=shape)
+        return BuiltMilp(
+            cost=cost,
+            constant=self._constant,
+            lower=_joined(self._lower),
+            upper=_joined(self._upper),
+            integer=integer,
+            matrix=matrix,
+            row_lower=_joined(self._row_lower),
+            row_upper=_joined(self._row_upper),
+        )
+
+    def column_names(self) -> list[str]:
+        """Readable name of each column: its group and its index in the group."""
+        names = [""] * self._n_columns
+        for group, columns in self._columns.items():
+            for index in np.argwhere(columns != ABSENT):
+                names[columns[tuple(index)]] = f"{group}({','.join(map(str, index))})"
+        return names
+
+    def row_names(self) -> list[str]:
+        """Readable name of each row: its family and its index in the family."""
+        return [
+            f"{family}({','.join(map(str, index))})"
+            for family, indices in self._row_names
+            for index in indices
+        ]
+
+    def lp_text(self) -> str:
+        """The program in LP format, one row per line, for people and for golden files."""
+        built, names = self.build(), self.column_names()
+        lines = ["minimize", f" cost: {_expression(built.cost, range(len(names)), names)}"]
+        lines.append("subject to")
+        for row, name in enumerate(self.row_names()):
+            span = slice(built.matrix.indptr[row], built.matrix.indptr[row + 1])
+            order = np.argsort(built.matrix.indices[span], kind="stable")
+            columns = built.matrix.indices[span][order]
+            left = _expression(built.matrix.data[span][order], columns, names)
+            low, high = built.row_lower[row], built.row_upper[row]
+            if low == high:
+                lines.append(f" {name}: {left} = {_number(low)}")
+            elif np.isinf(low):
+                lines.append(f" {name}: {left} <= {_number(high)}")
+            elif np.isinf(high):
+                lines.append(f" {name}: {left} >= {_number(low)}")
+            else:
+                lines.append(f" {name}: {_number(low)} <= {left} <= {_number(high)}")
+        lines.append("bounds")
+        binary = built.integer & (built.lower == 0.0) & (built.upper == 1.0)
+        for column, name in enumerate(names):
+            low, high = built.lower[column], built.upper[column]
+            if not binary[column]:
+                lines.append(f" {_number(low)} <= {name} <= {_number(high)}")
+        for title, group in (("binary", binary), ("general", built.integer & ~binary)):
+            if group.any():
+                lines.append(title)
+                lines += [f" {names[column]}" for column in np.flatnonzero(group)]
+        return "\n".join([*lines, "end", ""])
+
+    def write_lp(self, path: str | Path) -> None:
+        """Write `lp_text` to a file."""
+        Path(path).write_text(self.lp_text(), encoding="utf-8")
+
+
+def _joined(parts: list[NDArray]) -> NDArray:
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _number(value: float) -> str:
+    if np.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return f"{value:.6g}" if abs(value) > 1e-12 else "0"
+
+
+def _expression(values, columns, names: list[str]) -> str:
+    parts = []
+    for value, column in zip(values, columns, strict=True):
+        if value == 0.0:
+            continue
+        sign = "-" if value < 0 else "+"
+        size = "" if abs(value) == 1.0 else f"{_number(abs(value))} "
+        parts.append(f"{sign} {size}{names[column]}")
+    return " ".join(parts) if parts else "0"

@@ -1,0 +1,74 @@
+"""The optimal control problem (OF), (OCP_1) to (OCP_8): its table of contents."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from uas_coverage_baselines.milp_mpc.blocks import (
+    Capabilities,
+    Collision,
+    CornerCutting,
+    Coverage,
+    Dynamics,
+    Geofence,
+    MovingObstacles,
+    Obstacles,
+    Slack,
+    TargetDistance,
+    coverable,
+)
+from uas_coverage_baselines.milp_mpc.milp import Milp
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES
+
+
+class Block(Protocol):
+    """One constraint family of the OCP (Sec. III-C), with its part of the objective."""
+
+    def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
+        """Add the family's columns, rows and costs."""
+        ...
+
+
+OCP: tuple[Block, ...] = (
+    Dynamics(),
+    Capabilities(),
+    Slack(),
+    Collision(),
+    Geofence(),
+    Obstacles(),
+    MovingObstacles(),
+    CornerCutting(),
+    Coverage(),
+    TargetDistance(),
+)
+
+
+def shared_variables(milp: Milp, problem: PlanningProblem) -> Variables:
+    """The columns every block may use; x(0) and Phi(0) are fixed to what was measured."""
+    U, N, W = problem.n_uas, problem.horizon, problem.n_waypoints
+    lower = np.full((U, N + 1, N_STATES), -np.inf)
+    upper = -lower
+    lower[:, 0] = upper[:, 0] = problem.x0
+    open_now = np.zeros((N + 1, W))
+    open_now[0] = 1.0
+    return Variables(
+        x=milp.variables("x", (U, N + 1, N_STATES), lower=lower, upper=upper),
+        u=milp.variables("u", (U, N, N_INPUTS)),
+        covers=milp.variables(
+            "covers", (U, N, W), lower=0.0, upper=1.0, integer=True, where=coverable(problem)
+        ),
+        uncovered=milp.variables("uncovered", (N + 1, W), lower=open_now, upper=1.0),
+    )
+
+
+def formulate(problem: PlanningProblem, blocks: Sequence[Block] = OCP) -> tuple[Milp, Variables]:
+    """Write the OCP of one decision as a mixed-integer linear program."""
+    milp = Milp()
+    v = shared_variables(milp, problem)
+    for block in blocks:
+        block.add_to(milp, v, problem)
+    return milp, v

@@ -1,0 +1,218 @@
+"""What one decision's OCP is about: everything a block may read, and the columns all blocks share.
+
+Operation modes are data before the OCP (Sec. III-C.6): a landed UAS is absent, a target is a
+`Target` or None, a waypoint out of reach or covered is absent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.milp import Columns
+from uas_coverage_baselines.milp_mpc.reachability import Reach
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.vehicle import LinearModel, VehicleParams
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Cost coefficients of the objective (OF); each term is normalised by its largest value.
+
+    The paper names what is penalised but publishes no figures; these are ours, in units of one
+    waypoint of weight 1 left uncovered for one step.
+    """
+
+    lift: float = 0.05
+    torque: float = 0.05
+    rate: float = 0.03
+    yaw: float = 0.05
+    energy: float = 0.05
+    transit: float = 0.6
+    homing: float = 0.6
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a UAS's target distance is measured to (Sec. III-C.6).
+
+    Attributes:
+        position_m: (3,) the target, NED.
+        weight: cost per metre of distance and step, W_target.
+        waypoint: position of the waypoint in `PlanningProblem.waypoints_m`, whose coverage
+            relaxes the constraint; None for the initial position.
+    """
+
+    position_m: FloatArray
+    weight: float
+    waypoint: int | None = None
+
+
+@dataclass(frozen=True)
+class MovingHull:
+    """A moving obstacle as the planner predicts it: constant velocity, closed cylinder.
+
+    Attributes:
+        name: name in the scenario.
+        position_m: (N+1, 3) predicted centre.
+        radius_m: its own radius.
+        half_height_m: half its height.
+    """
+
+    name: str
+    position_m: FloatArray
+    radius_m: float
+    half_height_m: float
+
+
+@dataclass(frozen=True)
+class PlanningProblem:
+    """One decision.
+
+    Attributes:
+        names: the active UAS.
+        vehicles: (U) their parameters.
+        models: (U) the LPV matrices for the measured depth of discharge, held over the horizon.
+        x0: (U, 14) measured states.
+        horizon: N.
+        fence: the geofence.
+        fence_margin_m: how far inside it the plan stays, -delta_G.
+        obstacles: names and hulls of the fixed obstacles.
+        obstacle_clearance_m: (U, O) delta_O,min, margins included.
+        moving: the moving obstacles.
+        moving_clearance_m: (U, M) added to radius and half height.
+        separation_m: (U, U) delta_C,min.
+        waypoints_m: (W, 3) the uncovered waypoints considered.
+        waypoint_reach_m: (W,) delta_WP times the inner factor c_in.
+        waypoint_weight: (W,) W_Phi.
+        waypoint_index: (W,) index of each in the scenario.
+        n_scenario_waypoints: K, how many waypoints the scenario has.
+        targets: (U) see `Target`.
+        weights: see `Weights`.
+        physical_sides: H_P.
+        obstacle_sides: H_O.
+        waypoint_sides: H_WP.
+        prune: whether reachable sets drop what cannot matter; False keeps every row and column,
+            with big M from the fence alone (the oracle of the tests).
+    """
+
+    names: tuple[str, ...]
+    vehicles: tuple[VehicleParams, ...]
+    models: tuple[LinearModel, ...]
+    x0: FloatArray
+    horizon: int
+    fence: ConvexPolytope
+    fence_margin_m: float
+    obstacles: tuple[tuple[str, ConvexPolytope], ...]
+    obstacle_clearance_m: FloatArray
+    moving: tuple[MovingHull, ...]
+    moving_clearance_m: FloatArray
+    separation_m: FloatArray
+    waypoints_m: FloatArray
+    waypoint_reach_m: FloatArray
+    waypoint_weight: FloatArray
+    waypoint_index: NDArray[np.int64]
+    n_scenario_waypoints: int
+    targets: tuple[Target | None, ...]
+    weights: Weights = field(default_factory=Weights)
+    physical_sides: int = 8
+    obstacle_sides: int = 8
+    waypoint_sides: int = 4
+    prune: bool = True
+
+    @property
+    def n_uas(self) -> int:
+        """U."""
+        return len(self.names)
+
+    @property
+    def n_waypoints(self) -> int:
+        """W."""
+        return len(self.waypoints_m)
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Supersets of the positions each UAS can have at each step."""
+        return Reach.of(self.x0, self.vehicles, self.models, self.horizon, self.fence, self.prune)
+
+    def limit(self, name: str) -> FloatArray:
+        """(U,) one of the vehicles' limits by its field name."""
+        return np.array([getattr(v.limits, name) for v in self.vehicles], float)
+
+    def torque_max_Nm(self, axis: int) -> FloatArray:
+        """(U,) largest torque about a body axis."""
+        return np.array([v.torque_max_Nm[axis] for v in self.vehicles], float)
+
+
+@dataclass(frozen=True)
+class Variables:
+    """The columns all blocks share.
+
+    Attributes:
+        x: (U, N+1, 14) predicted states.
+        u: (U, N, 5) inputs.
+        covers: (U, N, W) b_W: 1 where the UAS covers the waypoint at that step.
+        uncovered: (N+1, W) Phi: 1 where the waypoint is still open.
+    """
+
+    x: Columns
+    u: Columns
+    covers: Columns
+    uncovered: Columns
+
+    @property
+    def position(self) -> Columns:
+        """(U, N+1, 3)."""
+        return self.x[..., 0:3]
+
+    @property
+    def velocity(self) -> Columns:
+        """(U, N+1, 3)."""
+        return self.x[..., 3:6]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A verified plan.
+
+    Attributes:
+        names: the UAS it is for.
+        x: (U, n+1, 14) predicted states; n = N when made, less as it is flown.
+        u: (U, n, 5) inputs.
+        covers: (U, n, K) True where a waypoint is planned to be covered, K all of the scenario's.
+        objective: J without what the plan cannot influence.
+        bound: proven lower bound of the best objective; -inf where none.
+    """
+
+    names: tuple[str, ...]
+    x: FloatArray
+    u: FloatArray
+    covers: NDArray[np.bool_]
+    objective: float
+    bound: float
+
+    def of(self, name: str) -> int:
+        """Row of a UAS."""
+        return self.names.index(name)
+
+    def advanced(self) -> Plan | None:
+        """What is left of the plan after its first step was flown; None when nothing is."""
+        if self.u.shape[1] <= 1:
+            return None
+        return replace(self, x=self.x[:, 1:], u=self.u[:, 1:], covers=self.covers[:, 1:])
+
+    def positions(self) -> Mapping[str, FloatArray]:
+        """(N+1, 3) predicted positions by UAS."""
+        return {name: self.x[row, :, 0:3] for row, name in enumerate(self.names)}
+
+    def relative_gap(self) -> float | None:
+        """(J - bound) / |J|, J being what the plan can influence; None without a bound."""
+        if not np.isfinite(self.bound):
+            return None
+        return max(self.objective - self.bound, 0.0) / max(abs(self.objective), 1e-6)

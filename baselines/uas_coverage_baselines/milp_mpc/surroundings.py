@@ -1,0 +1,157 @@
+"""From the scenario and what is seen now to the `PlanningProblem` of one decision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.blocks import coverable
+from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem, Target, Weights
+from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model, return_threshold
+from uas_coverage_env.world import SwarmState
+
+FloatArray = NDArray[np.float64]
+_LANDING_S = 12.0  # settling above the landing site, generously
+
+
+class Formulation(Protocol):
+    """The planner options that shape a problem."""
+
+    horizon: int
+    physical_sides: int
+    obstacle_sides: int
+    waypoint_sides: int
+    margin_m: float
+    moving_margin_m: float
+
+
+class Surroundings:
+    """What stays the same over a mission, and the view of it at one sample."""
+
+    def __init__(self, scenario: Scenario, options: Formulation) -> None:
+        self.scenario, self._options = scenario, options
+        self.dt_s = scenario.dt_s
+        self.waypoints_m = np.array([w.position_m for w in scenario.waypoints], float)
+        self.home_m = {uas.name: np.array(uas.start_m, float) for uas in scenario.uas}
+        self._vehicles = dict(zip((u.name for u in scenario.uas), scenario.vehicles, strict=True))
+        self._uas = {uas.name: uas for uas in scenario.uas}
+        self._obstacles = tuple(
+            (obstacle.name, hull)
+            for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+        )
+        factor = inner_factor(options.waypoint_sides, 3)
+        self._waypoint_reach_m = np.array([w.radius_m * factor for w in scenario.waypoints])
+        self._waypoint_weight = np.array([w.weight for w in scenario.waypoints], float)
+
+    def vehicle(self, name: str) -> VehicleParams:
+        """Parameters of a UAS's vehicle."""
+        return self._vehicles[name]
+
+    def dod_return(self, name: str) -> float:
+        """DoD_r (Sec. III-C.6, return mode)."""
+        return return_threshold(self._vehicles[name], self._uas[name].dod_max)
+
+    def seconds_left(self, name: str, dod: float) -> float:
+        """Flight time until DoD_max, at the pace of cruising."""
+        vehicle = self._vehicles[name]
+        energy_J = 3600.0 * vehicle.battery.capacity_Ah * vehicle.battery.voltage_nominal_V
+        return (self._uas[name].dod_max - dod) * energy_J / (1.1 * vehicle.power.hover_W)
+
+    def seconds_home(self, name: str, position_m: FloatArray) -> float:
+        """Flight time home at cruise speed, with a detour and the landing."""
+        limits = self._vehicles[name].limits
+        away = self.home_m[name] - position_m
+        level = 1.2 * float(np.hypot(away[0], away[1])) / limits.v_cruise_mps
+        return level + abs(float(away[2])) / limits.v_down_max_mps + _LANDING_S
+
+    def blocked_waypoints(self, swarm: SwarmState) -> set[int]:
+        """Waypoints whose whole inner polyhedron lies in a moving obstacle's keep-out, now."""
+        blocked: set[int] = set()
+        for row, obstacle in enumerate(self.scenario.moving_obstacles):
+            keep_out = obstacle.safe_distance_m + max(u.radius_m for u in self.scenario.uas)
+            away = np.abs(self.waypoints_m - swarm.moving_position_m[row])
+            reach = self._waypoint_reach_m
+            level = np.hypot(away[:, 0] + reach, away[:, 1] + reach)
+            inside = level < obstacle.radius_m + keep_out
+            inside &= away[:, 2] + reach < 0.5 * obstacle.height_m + keep_out
+            blocked |= set(np.flatnonzero(inside).tolist())
+        return blocked
+
+    def problem(
+        self, swarm: SwarmState, targets: Mapping[str, Target | None], weights: Weights
+    ) -> PlanningProblem:
+        """The decision to make now; waypoints that nobody can reach in time are left out."""
+        options, names = self._options, swarm.active
+        rows = [swarm.names.index(name) for name in names]
+        x0 = swarm.x[rows]
+        uas = [self._uas[name] for name in names]
+        radius = np.array([u.radius_m for u in uas])
+        fixed = np.array([o.safe_distance_m for o in self.scenario.obstacles])
+        moving = np.array([o.safe_distance_m for o in self.scenario.moving_obstacles])
+        open_now = np.flatnonzero(swarm.uncovered)
+        vehicles = tuple(self._vehicles[name] for name in names)
+        problem = PlanningProblem(
+            names=names,
+            vehicles=vehicles,
+            models=tuple(
+                linear_model(vehicle, float(x[DOD]), self.dt_s)
+                for vehicle, x in zip(vehicles, x0, strict=True)
+            ),
+            x0=x0,
+            horizon=options.horizon,
+            fence=self.scenario.fence,
+            fence_margin_m=self.scenario.geofence.margin_m + min(options.margin_m, 0.1),
+            obstacles=self._obstacles,
+            obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
+            moving=self._predicted(swarm),
+            moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
+            separation_m=(
+                radius[:, None] + radius + self.scenario.uas_safe_distance_m + options.margin_m
+            ),
+            waypoints_m=self.waypoints_m[open_now],
+            waypoint_reach_m=self._waypoint_reach_m[open_now],
+            waypoint_weight=self._waypoint_weight[open_now],
+            waypoint_index=open_now,
+            n_scenario_waypoints=len(self.waypoints_m),
+            targets=(),
+            weights=weights,
+            physical_sides=options.physical_sides,
+            obstacle_sides=options.obstacle_sides,
+            waypoint_sides=options.waypoint_sides,
+        )
+        near = coverable(problem).any(axis=(0, 1))
+        index = open_now[near]
+        return replace(
+            problem,
+            waypoints_m=self.waypoints_m[index],
+            waypoint_reach_m=self._waypoint_reach_m[index],
+            waypoint_weight=self._waypoint_weight[index],
+            waypoint_index=index,
+            targets=tuple(_in_rows(targets[name], index) for name in names),
+        )
+
+    def _predicted(self, swarm: SwarmState) -> tuple[MovingHull, ...]:
+        steps = np.arange(self._options.horizon + 1)[:, None] * self.dt_s
+        return tuple(
+            MovingHull(
+                obstacle.name,
+                swarm.moving_position_m[row] + steps * swarm.moving_velocity_mps[row],
+                obstacle.radius_m,
+                0.5 * obstacle.height_m,
+            )
+            for row, obstacle in enumerate(self.scenario.moving_obstacles)
+        )
+
+
+def _in_rows(target: Target | None, index: NDArray[np.int64]) -> Target | None:
+    """The target with its waypoint as a row of the problem; one out of reach relaxes nothing."""
+    if target is None or target.waypoint is None:
+        return target
+    rows = np.flatnonzero(index == target.waypoint)
+    return replace(target, waypoint=int(rows[0]) if len(rows) else None)

@@ -1,0 +1,26 @@
+"""Nearest waypoint: every UAS to the open waypoint nearest to it, one after the other."""
+
+from collections.abc import Mapping
+
+from uas_coverage_baselines.targets import Targets
+from uas_coverage_env.flight import AssistedOptions
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Command, SwarmState
+
+
+class NearestWaypoint:
+    """Flies each UAS to the nearest waypoint that is open and nobody else's; home in the end."""
+
+    Options = AssistedOptions
+
+    def __init__(self, options: AssistedOptions | None = None) -> None:
+        self.options = options or AssistedOptions()
+        self.assistants = self.options.assistants
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Forget the targets of the mission before."""
+        self._targets = Targets(scenario)
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Keep a target until it is covered or blocked, then take the nearest one."""
+        return self._targets.commands(swarm, self._targets.nearest)

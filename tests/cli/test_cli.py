@@ -1,0 +1,189 @@
+"""The commands in this process: what they say, write and return."""
+
+import json
+import re
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from uas_coverage_env.cli import main
+from uas_coverage_env.cli.text_map import TextMap
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.scenario import load_scenario, scenario_names
+from uas_coverage_env.world import World
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Every command runs in a folder of its own, on a terminal of a known width."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    return tmp_path
+
+
+def village(tmp_path, **changes):
+    """The village with some texts replaced, as a file."""
+    text = files("uas_coverage_env.scenario").joinpath("village.toml").read_text(encoding="utf-8")
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_run_writes_a_flight_directory_and_says_where(elsewhere, capsys):
+    assert main(["run", "open_field", "--planner", "nearest-waypoint", "--out", "mine"]) == 0
+    flight = Flight.load("mine")
+    assert flight.planner == "nearest-waypoint"
+    assert json.loads((elsewhere / "mine" / "summary.json").read_text())["coverage"] == 1.0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "flight in mine" in out
+    assert f"covered 100% in {flight.steps} steps; all home" in out
+    assert all(name in out for name in flight.names)
+
+
+def test_a_run_that_was_limited_succeeds_and_one_that_failed_does_not(elsewhere, capsys):
+    hover = ["run", "open_field", "--planner", "hover"]
+    assert main([*hover, "--steps", "3", "--out", "short"]) == 0
+    assert Flight.load("short").steps == 3
+    assert "in 3 steps, limit of steps reached; not all home" in capsys.readouterr().out
+    # a limit that the scenario undercuts is no success
+    assert main([*hover, "--steps", "1000000", "--out", "long"]) == 1
+
+
+def test_runs_without_out_never_meet(elsewhere, capsys):
+    command = ["run", "village", "--planner", "hover", "--steps", "1", "--seed", "4"]
+    for _ in range(3):
+        assert main(command) == 0
+    assert sorted(path.name for path in (elsewhere / "flights").iterdir()) == [
+        "village-hover-4",
+        "village-hover-4-2",
+        "village-hover-4-3",
+    ]
+    assert "flights/village-hover-4-3" in capsys.readouterr().out
+
+
+def test_an_out_that_holds_something_is_refused_unless_overwritten(elsewhere, capsys):
+    command = ["run", "village", "--planner", "hover", "--steps", "1", "--out", "mine"]
+    assert main(command) == 0
+    (elsewhere / "mine" / "notes.txt").write_text("keep")
+    first = Flight.load("mine")
+    assert main([*command, "--seed", "9"]) == 2
+    assert Flight.load("mine") == first
+    assert main([*command, "--seed", "9", "--overwrite"]) == 0
+    assert Flight.load("mine").seed == 9
+    assert (elsewhere / "mine" / "notes.txt").read_text() == "keep"
+
+
+def test_options_seed_dynamics_and_filter_reach_the_flight():
+    code = main(
+        [
+            *("run", "village", "--planner", "random-walk", "--seed", "5", "--steps", "2"),
+            *("--option", "hold_s=3", "--option", "filter=false", "--option", "return_mode=no"),
+            *("--dynamics", "nonlinear", "--out", "mine"),
+        ]
+    )
+    assert code == 0
+    flight = Flight.load("mine")
+    assert (flight.seed, flight.dynamics) == (5, "nonlinear")
+    assert flight.planner_options["hold_s"] == 3.0
+    assert (flight.return_mode, flight.safety_filter) == (False, False)
+    main(["run", "village", "--planner", "hover", "--steps", "1", "--filter", "--out", "safe"])
+    assert Flight.load("safe").safety_filter
+
+
+def test_ctrl_c_keeps_the_flight_and_fails_the_mission(elsewhere, monkeypatch, capsys):
+    from uas_coverage_baselines.hover import Hover
+
+    act = Hover.act
+
+    def interrupted(planner, swarm):
+        if swarm.step == 3:
+            raise KeyboardInterrupt
+        return act(planner, swarm)
+
+    monkeypatch.setattr(Hover, "act", interrupted)
+    assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 1
+    assert Flight.load("mine").steps == 3
+    assert "stopped by hand" in capsys.readouterr().out
+
+
+def test_a_planner_that_gives_nonsense_fails_in_one_line(elsewhere, monkeypatch, capsys):
+    from uas_coverage_baselines.hover import Hover
+
+    monkeypatch.setattr(Hover, "act", lambda planner, swarm: {})
+    assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 1
+    err = capsys.readouterr().err
+    assert re.fullmatch(r"error: planner 'hover' at t = 0 s: .*\n", err)
+    assert not (elsewhere / "mine").exists(), "no empty folder is left behind"
+
+
+def test_the_shipped_scenarios_are_listed(capsys):
+    assert main(["scenarios"]) == 0
+    out = capsys.readouterr().out
+    assert set(scenario_names()) <= set(out.split())
+    assert "500 x 500 x 50" in out
+
+
+def test_a_check_describes_and_draws_a_scenario(elsewhere, capsys):
+    path = village(elsewhere)
+    assert main(["scenarios", "check", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "village is valid" in out
+    assert "49, sum of weights" in out
+    assert "10 fixed, 1 moving" in out
+    assert (elsewhere / "village.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_check_replaces_a_picture_only_where_it_was_asked_to(elsewhere, capsys):
+    picture = elsewhere / "drawn.png"
+    picture.write_bytes(b"precious")
+    command = ["scenarios", "check", "village", "--picture", "drawn.png"]
+    assert main(command) == 2
+    assert picture.read_bytes() == b"precious"
+    assert main([*command, "--overwrite"]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(["scenarios", "check", "village", "--picture", "no/such/folder.png"]) == 2
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+def test_a_mission_that_its_batteries_cannot_finish_is_valid_with_a_warning(elsewhere, capsys):
+    path = village(elsewhere, **{"soc_0 = 1.0": "soc_0 = 0.27", "soc_0 = 0.433": "soc_0 = 0.27"})
+    assert main(["scenarios", "check", str(path)]) == 0
+    err = capsys.readouterr().err
+    assert err.startswith("warning: ")
+    assert err.count("\n") == 1
+
+
+def test_the_planners_are_listed_with_their_options(capsys):
+    assert main(["planners"]) == 0
+    out = capsys.readouterr().out
+    for words in ("hover", "climb_m", "default 5.0", "random-walk", "hold_s", "true|false"):
+        assert words in out
+
+
+@pytest.mark.parametrize("command", [[], ["run"], ["scenarios"], ["scenarios", "check"]])
+def test_every_command_has_help(command, capsys):
+    assert main([*command, "--help"]) == 0
+    assert "Usage: uas-coverage" in capsys.readouterr().out
+
+
+def test_no_command_at_all_is_answered_with_help(capsys):
+    assert main([]) == 0
+    assert "planners" in capsys.readouterr().out
+
+
+def test_a_map_of_letters_shows_what_is_where():
+    scenario = load_scenario("village")
+    world = World(scenario)
+    lines = TextMap(scenario).drawn(world.swarm_state()).plain.splitlines()
+    cells = np.array([list(line) for line in lines[1:-2]])
+    assert {"1", "2", "o", "#", "@"} <= set(cells.ravel())
+    row, column = np.argwhere(cells == "1")[0]
+    # in the middle of the west: half way up, at the left edge
+    assert column <= 3
+    assert abs(row - len(cells) / 2) <= 2
+    # the helicopter is in the east
+    assert np.argwhere(cells == "@")[0][1] > 0.8 * cells.shape[1]

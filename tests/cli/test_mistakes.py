@@ -1,0 +1,131 @@
+"""Mistakes that people make, each answered by one line on stderr and exit code 2."""
+
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from uas_coverage_env.cli import main
+
+VILLAGE = files("uas_coverage_env.scenario").joinpath("village.toml").read_text(encoding="utf-8")
+FIRST_WAYPOINT = "position_m = [48.0, 68.0, -26.0]"
+
+SCENARIO_MISTAKES = {
+    "nan": (FIRST_WAYPOINT, "position_m = [nan, 68.0, -26.0]", "waypoints[0].position_m"),
+    "unknown key": ("max_steps = 500", "max_steps = 500\nmax_stops = 5", "max_stops"),
+    "waypoint inside an obstacle": (
+        FIRST_WAYPOINT,
+        "position_m = [60.0, 120.0, -5.0]",
+        "forest_southwest",
+    ),
+    "waypoint outside the fence": (FIRST_WAYPOINT, "position_m = [-48.0, 68.0, -26.0]", "-48"),
+    "starts too close": (
+        "start_m = [230.0, 10.0, -1.0]",
+        "start_m = [249.5, 10.0, -1.0]",
+        "uas[1]",
+    ),
+    "missing section": ("[geofence]\nmargin_m = 0.5", "[fence]\nmargin_m = 0.5", "fence"),
+    "syntax error": ("max_steps = 500", "max_steps = = 500", "TOML"),
+    "text for a number": ("max_steps = 500", 'max_steps = "500"', "max_steps"),
+    "coordinates beyond reason": (
+        FIRST_WAYPOINT,
+        "position_m = [4.8e9, 68.0, -26.0]",
+        "position_m",
+    ),
+    "unknown vehicle": ('vehicle = "s500_v2"', 'vehicle = "s600"', "s600"),
+    "negative radius": ("radius_m = 15.0", "radius_m = -15.0", "radius_m"),
+}
+
+
+def refused(capsys, *command: str) -> str:
+    """Run a command that must be refused; returns its line."""
+    assert main(list(command)) == 2
+    out, err = capsys.readouterr()
+    assert out == "", "nothing is said to have begun"
+    assert err.startswith("error: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1, err
+    return err
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("mistake", SCENARIO_MISTAKES)
+def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
+    old, new, word = SCENARIO_MISTAKES[mistake]
+    assert old in VILLAGE
+    path = elsewhere / "mine.toml"
+    path.write_text(VILLAGE.replace(old, new), encoding="utf-8")
+    line = refused(capsys, "run", str(path), "--planner", "hover")
+    assert word in line
+    assert "mine.toml" in line
+    assert refused(capsys, "scenarios", "check", str(path)) == line
+    assert [entry.name for entry in elsewhere.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["run", "atlantis"], "atlantis"),
+        (["run", "no/such/file.toml"], "no/such/file.toml"),
+        (["scenarios", "check", "no/such/file.toml"], "no/such/file.toml"),
+        (["run", "."], "."),
+        (["run", "village", "--planner", "teleport"], "teleport"),
+        (["run", "village", "--planner", "hover", "--option", "climb=3"], "climb_m"),
+        (["run", "village", "--planner", "hover", "--option", "climb_m=high"], "climb_m"),
+        (["run", "village", "--planner", "hover", "--option", "climb_m=nan"], "climb_m"),
+        (["run", "village", "--planner", "hover", "--option", "climb_m"], "KEY=VALUE"),
+        (
+            [
+                *("run", "village", "--planner", "hover"),
+                *("--option", "climb_m=3", "--option", "climb_m=4"),
+            ],
+            "twice",
+        ),
+        (["run", "village", "--dynamics", "magic"], "nonlinear"),
+        (["run", "village", "--steps", "0"], "--steps"),
+        (["run", "village", "--steps", "many"], "--steps"),
+        (["run", "village", "--seed", "-1"], "--seed"),
+        (["run", "village", "--speed", "9"], "--speed"),
+        (["run"], "SCENARIO"),
+        (["fly", "village"], "fly"),
+        (["scenarios", "chek", "village"], "chek"),
+        (["run", "village", "--planner", "hover", "--out", "taken"], "taken"),
+        (["run", "village", "--planner", "hover", "--out", "taken/note"], "taken/note"),
+        (["run", "village", "--planner", "hover", "--out", "taken/note/deeper"], "deeper"),
+    ],
+)
+def test_a_mistake_on_the_command_line_is_named(arguments, word, elsewhere, capsys):
+    (elsewhere / "taken").mkdir()
+    (elsewhere / "taken" / "note").write_text("mine")
+    assert word in refused(capsys, *arguments)
+    assert (elsewhere / "taken" / "note").read_text() == "mine"
+    assert [entry.name for entry in elsewhere.iterdir()] == ["taken"]
+
+
+def test_the_installed_command_answers_like_this_process(elsewhere):
+    program = Path(sys.executable).with_name("uas-coverage")
+    (elsewhere / "bad.toml").write_text("schema = 1\nname = ")
+    for arguments in (["run", "bad.toml"], ["run", "village", "--wind", "3"]):
+        result = subprocess.run(
+            [program, *arguments], cwd=elsewhere, capture_output=True, text=True, timeout=120
+        )
+        assert result.returncode == 2
+        assert result.stderr.startswith("error: ")
+        assert result.stderr.count("\n") == 1
+        assert "Traceback" not in result.stderr
+    result = subprocess.run(
+        [program, "run", "village", "--planner", "hover", "--steps", "2", "--out", "mine"],
+        cwd=elsewhere,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    assert (elsewhere / "mine" / "flight.csv").exists()

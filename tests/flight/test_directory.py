@@ -1,0 +1,262 @@
+import csv
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from uas_coverage_env.flight import Decision, Flight, rollout, summary
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.world import Velocity
+
+FILES = {
+    "scenario.json",
+    "flight.csv",
+    "moving_obstacles.csv",
+    "plan.csv",
+    "summary.json",
+    "run.json",
+}
+FLIGHT_HEADER = (
+    "t_s,uas,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,phi_rad,theta_rad,psi_rad,wx_radps,wy_radps,"
+    "wz_radps,dod,u_th_V,soc,voltage_V,current_A,mode,lift_N,tau_x_Nm,tau_y_Nm,tau_z_Nm,"
+    "delta_thrust_N,covered"
+)
+
+
+@pytest.fixture
+def saved(flight, tmp_path) -> Path:
+    return flight.save(tmp_path / "flight")
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_saved_flight_reads_back_equal(flight, saved):
+    assert {path.name for path in saved.iterdir()} == FILES
+    assert Flight.load(saved) == flight
+
+
+def test_flights_that_differ_in_one_bit_are_not_equal(flight):
+    x = flight.x.copy()
+    x[3, 0, 5] = np.nextafter(x[3, 0, 5], 1.0)
+    assert dataclasses.replace(flight, x=x) != flight
+    assert flight != "a flight"
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    st.data(),
+    st.floats(allow_nan=False, allow_infinity=False),
+)
+def test_every_finite_number_survives_the_way_through_the_files(
+    yard, tmp_path_factory, data, separation_m
+):
+    numbers = st.floats(-1e300, 1e300)
+    flight = rollout(yard, _Predicting(), max_steps=2)
+    flight = dataclasses.replace(
+        flight,
+        x=data.draw(arrays(float, flight.x.shape, elements=numbers)),
+        u=data.draw(arrays(float, flight.u.shape, elements=numbers)),
+        min_separation_m=separation_m,
+    )
+    folder = tmp_path_factory.mktemp("flight")
+    assert Flight.load(flight.save(folder)) == flight
+
+
+class _Predicting:
+    """Holds position and says so."""
+
+    last_decision = None
+
+    def reset(self, scenario, seed):
+        self.last_decision = None
+
+    def act(self, swarm):
+        paths_m = {name: np.tile(swarm.x[i, :3], (3, 1)) for i, name in enumerate(swarm.names)}
+        self.last_decision = Decision(paths_m, fallback=swarm.step == 1, mip_gap=0.125)
+        return {name: Velocity(0.0, 0.0, 3.0) for name in swarm.active}
+
+
+def test_flight_csv_has_the_columns_of_the_contract_in_their_order(saved):
+    assert (saved / "flight.csv").read_text().splitlines()[0] == FLIGHT_HEADER
+    assert (saved / "moving_obstacles.csv").read_text().startswith("t_s,name,x_m,y_m,z_m\n")
+    assert (saved / "plan.csv").read_text() == "t_s,uas,n,x_m,y_m,z_m\n"
+
+
+def test_there_is_one_row_per_uas_and_sample_until_it_has_landed(flight, saved):
+    rows = rows_of(saved / "flight.csv")
+    for i, name in enumerate(flight.names):
+        own = [row for row in rows if row["uas"] == name]
+        assert [float(row["t_s"]) for row in own] == list(range(flight.last_sample[i] + 1))
+        assert [row["mode"] for row in own].index("landed") == len(own) - 1
+        assert float(own[-1]["current_A"]) == float(own[-1]["lift_N"]) == 0.0
+        assert {row["mode"] for row in own[:-1]} == {"transit", "return"}
+        assert all(float(row["soc"]) == 1.0 - float(row["dod"]) for row in own)
+    assert [float(row["t_s"]) for row in rows] == sorted(float(row["t_s"]) for row in rows)
+
+
+def test_a_lost_uas_has_its_last_row_where_it_is_lost(yard, tmp_path):
+    planner = _Predicting()
+    planner.act = lambda swarm: {name: Velocity(12.0, 0.0, 3.0) for name in swarm.active}
+    folder = rollout(yard, planner).save(tmp_path / "lost")
+    modes = [row["mode"] for row in rows_of(folder / "flight.csv") if row["uas"] == "left"]
+    assert modes.index("lost") == len(modes) - 1
+    violations = json.loads((folder / "summary.json").read_text())["violations"]
+    assert violations[0] == {
+        "t_s": float(len(modes) - 1),
+        "uas": "left",
+        "kind": "geofence",
+        "with": None,
+    }
+
+
+def test_the_summary_follows_from_the_rows(saved, yard):
+    result = json.loads((saved / "summary.json").read_text())
+    rows = rows_of(saved / "flight.csv")
+    energy_J = sum(float(row["voltage_V"]) * float(row["current_A"]) for row in rows) * yard.dt_s
+    assert result["energy_Wh"] == pytest.approx(energy_J / 3600.0, rel=1e-12)
+    assert result["coverage"] == int(rows[-1]["covered"]) / len(yard.waypoints) == 1.0
+    assert result["steps"] == max(float(row["t_s"]) for row in rows)
+    assert result["all_home"] is True
+
+
+def test_the_summary_has_the_fields_of_the_contract(saved):
+    result = json.loads((saved / "summary.json").read_text())
+    assert list(result) == [
+        *("coverage", "steps", "energy_Wh", "all_home", "min_separation_m"),
+        *("min_obstacle_clearance_m", "violations", "breaches", "wall_time_s"),
+        *("decision_time_s", "fallbacks", "mip_gap_p50", "versions", "seed", "planner"),
+    ]
+    assert list(result["decision_time_s"]) == ["p50", "p95", "p99", "max"]
+    assert result["planner"] == {"name": "Listed", "options": {}}
+    assert result["seed"] == 3
+    assert result["mip_gap_p50"] is None
+    assert {"uas-coverage-env", "python", "numpy", "numba", "highspy"} <= set(result["versions"])
+
+
+def test_the_scenario_is_kept_with_every_default_filled_in(saved, yard):
+    scenario = json.loads((saved / "scenario.json").read_text())
+    assert scenario["schema"] == 1
+    assert scenario["decorations"] == []
+    assert scenario["waypoints"][1] == {
+        "kind": None,
+        "position_m": [50.0, 30.0, -10.0],
+        "radius_m": 8.0,
+        "weight": 2.0,
+    }
+    assert scenario["uas"][0]["vehicle"] == "s500_v2"
+
+
+def test_moving_obstacles_are_kept_at_every_sample(saved, yard, flight):
+    rows = rows_of(saved / "moving_obstacles.csv")
+    assert len(rows) == flight.steps + 1
+    for row in rows:
+        centre_m = yard.moving_positions(float(row["t_s"]))[0]
+        assert [float(row[key]) for key in ("x_m", "y_m", "z_m")] == pytest.approx(centre_m)
+        assert row["name"] == "kite"
+
+
+def test_predictions_are_kept_step_by_step(yard, tmp_path):
+    flight = rollout(yard, _Predicting(), max_steps=2)
+    rows = rows_of(flight.save(tmp_path / "flight") / "plan.csv")
+    assert [(row["t_s"], row["uas"], row["n"]) for row in rows] == [
+        (time, name, n) for time in ("0.0", "1.0") for name in ("left", "right") for n in "012"
+    ]
+    assert float(rows[0]["z_m"]) == -1.0
+    result = summary(flight)
+    assert (result["fallbacks"], result["mip_gap_p50"]) == (1, 0.125)
+
+
+def test_a_folder_that_is_not_empty_is_refused(flight, tmp_path):
+    (tmp_path / "thesis.txt").write_text("all of it")
+    with pytest.raises(InputError, match="is not empty"):
+        flight.save(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_overwriting_replaces_our_files_and_no_other(flight, yard, tmp_path):
+    rollout(yard, _Predicting(), max_steps=1).save(tmp_path)
+    (tmp_path / "thesis.txt").write_text("all of it")
+    flight.save(tmp_path, overwrite=True)
+    assert Flight.load(tmp_path) == flight
+    assert (tmp_path / "thesis.txt").read_text() == "all of it"
+    assert {path.name for path in tmp_path.iterdir()} == {*FILES, "thesis.txt"}
+
+
+def test_a_file_is_no_folder(flight, tmp_path):
+    (tmp_path / "flight").write_text("")
+    with pytest.raises(InputError, match="is a file"):
+        flight.save(tmp_path / "flight")
+    with pytest.raises(InputError, match="cannot be written"):
+        flight.save(tmp_path / "flight" / "deeper")
+
+
+def test_a_write_that_fails_leaves_the_former_flight_whole(flight, yard, tmp_path, monkeypatch):
+    former = rollout(yard, _Predicting(), max_steps=1)
+    former.save(tmp_path)
+    write_text = Path.write_text
+
+    def full_disk(path, *args, **kwargs):
+        if "run.json" in path.name:
+            raise OSError(28, "No space left on device")
+        return write_text(path, *args, **kwargs)
+
+    monkeypatch.setattr(Path, "write_text", full_disk)
+    with pytest.raises(InputError, match="No space left"):
+        flight.save(tmp_path, overwrite=True)
+    assert {path.name for path in tmp_path.iterdir()} == FILES
+    assert Flight.load(tmp_path) == former
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("flight.csv", "t_s,uas\n"),
+        ("flight.csv", FLIGHT_HEADER + "\n"),
+        ("summary.json", "{}"),
+        ("run.json", "not json"),
+        ("plan.csv", "t_s,uas,n,x_m,y_m,z_m\n0.0,nobody,0,0,0,0\n"),
+        ("moving_obstacles.csv", "t_s,name,x_m,y_m,z_m\n0.0,kite,0,0,0\n"),
+    ],
+)
+def test_a_damaged_file_is_named_in_one_line(saved, name, text):
+    (saved / name).write_text(text)
+    with pytest.raises(InputError) as error:
+        Flight.load(saved)
+    assert name in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_folder_without_a_flight_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"scenario\.json: cannot be read"):
+        Flight.load(tmp_path)
+
+
+def test_an_interrupted_flight_is_kept_like_any_other(yard, listed, tmp_path):
+    def stop(progress):
+        if progress.swarm.step == 4:
+            raise KeyboardInterrupt
+
+    flight = rollout(yard, listed, on_step=stop)
+    loaded = Flight.load(flight.save(tmp_path / "flight"))
+    assert loaded == flight
+    assert (loaded.ended, loaded.steps) == ("stopped", 4)
+
+
+def test_a_flight_that_never_began_is_kept_too(yard, listed, tmp_path):
+    flight = rollout(yard, listed, should_stop=lambda: True)
+    loaded = Flight.load(flight.save(tmp_path / "flight"))
+    assert loaded == flight
+    assert summary(loaded)["decision_time_s"] == {
+        "p50": None,
+        "p95": None,
+        "p99": None,
+        "max": None,
+    }

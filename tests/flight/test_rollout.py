@@ -1,0 +1,301 @@
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from uas_coverage_env.flight import (
+    MODES,
+    Assistants,
+    Decision,
+    PlannerError,
+    PlannerOptions,
+    accomplished,
+    rollout,
+)
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.world import GoTo, Velocity, World
+
+
+class Still:
+    """Holds everybody where they started, three metres higher."""
+
+    def reset(self, scenario, seed):
+        pass
+
+    def act(self, swarm):
+        return {name: Velocity(0.0, 0.0, 4.0) for name in swarm.active}
+
+
+def changed(scenario, **fields):
+    return parse(scenario.model_dump(by_alias=True) | fields, Scenario, "changed")
+
+
+def commanding(command):
+    planner = Still()
+    planner.act = lambda swarm: dict.fromkeys(swarm.active, command)
+    return planner
+
+
+def test_a_mission_that_covers_all_and_lands_is_accomplished(flight):
+    assert flight.ended == "complete"
+    assert accomplished(flight)
+    assert flight.covered[0] == 1, "the waypoint above a start is covered at t = 0"
+    assert flight.covered[-1] == 3
+    assert (np.diff(flight.covered) >= 0).all()
+    assert flight.violations == ()
+    assert [MODES[code] for code in flight.mode[-1]] == ["landed", "landed"]
+
+
+def test_inputs_and_currents_act_from_their_sample_to_the_next_and_end_with_the_landing(flight):
+    for i, last in enumerate(flight.last_sample):
+        assert (flight.current_A[:last, i] > 1.0).all(), "a multicopter in the air draws current"
+        assert (flight.current_A[last:, i] == 0.0).all()
+        assert (flight.u[last:, i] == 0.0).all()
+        assert (flight.voltage_V[last:, i] > flight.voltage_V[last - 1, i]).all()
+    assert flight.last_sample.max() == flight.steps
+
+
+def test_the_record_is_what_a_world_flown_by_hand_shows(yard, listed, flight):
+    world = World(yard)
+    listed.reset(yard, 3)
+    for k in range(flight.steps):
+        swarm = world.swarm_state()
+        np.testing.assert_array_equal(flight.x[k], swarm.x)
+        np.testing.assert_array_equal(flight.moving_position_m[k], swarm.moving_position_m)
+        assert flight.covered[k] == (~swarm.uncovered).sum()
+        outcome = world.step(listed.act(swarm))
+        for i, name in enumerate(swarm.names):
+            if name in swarm.active:
+                np.testing.assert_array_equal(flight.u[k, i], outcome["u"][i])
+                assert flight.voltage_V[k, i] == outcome["voltage_V"][i]
+                assert flight.current_A[k, i] == outcome["current_A"][i]
+    assert world.done
+    np.testing.assert_array_equal(flight.x[-1], world.swarm_state().x)
+
+
+def test_modes_are_those_of_the_commands_then_the_end_of_each_uas(yard, flight):
+    left = [MODES[code] for code in flight.mode[:, 0]]
+    assert list(dict.fromkeys(left)) == ["transit", "return", "landed"]
+    covering = rollout(yard, commanding(Velocity(0.0, 0.0, 3.0, mode="covering")), max_steps=2)
+    assert {MODES[code] for code in covering.mode.ravel()} == {"covering"}
+
+
+def test_distances_and_breaches_are_the_worst_of_the_world(yard, flight, listed):
+    world = World(yard)
+    listed.reset(yard, 3)
+    separation_m, clearance_m, breaches = [], [], 0
+    while not world.done:
+        outcome = world.step(listed.act(world.swarm_state()))
+        separation_m.append(outcome["separation_m"].min())
+        clearance_m.append(outcome["obstacle_clearance_m"].min())
+        breaches += outcome["breaches"].sum()
+    assert flight.min_separation_m == min(separation_m)
+    assert flight.min_obstacle_clearance_m == min(clearance_m)
+    assert flight.breaches == breaches
+
+
+def test_distances_are_none_where_there_is_nothing_to_be_clear_of(yard):
+    alone = changed(yard, uas=[yard.uas[0].model_dump()], obstacles=[], moving_obstacles=[])
+    flight = rollout(alone, Still(), max_steps=2)
+    assert flight.min_separation_m is None
+    assert flight.min_obstacle_clearance_m is None
+    assert flight.moving_position_m.shape == (3, 0, 3)
+
+
+def test_a_contact_is_a_violation_with_time_kind_and_partner(yard):
+    flight = rollout(yard, commanding(Velocity(12.0, 0.0, 3.0)))
+    assert [violation.kind for violation in flight.violations] == ["geofence", "geofence"]
+    violation = flight.violations[0]
+    assert violation.partner is None
+    k = round(violation.time_s / yard.dt_s)
+    i = flight.names.index(violation.uas)
+    assert flight.x[k, i, 0] > 100.0 >= flight.x[k - 1, i, 0]
+    assert MODES[flight.mode[k, i]] == "lost"
+    assert flight.ended == "complete"
+    assert not accomplished(flight)
+
+
+def test_a_collision_with_an_obstacle_names_the_obstacle(yard):
+    planner = Still()
+    planner.act = lambda swarm: {
+        name: Velocity(6.0, 3.0 if name == "left" else -3.0, 3.0) for name in swarm.active
+    }
+    flight = rollout(yard, planner)
+    assert {(violation.kind, violation.partner) for violation in flight.violations} <= {
+        ("obstacle", "shed"),
+        ("uas", "left"),
+        ("uas", "right"),
+    }
+    assert flight.violations
+
+
+def test_a_flight_ends_after_the_steps_that_were_asked_for(yard):
+    flight = rollout(yard, Still(), max_steps=4)
+    assert (flight.steps, flight.ended) == (4, "steps")
+    assert flight.x.shape == (5, 2, 14)
+    assert (flight.current_A[-1] == 0.0).all(), "nothing acts after the last sample"
+    assert len(flight.decisions) == 4
+
+
+def test_a_flight_ends_after_the_steps_of_the_scenario_at_the_latest(yard):
+    assert rollout(changed(yard, max_steps=3), Still(), max_steps=100).steps == 3
+
+
+@pytest.mark.parametrize("interrupted", ["act", "on_step"])
+def test_ctrl_c_leaves_the_flight_so_far(yard, listed, interrupted):
+    def stop(progress):
+        if progress.swarm.step == 5:
+            raise KeyboardInterrupt
+
+    if interrupted == "act":
+        act = listed.act
+        listed.act = lambda swarm: stop(SimpleNamespace(swarm=swarm)) or act(swarm)
+        flight = rollout(yard, listed)
+    else:
+        flight = rollout(yard, listed, on_step=stop)
+    assert (flight.steps, flight.ended) == (5, "stopped")
+    assert len(flight.u) == len(flight.covered) == len(flight.moving_position_m) == 6
+
+
+def test_a_flight_can_be_stopped_from_outside(yard):
+    asked = iter([False, False, True])
+    flight = rollout(yard, Still(), should_stop=lambda: next(asked))
+    assert (flight.steps, flight.ended) == (2, "stopped")
+
+
+def test_progress_is_told_before_the_first_decision_and_after_every_step(yard):
+    told = []
+    rollout(yard, Still(), max_steps=3, on_step=told.append)
+    assert [progress.swarm.step for progress in told] == [0, 1, 2, 3]
+    assert [progress.max_steps for progress in told] == [3] * 4
+    assert told[0].decision_time_s is None
+    assert all(progress.decision_time_s > 0.0 for progress in told[1:])
+    assert [progress.covered for progress in told] == [1] * 4
+
+
+def test_warming_up_comes_first_and_is_not_timed(yard, listed):
+    order = []
+    reset = listed.reset
+    listed.warm_up = lambda scenario: order.append("warm_up") or time.sleep(0.2)
+    listed.reset = lambda scenario, seed: order.append(f"reset {seed}") or reset(scenario, seed)
+    flight = rollout(yard, listed, seed=7, max_steps=3)
+    assert order == ["warm_up", "reset 7"]
+    assert sum(decision.duration_s for decision in flight.decisions) < 0.2
+    assert flight.wall_time_s >= sum(decision.duration_s for decision in flight.decisions)
+    assert flight.x[0, 0, 12] == 0.0, "trying out the world leaves no trace in the flight"
+
+
+def test_decision_time_is_that_of_the_planner_alone(yard):
+    planner = Still()
+    act = planner.act
+    planner.act = lambda swarm: time.sleep(0.02) or act(swarm)
+    flight = rollout(yard, planner, max_steps=2, on_step=lambda progress: time.sleep(0.2))
+    assert all(0.02 <= decision.duration_s < 0.2 for decision in flight.decisions)
+
+
+def test_what_a_planner_tells_about_its_decisions_is_kept(yard):
+    planner = Still()
+    act = planner.act
+
+    def telling(swarm):
+        path_m = np.array([[swarm.step, n, -n] for n in range(4)], float)
+        gap = [0.25, float("inf"), None][swarm.step]
+        planner.last_decision = Decision({"right": path_m}, fallback=swarm.step == 1, mip_gap=gap)
+        return act(swarm)
+
+    planner.act = telling
+    flight = rollout(yard, planner, max_steps=3)
+    assert [decision.fallback for decision in flight.decisions] == [False, True, False]
+    assert [decision.mip_gap for decision in flight.decisions] == [0.25, None, None]
+    assert flight.plan["step"].tolist() == [0] * 4 + [1] * 4 + [2] * 4
+    assert set(flight.plan["uas"]) == {1}
+    assert flight.plan["n"].tolist() == [0, 1, 2, 3] * 3
+    np.testing.assert_array_equal(flight.plan["position_m"][9], [2.0, 1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("asked", "given", "flown"),
+    [
+        (None, None, False),
+        (Assistants(return_mode=True, safety_filter=True), None, True),
+        (Assistants(return_mode=True, safety_filter=True), False, False),
+        (None, True, True),
+    ],
+)
+def test_assistants_are_those_of_the_planner_unless_the_caller_says_otherwise(
+    yard, asked, given, flown
+):
+    planner = Still()
+    if asked is not None:
+        planner.assistants = asked
+    flight = rollout(yard, planner, max_steps=1, return_mode=given, safety_filter=given)
+    assert flight.return_mode is flown
+    assert flight.safety_filter is flown
+
+
+@pytest.mark.parametrize(
+    ("commands", "reason"),
+    [
+        (lambda swarm: {"left": GoTo(0)}, "right"),
+        (lambda swarm: dict.fromkeys(swarm.active, GoTo(99)), "99"),
+        (lambda swarm: dict.fromkeys(swarm.active, Velocity(float("nan"), 0, 3)), "nan"),
+        (lambda swarm: None, "None"),
+    ],
+)
+def test_commands_that_cannot_be_flown_are_reported_with_planner_and_time(yard, commands, reason):
+    planner = Still()
+    act = planner.act
+    planner.act = lambda swarm: act(swarm) if swarm.step < 2 else commands(swarm)
+    with pytest.raises(PlannerError, match=r"'Still' at t = 2 s: ") as error:
+        rollout(yard, planner)
+    assert reason in str(error.value)
+
+
+def test_a_planner_that_refuses_a_scenario_is_reported_as_bad_input(yard):
+    planner = Still()
+
+    def refuse(scenario, seed):
+        raise ValueError("too many UAS for me")
+
+    planner.reset = refuse
+    with pytest.raises(InputError, match="'Still' refuses scenario 'yard': too many UAS for me"):
+        rollout(yard, planner)
+
+
+def test_options_of_a_planner_go_into_the_record(yard):
+    class Options(PlannerOptions):
+        patience_s: float = 2.5
+
+    planner = Still()
+    planner.options = Options()
+    flight = rollout(yard, planner, seed=11, max_steps=1)
+    assert (flight.planner, flight.planner_options, flight.seed) == (
+        "Still",
+        {"patience_s": 2.5},
+        11,
+    )
+
+
+def test_scenario_and_planner_may_be_names_or_files(yard, tmp_path):
+    yard.to_file(tmp_path / "yard.toml")
+    flight = rollout(tmp_path / "yard.toml", "hover", max_steps=2)
+    assert flight.scenario == yard
+    assert flight.planner == "hover"
+    assert rollout("open_field", "hover", max_steps=1).scenario.name == "open_field"
+
+
+def test_what_cannot_be_flown_is_refused_at_the_door(yard):
+    with pytest.raises(ValueError, match="max_steps = 0"):
+        rollout(yard, Still(), max_steps=0)
+    with pytest.raises(InputError, match="unknown planner 'nobody'"):
+        rollout(yard, "nobody")
+    with pytest.raises(ValueError, match="newtonian"):
+        rollout(yard, Still(), dynamics="newtonian")
+
+
+def test_the_nonlinear_world_can_be_flown_too(yard, listed):
+    flight = rollout(yard, listed, dynamics="nonlinear", max_steps=15)
+    assert flight.dynamics == "nonlinear"
+    assert not np.array_equal(flight.x[15], rollout(yard, listed, max_steps=15).x[15])

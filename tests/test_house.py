@@ -1,0 +1,177 @@
+"""What the whole repository keeps: the walls between rooms, types, form, the wheel."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from email import message_from_bytes
+from email.message import Message
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = {
+    "uas_coverage_env": ROOT / "uas_coverage_env",
+    "uas_coverage_baselines": ROOT / "baselines" / "uas_coverage_baselines",
+    "uas_coverage_agents": ROOT / "agents" / "uas_coverage_agents",
+}
+LONGEST_FILE = 440
+TEXT = {".py", ".md", ".toml", ".txt", ".cff", ".yaml", ".yml", ".json", ".csv", ".ipynb", ".lp"}
+
+
+def checked(*command: str, **environment: str) -> str:
+    """Run a tool of this Python in the root; its output is the message where it fails."""
+    result = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, env={**os.environ, **environment}
+    )
+    output = result.stdout + result.stderr
+    assert result.returncode == 0, output
+    return output
+
+
+def ours() -> list[Path]:
+    """Every file that is, or would be, committed."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    names = checked("git", "ls-files", "--cached", "--others", "--exclude-standard").splitlines()
+    return [path for name in names if (path := ROOT / name).is_file()]
+
+
+def test_no_room_imports_a_room_above_it():
+    tool = Path(sys.executable).with_name("lint-imports")
+    output = checked(str(tool), "--no-cache", PYTHONPATH=os.pathsep.join(_source_folders()))
+    assert "0 broken" in output
+
+
+def _source_folders() -> list[str]:
+    return sorted({str(folder.parent) for folder in PACKAGES.values()})
+
+
+def test_ruff_finds_nothing_to_mend():
+    checked(sys.executable, "-m", "ruff", "check", ".")
+    checked(sys.executable, "-m", "ruff", "format", "--check", ".")
+
+
+def test_pyright_finds_no_type_that_does_not_fit():
+    output = checked(sys.executable, "-m", "pyright", "--pythonpath", sys.executable)
+    assert "0 errors" in output
+
+
+def test_no_file_names_a_folder_of_the_machine_it_was_written_on():
+    machine_folders = [f"/{name}/" for name in ("work", "tmp", "farm", "root")]
+    found = [
+        f"{path.relative_to(ROOT)}: {folder}"
+        for path in ours()
+        if path.suffix in TEXT or path.name == "run"
+        for folder in machine_folders
+        if folder in path.read_text(encoding="utf-8")
+    ]
+    assert not found
+
+
+def test_no_python_file_is_much_longer_than_400_lines():
+    lengths = {
+        str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines())
+        for path in ours()
+        if path.suffix == ".py"
+    }
+    assert len(lengths) > 50
+    assert {name: n for name, n in lengths.items() if n > LONGEST_FILE} == {}
+
+
+def test_constraints_pin_exact_versions_and_nothing_else():
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    requirements = [Requirement(line) for line in lines if not line.startswith("#")]
+    for requirement in requirements:
+        (pin,) = requirement.specifier
+        assert pin.operator == "=="
+        assert requirement.url is None
+        assert "+" not in pin.version, f"{requirement}: a local version is on no index"
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    pinned = {_canonical(requirement.name) for requirement in requirements}
+    assert {_canonical(Requirement(text).name) for text in needed} <= pinned
+
+
+def _canonical(name: str) -> str:
+    return name.lower().replace("_", "-")
+
+
+def test_ci_runs_what_the_readme_tells_a_newcomer():
+    script = (ROOT / ".ci" / "run").read_text()
+    command = 'python -m pip install -c constraints.txt ".[test]" && python -m pytest -n 2'
+    assert all(part in script for part in command.split(" && "))
+    assert command in (ROOT / "README.md").read_text()
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> zipfile.ZipFile:
+    folder = tmp_path_factory.mktemp("wheel")
+    checked(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder))
+    (path,) = folder.glob("*.whl")
+    return zipfile.ZipFile(path)
+
+
+@pytest.fixture(scope="module")
+def metadata(wheel) -> Message:
+    (name,) = [name for name in wheel.namelist() if name.endswith(".dist-info/METADATA")]
+    return message_from_bytes(wheel.read(name))
+
+
+def test_the_wheel_holds_our_three_packages_and_no_other(wheel):
+    tops = {name.partition("/")[0] for name in wheel.namelist()}
+    (info,) = [top for top in tops if top.endswith(".dist-info")]
+    assert tops - {info} == set(PACKAGES)
+
+
+def test_the_wheel_holds_every_module_and_data_file(wheel):
+    names = set(wheel.namelist())
+    wanted = {
+        f"{package}/{path.relative_to(folder).as_posix()}"
+        for package, folder in PACKAGES.items()
+        for path in folder.rglob("*")
+        if path.suffix in {".py", ".toml", ".typed", ".safetensors"}
+    }
+    assert wanted <= names
+    assert "uas_coverage_env/scenario/village.toml" in names
+    assert {name for name in names if name.endswith("s500_v2.toml")}
+    assert not [name for name in names if "__pycache__" in name or name.endswith((".nbi", ".nbc"))]
+
+
+def test_the_core_needs_neither_torch_nor_matplotlib(metadata):
+    requirements = [Requirement(text) for text in metadata.get_all("Requires-Dist") or []]
+    core = {_canonical(entry.name) for entry in requirements if entry.marker is None}
+    assert "numpy" in core
+    heavy = {"torch", "matplotlib", "stable-baselines3", "ray", "pygame-ce", "pandas"}
+    assert core.isdisjoint(heavy)
+
+
+def test_importing_the_core_loads_no_heavy_package():
+    loaded = checked(
+        sys.executable,
+        "-c",
+        "import sys, uas_coverage_env, uas_coverage_env.cli, uas_coverage_baselines\n"
+        "heavy = ('torch', 'matplotlib', 'pygame', 'highspy', 'ray', 'stable_baselines3')\n"
+        "sys.stdout.write(' '.join(name for name in heavy if name in sys.modules))",
+    )
+    assert loaded == ""
+
+
+def test_every_name_of_the_nomenclature_stands_where_it_says():
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("|") and "`" in line
+    ]
+    assert len(rows) > 50
+    for symbol, _, names, _, place in rows:
+        path = place.strip("`").replace("milp_mpc/", "baselines/uas_coverage_baselines/milp_mpc/")
+        file = ROOT / path if path.startswith("baselines") else ROOT / "uas_coverage_env" / path
+        words = set(re.findall(r"\w+", file.read_text(encoding="utf-8")))
+        missing = set(re.findall(r"`(\w+)`", names)) - words
+        assert not missing, f"{symbol}: {missing} not in {place}"

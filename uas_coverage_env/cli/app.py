@@ -1,0 +1,60 @@
+"""The commands of `uas-coverage` and what becomes of their mistakes."""
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from uas_coverage_env.cli import planners, run, scenarios
+from uas_coverage_env.cli.output import DONE, FAILED, one_line
+from uas_coverage_env.flight import PlannerError
+from uas_coverage_env.strict_toml import InputError
+
+PROGRAM = "uas-coverage"
+
+# what typer makes of Ctrl-C that no command has caught
+_CTRL_C = 130
+
+app = typer.Typer(
+    add_completion=False,
+    invoke_without_command=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback()
+def describe(context: typer.Context) -> None:
+    """Fly a swarm of multicopters that covers an area, and see how well it went.
+
+    Exits 0 on success, 1 where a mission failed, 2 where the input is bad.
+    """
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+app.command("run")(run.run)
+app.command("planners")(planners.planners)
+app.add_typer(scenarios.app, name="scenarios")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; the exit code is returned, every mistake of a person is one line."""
+    command = typer.main.get_command(app)
+    try:
+        code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
+    except typer.TyperException as error:
+        return _refuse(error.format_message(), error.exit_code)
+    except InputError as error:
+        return _refuse(str(error), 2)
+    except PlannerError as error:
+        return _refuse(str(error), FAILED)
+    if code == _CTRL_C:
+        return _refuse("stopped by hand before there was anything to keep", FAILED)
+    return code
+
+
+def _refuse(message: str, code: int) -> int:
+    sys.stderr.write(f"error: {one_line(message)}\n")
+    return code

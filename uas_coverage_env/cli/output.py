@@ -1,0 +1,27 @@
+"""How the commands speak: plain lines and tables on stdout, warnings on stderr."""
+
+import sys
+
+from rich.console import Console
+
+from uas_coverage_env.scenario import Scenario, load_scenario, warnings
+
+DONE, FAILED = 0, 1
+
+
+def console() -> Console:
+    """A console on stdout as it is now; numbers in our lines are not coloured."""
+    return Console(highlight=False, soft_wrap=True)
+
+
+def one_line(text: str) -> str:
+    """The text without line breaks."""
+    return " ".join(text.split())
+
+
+def loaded(name_or_path: str) -> Scenario:
+    """Load a scenario; what is doubtful about it goes to stderr, a line each."""
+    scenario = load_scenario(name_or_path)
+    for warning in warnings(scenario):
+        sys.stderr.write(f"warning: {one_line(warning)}\n")
+    return scenario

@@ -1,0 +1,70 @@
+"""What a person sees while a flight is computed: a line that changes, or lines now and then."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.spinner import Spinner
+
+from uas_coverage_env.cli.text_map import TextMap
+from uas_coverage_env.flight import Progress
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import LANDED, LOST
+
+_COMPILING = "compiling (the first flight on a machine takes a minute)"
+_SECONDS_BETWEEN_LINES = 5.0
+_NO_CHARGE = {LANDED: "landed", LOST: "lost"}
+
+
+@contextmanager
+def shown(
+    out: Console, scenario: Scenario, *, watch: bool
+) -> Iterator[Callable[[Progress], object]]:
+    """Show how a flight goes: gives the function that `rollout` calls in every step."""
+    if not out.is_terminal:
+        out.print(_COMPILING)
+        yield _PlainLines(out)
+        return
+    text_map = TextMap(scenario) if watch else None
+    with Live(Spinner("dots", _COMPILING), console=out, refresh_per_second=8) as live:
+
+        def update(progress: Progress) -> None:
+            line = Spinner("dots", progress_line(progress))
+            live.update(line if text_map is None else Group(text_map.drawn(progress.swarm), line))
+
+        yield update
+
+
+def progress_line(progress: Progress) -> str:
+    """Step, coverage, charge of each UAS and time of the last decision in one line."""
+    swarm = progress.swarm
+    charges = [
+        f"{name} {_NO_CHARGE.get(int(status), f'{1 - dod:.0%}')}"
+        for name, status, dod in zip(swarm.names, swarm.status, swarm.x[:, DOD], strict=True)
+    ]
+    decision_s = progress.decision_time_s
+    return "  ".join(
+        [
+            f"step {swarm.step}/{progress.max_steps}",
+            f"covered {progress.covered}/{len(swarm.uncovered)}",
+            *charges,
+            *([] if decision_s is None else [f"decision {1e3 * decision_s:.2f} ms"]),
+        ]
+    )
+
+
+class _PlainLines:
+    """One line every few seconds, for logs."""
+
+    def __init__(self, out: Console) -> None:
+        self._out = out
+        self._next = time.monotonic() + _SECONDS_BETWEEN_LINES
+
+    def __call__(self, progress: Progress) -> None:
+        now = time.monotonic()
+        if progress.decision_time_s is None or now >= self._next:
+            self._out.print(progress_line(progress), markup=False)
+            self._next = now + _SECONDS_BETWEEN_LINES

@@ -1,0 +1,148 @@
+"""`uas-coverage run`: fly one mission and keep it."""
+
+from collections.abc import Sequence
+from itertools import count
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
+from uas_coverage_env.cli.progress import shown
+from uas_coverage_env.flight import (
+    MODES,
+    Flight,
+    accomplished,
+    check_directory,
+    energy_Wh,
+    load_planner,
+    rollout,
+    summary,
+)
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.world import Dynamics
+
+
+def run(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO", help="Name of a shipped scenario (`scenarios`), or a scenario file."
+        ),
+    ],
+    planner: Annotated[str, typer.Option(help="Who flies, see `planners`.")] = "milp-mpc",
+    option: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY=VALUE", help="Option of the planner; may be repeated."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the planner.")] = 0,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Stop after so many steps; that is a success.")
+    ] = None,
+    dynamics: Annotated[
+        Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
+    ] = "lpv",
+    safety_filter: Annotated[
+        bool, typer.Option("--filter", help="Keep the planner's commands clear of harm.")
+    ] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Show a map of letters while it flies (terminal).")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Flight directory; default: flights/SCENARIO-PLANNER-SEED, numbered."),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the flight that --out holds.")
+    ] = False,
+) -> None:
+    """Fly one mission and write a flight directory.
+
+    Ctrl-C ends the flight early and keeps what was flown. Exits 0 where everything is covered,
+    everybody home and nothing was touched (also where --steps ended the run), 1 otherwise.
+    """
+    mission = loaded(scenario)
+    player = load_planner(planner, _options(option or ()))
+    directory = out or _free_directory(f"{mission.name}-{planner}-{seed}")
+    check_directory(directory, overwrite=overwrite)
+
+    screen = console()
+    try:
+        with shown(screen, mission, watch=watch) as on_step:
+            flight = rollout(
+                mission,
+                player,
+                seed,
+                dynamics=dynamics,
+                safety_filter=True if safety_filter else None,
+                max_steps=steps,
+                on_step=on_step,
+            )
+        flight.save(directory, overwrite=overwrite)
+    finally:
+        if not any(directory.iterdir()):
+            directory.rmdir()
+    _report(screen, flight, directory)
+    raise typer.Exit(_exit_code(flight, steps))
+
+
+def _options(pairs: Sequence[str]) -> dict[str, str]:
+    options: dict[str, str] = {}
+    for pair in pairs:
+        key, separator, value = (part.strip() for part in pair.partition("="))
+        if not key or not separator:
+            raise InputError(f"--option {pair!r}: should be KEY=VALUE, as in horizon=12")
+        if key in options:
+            raise InputError(f"--option {key} is given twice; give it once")
+        options[key] = value
+    return options
+
+
+def _free_directory(name: str) -> Path:
+    """flights/NAME, or NAME-2, NAME-3, ... where that is taken."""
+    first = Path("flights") / name
+    candidates = (first if n == 1 else first.with_name(f"{name}-{n}") for n in count(1))
+    return next(path for path in candidates if not path.exists())
+
+
+def _exit_code(flight: Flight, steps: int | None) -> int:
+    ended_by_person = flight.ended == "steps" and flight.steps == steps
+    return DONE if accomplished(flight) or ended_by_person else FAILED
+
+
+def _report(screen: Console, flight: Flight, directory: Path) -> None:
+    result = summary(flight)
+    table = Table("UAS", "end", "steps", "energy, Wh", "charge left", box=None)
+    for i, name in enumerate(flight.names):
+        end = MODES[flight.mode[-1, i]]
+        table.add_row(
+            name,
+            end if end in ("landed", "lost") else "in the air",
+            str(flight.last_sample[i]),
+            f"{energy_Wh(flight)[i]:.2f}",
+            f"{flight.soc[-1, i]:.1%}",
+        )
+    screen.print(table)
+    for violation in flight.violations:
+        partner = f" with {violation.partner}" if violation.partner else ""
+        screen.print(
+            f"violation: {violation.uas}, {violation.kind} contact{partner} "
+            f"at {violation.time_s:g} s",
+            markup=False,
+        )
+    ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
+    screen.print(
+        f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "
+        f"{'all home' if result['all_home'] else 'not all home'}; "
+        f"{result['energy_Wh']:.2f} Wh; {len(flight.violations)} violations, "
+        f"{flight.breaches} breaches",
+        markup=False,
+    )
+    if flight.decisions:
+        times = ", ".join(
+            f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
+        )
+        screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks", markup=False)
+    screen.print(f"flight in {directory}", markup=False)

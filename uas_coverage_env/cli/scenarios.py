@@ -1,0 +1,84 @@
+"""`uas-coverage scenarios`: the missions that are shipped, and a check of one's own."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from PIL import Image
+from rich.table import Table
+
+from uas_coverage_env.cli.output import console, loaded
+from uas_coverage_env.draw import picture
+from uas_coverage_env.scenario import Scenario, load_scenario, scenario_names
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.world import World
+
+_PICTURE_PX = 1024
+
+app = typer.Typer(invoke_without_command=True, help="List the shipped scenarios, or check one.")
+
+
+@app.callback()
+def scenarios(context: typer.Context) -> None:
+    """List the shipped scenarios; `check FILE` validates and draws one."""
+    if context.invoked_subcommand is not None:
+        return
+    table = Table("name", "UAS", "waypoints", "obstacles", "moving", "size, m", "steps", box=None)
+    for name in scenario_names():
+        scenario = load_scenario(name)
+        counts = (scenario.uas, scenario.waypoints, scenario.obstacles, scenario.moving_obstacles)
+        table.add_row(
+            name, *(str(len(items)) for items in counts), _size(scenario), str(scenario.max_steps)
+        )
+    console().print(table)
+
+
+@app.command()
+def check(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="Scenario file, or the name of a shipped one.")
+    ],
+    picture_file: Annotated[
+        Path | None, typer.Option("--picture", help="PNG to draw; default: NAME.png, here.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace the PNG where it exists.")] = False,
+) -> None:
+    """Validate a scenario, say what is in it, and draw it."""
+    scenario = loaded(file)
+    path = picture_file or Path(f"{scenario.name}.png")
+    if path.exists() and not overwrite:
+        raise InputError(f"{path}: exists; give another --picture or add --overwrite")
+    pixels = picture(scenario, World(scenario).swarm_state(), size_px=_PICTURE_PX)
+    try:
+        Image.fromarray(pixels).save(path, format="PNG")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    out = console()
+    out.print(f"[bold]{scenario.name}[/] is valid", highlight=False)
+    for line in _lines(scenario):
+        out.print(line, markup=False)
+    out.print(f"drawn in {path}", markup=False)
+
+
+def _lines(scenario: Scenario) -> list[str]:
+    weight = sum(waypoint.weight for waypoint in scenario.waypoints)
+    return [
+        f"fence      {_size(scenario)} m, margin {scenario.geofence.margin_m:g} m",
+        f"waypoints  {len(scenario.waypoints)}, sum of weights {weight:g}",
+        f"obstacles  {len(scenario.obstacles)} fixed, {len(scenario.moving_obstacles)} moving",
+        f"time       at most {scenario.max_steps} steps of {scenario.dt_s:g} s",
+        *(
+            f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, "
+            f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}"
+            for uas in scenario.uas
+        ),
+    ]
+
+
+def _size(scenario: Scenario) -> str:
+    return " x ".join(f"{side_m:g}" for side_m in np.ptp(scenario.fence.vertices_m, axis=0))
+
+
+def _position(position_m: tuple[float, float, float]) -> str:
+    return "({})".format(", ".join(f"{coordinate:g}" for coordinate in position_m))

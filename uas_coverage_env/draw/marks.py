@@ -1,0 +1,104 @@
+"""What stands for a waypoint, a moving obstacle and a UAS."""
+
+import math
+from typing import TYPE_CHECKING
+
+from uas_coverage_env.draw import colours
+from uas_coverage_env.draw.colours import Colour
+from uas_coverage_env.draw.frame import Frame
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+
+def waypoint(
+    draw: "ImageDraw", frame: Frame, x: float, y: float, radius: float, *, heavy: bool, open_: bool
+) -> None:
+    """A ring of the true radius while open, a filled disc once covered; two rings for more weight.
+
+    Args:
+        draw: Where to draw.
+        frame: The picture.
+        x: Centre on the canvas.
+        y: Centre on the canvas.
+        radius: On the canvas.
+        heavy: Weighs more than the lightest waypoint of its scenario.
+        open_: Still to be covered.
+    """
+    edge = colours.INK if open_ else colours.COVERED_EDGE
+    width = max(1, round(1.2 * frame.unit))
+    box = (x - radius, y - radius, x + radius, y + radius)
+    draw.ellipse(box, fill=None if open_ else colours.COVERED, outline=edge, width=width)
+    if heavy:
+        inner = radius - 3 * frame.unit
+        if inner > frame.unit:
+            box = (x - inner, y - inner, x + inner, y + inner)
+            draw.ellipse(box, outline=edge, width=width)
+    if not open_:
+        # a tick, for eyes and printers without colour
+        tick = min(radius, 7 * frame.unit) * 0.5
+        corners = [x - tick, y, x - 0.25 * tick, y + 0.75 * tick, x + tick, y - 0.75 * tick]
+        draw.line(corners, fill=colours.COVERED_EDGE, width=round(1.6 * frame.unit))
+
+
+def moving_obstacle(
+    draw: "ImageDraw", frame: Frame, x: float, y: float, radius: float, safe_radius: float
+) -> None:
+    """A disc for the cylinder and a dotted circle for the distance to be kept from it."""
+    box = (x - radius, y - radius, x + radius, y + radius)
+    draw.ellipse(box, fill=colours.RED, outline=colours.INK, width=round(frame.unit))
+    box = (x - safe_radius, y - safe_radius, x + safe_radius, y + safe_radius)
+    dashes = max(12, 4 * round(safe_radius / (4 * frame.unit)))
+    for dash in range(dashes):
+        start = 360 * dash / dashes
+        draw.arc(box, start, start + 180 / dashes, fill=colours.RED, width=round(1.5 * frame.unit))
+
+
+def flying(
+    draw: "ImageDraw", frame: Frame, x: float, y: float, yaw: float, soc: float, colour: Colour
+) -> None:
+    """A cross turned to the heading, in a ring that is as long and as green as the charge.
+
+    Args:
+        draw: Where to draw.
+        frame: The picture.
+        x: Centre on the canvas.
+        y: Centre on the canvas.
+        yaw: [rad] clockwise from north.
+        soc: State of charge, 0..1.
+        colour: Colour of the UAS.
+    """
+    unit = frame.unit
+    radius = 11.5 * unit
+    box = (x - radius, y - radius, x + radius, y + radius)
+    draw.ellipse(box, outline=colours.WHITE, width=round(4.5 * unit))
+    draw.ellipse(
+        (box[0] + unit, box[1] + unit, box[2] - unit, box[3] - unit),
+        outline=colours.FAINT,
+        width=round(unit),
+    )
+    end = -90 + 360 * min(1.0, max(0.0, soc))
+    draw.arc(box, -90, end, fill=colours.of_charge(soc), width=round(4 * unit))
+    arm = 7.5 * unit
+    for turned in (math.pi / 4, -math.pi / 4):
+        dx, dy = arm * math.sin(yaw + turned), -arm * math.cos(yaw + turned)
+        line = (x - dx, y - dy, x + dx, y + dy)
+        draw.line(line, fill=colours.INK, width=round(2.2 * unit))
+    nose = (x + arm * math.sin(yaw), y - arm * math.cos(yaw))
+    draw.line((x, y, *nose), fill=colour, width=round(2.2 * unit))
+
+
+def landed(draw: "ImageDraw", frame: Frame, x: float, y: float, colour: Colour) -> None:
+    """A small filled disc on its pad."""
+    radius = 4 * frame.unit
+    box = (x - radius, y - radius, x + radius, y + radius)
+    draw.ellipse(box, fill=colour, outline=colours.WHITE, width=round(frame.unit))
+
+
+def lost(draw: "ImageDraw", frame: Frame, x: float, y: float) -> None:
+    """A red cross where the flight ended."""
+    arm = 8 * frame.unit
+    for ends in ((x - arm, y - arm, x + arm, y + arm), (x - arm, y + arm, x + arm, y - arm)):
+        draw.line(ends, fill=colours.WHITE, width=round(6 * frame.unit))
+    for ends in ((x - arm, y - arm, x + arm, y + arm), (x - arm, y + arm, x + arm, y - arm)):
+        draw.line(ends, fill=colours.RED, width=round(3.2 * frame.unit))

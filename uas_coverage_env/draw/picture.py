@@ -1,0 +1,229 @@
+"""The picture of a state, seen from above: north up, east to the right."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.draw import colours, marks
+from uas_coverage_env.draw.frame import SMOOTHING, Frame
+from uas_coverage_env.draw.terrain import terrain
+from uas_coverage_env.draw.text import write
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD, PSI, Z
+from uas_coverage_env.world import FLYING, LANDED, STATUS_NAMES, SwarmState
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
+_SMALLEST_PX, _LARGEST_PX = 128, 4096
+# More do not fit below the map; a larger swarm is summed up.
+_NAMED_UAS = 4
+_LABELLED_UAS = 12
+
+
+def picture(
+    scenario: Scenario,
+    swarm: SwarmState,
+    *,
+    paths_m: NDArray[np.float64] | None = None,
+    planned_m: Mapping[str, NDArray[np.float64]] | None = None,
+    size_px: int = 512,
+) -> NDArray[np.uint8]:
+    """One picture of one state.
+
+    For many pictures of one scenario, keep a `Picture`: it draws the background only once.
+
+    Args:
+        scenario: The scenario flown.
+        swarm: The state.
+        paths_m: (T, U, 3) [m] where the UAS have been.
+        planned_m: Name of a UAS -> (N, 3) [m], where it means to fly.
+        size_px: Side of the picture.
+
+    Returns:
+        (size_px, size_px, 3) red, green, blue.
+    """
+    return Picture(scenario, size_px=size_px).draw(swarm, paths_m=paths_m, planned_m=planned_m)
+
+
+class Picture:
+    """Draws the states of one scenario; keeps the background between them.
+
+    Args:
+        scenario: The scenario flown.
+        size_px: Side of the square pictures.
+
+    Raises:
+        ValueError: The size is no whole number between 128 and 4096.
+    """
+
+    def __init__(self, scenario: Scenario, *, size_px: int = 512) -> None:
+        whole = isinstance(size_px, int | np.integer) and not isinstance(size_px, bool)
+        if not whole or not _SMALLEST_PX <= size_px <= _LARGEST_PX:
+            raise ValueError(
+                f"size_px is {size_px!r}; give a whole number from {_SMALLEST_PX} to {_LARGEST_PX}"
+            )
+        self._scenario = scenario
+        self._frame = frame = Frame.around(scenario.fence.vertices_m, int(size_px))
+        positions_m = np.array([point.position_m for point in scenario.waypoints])
+        self._waypoints = frame.pixels(positions_m).tolist()
+        weights = [point.weight for point in scenario.waypoints]
+        self._heavy = [weight > min(weights) for weight in weights]
+        self._radii = [point.radius_m * frame.scale for point in scenario.waypoints]
+        self._labels = [uas.name.rpartition("_")[2][:3] for uas in scenario.uas]
+        self._terrain: Image | None = None
+        # the map changes only when a waypoint is covered
+        self._map: tuple[bytes, Image] | None = None
+
+    def draw(
+        self,
+        swarm: SwarmState,
+        *,
+        paths_m: NDArray[np.float64] | None = None,
+        planned_m: Mapping[str, NDArray[np.float64]] | None = None,
+    ) -> NDArray[np.uint8]:
+        """The picture of a state.
+
+        Args:
+            swarm: The state.
+            paths_m: (T, U, 3) [m] where the UAS have been.
+            planned_m: Name of a UAS -> (N, 3) [m], where it means to fly.
+
+        Returns:
+            (size_px, size_px, 3) red, green, blue; an array of its own.
+        """
+        from PIL import ImageDraw
+
+        image = self._map_with_waypoints(swarm.uncovered).copy()
+        draw = ImageDraw.Draw(image)
+        if paths_m is not None and len(paths_m) > 1:
+            self._paths(draw, paths_m)
+        if planned_m:
+            self._plans(draw, swarm.names, planned_m)
+        self._moving_obstacles(draw, swarm)
+        self._swarm(image, draw, swarm)
+        self._margins(image)
+        self._altitudes(draw, swarm)
+        self._captions(image, draw, swarm)
+        return np.array(image.reduce(SMOOTHING))
+
+    def _background(self) -> "Image":
+        if self._terrain is None:
+            self._terrain = terrain(self._scenario, self._frame)
+        return self._terrain
+
+    def _map_with_waypoints(self, uncovered: NDArray[np.bool_]) -> "Image":
+        from PIL import ImageDraw
+
+        key = uncovered.tobytes()
+        if self._map is None or self._map[0] != key:
+            image = self._background().copy()
+            draw = ImageDraw.Draw(image)
+            for at, radius, heavy, open_ in zip(
+                self._waypoints, self._radii, self._heavy, uncovered.tolist(), strict=True
+            ):
+                marks.waypoint(draw, self._frame, *at, radius, heavy=heavy, open_=open_)
+            self._map = (key, image)
+        return self._map[1]
+
+    def _paths(self, draw: "ImageDraw", paths_m: NDArray[np.float64]) -> None:
+        pixels = self._frame.pixels(paths_m)
+        for i in range(pixels.shape[1]):
+            line = pixels[:, i].ravel().tolist()
+            draw.line(line, fill=_colour(i), width=round(1.7 * self._frame.unit))
+
+    def _plans(
+        self,
+        draw: "ImageDraw",
+        names: tuple[str, ...],
+        planned_m: Mapping[str, NDArray[np.float64]],
+    ) -> None:
+        radius = 2 * self._frame.unit
+        for name, positions_m in planned_m.items():
+            colour = _colour(names.index(name))
+            for x, y in self._frame.pixels(np.asarray(positions_m)).tolist():
+                box = (x - radius, y - radius, x + radius, y + radius)
+                draw.ellipse(box, fill=colour, outline=colours.WHITE)
+
+    def _moving_obstacles(self, draw: "ImageDraw", swarm: SwarmState) -> None:
+        scale = self._frame.scale
+        centres = self._frame.pixels(swarm.moving_position_m).tolist()
+        for (x, y), moving in zip(centres, self._scenario.moving_obstacles, strict=True):
+            radius = moving.radius_m * scale
+            safe_radius = radius + moving.safe_distance_m * scale
+            marks.moving_obstacle(draw, self._frame, x, y, radius, safe_radius)
+
+    def _swarm(self, image: "Image", draw: "ImageDraw", swarm: SwarmState) -> None:
+        frame, unit = self._frame, self._frame.unit
+        centres = frame.pixels(swarm.x[:, :2]).tolist()
+        labelled = len(centres) <= _LABELLED_UAS
+        for i, (x, y) in enumerate(centres):
+            colour = _colour(i)
+            if swarm.status[i] == FLYING:
+                yaw, soc = float(swarm.x[i, PSI]), 1 - float(swarm.x[i, DOD])
+                marks.flying(draw, frame, x, y, yaw, soc, colour)
+                place = (x + 13 * unit, y - 9 * unit)
+            elif swarm.status[i] == LANDED:
+                marks.landed(draw, frame, x, y, colour)
+                place = (x + 7 * unit, y)
+            else:
+                marks.lost(draw, frame, x, y)
+                place = (x + 11 * unit, y)
+            if labelled:
+                write(image, place, self._labels[i], 11 * unit, colour, halo=1.5 * unit)
+
+    def _margins(self, image: "Image") -> None:
+        """Cover what has left the map: a helicopter that is gone, and its dotted circle."""
+        frame, unit = self._frame, self._frame.unit
+        background = self._background()
+        for box in (
+            (0, 0, frame.side, round(frame.header - unit)),
+            (0, round(frame.footer), frame.side, frame.side),
+            (round(frame.gauge - 4 * unit), 0, frame.side, frame.side),
+        ):
+            image.paste(background.crop(box), box[:2])
+
+    def _altitudes(self, draw: "ImageDraw", swarm: SwarmState) -> None:
+        """Where the flying UAS are on the altitude scale."""
+        frame, unit = self._frame, self._frame.unit
+        x = frame.gauge + 6 * unit
+        for i, z in enumerate(swarm.x[:, Z].tolist()):
+            if swarm.status[i] == FLYING:
+                y = frame.gauge_height(-z)
+                mark = [x, y, x - 8 * unit, y - 4 * unit, x - 8 * unit, y + 4 * unit]
+                draw.polygon(mark, fill=_colour(i))
+
+    def _captions(self, image: "Image", draw: "ImageDraw", swarm: SwarmState) -> None:
+        frame, unit = self._frame, self._frame.unit
+        y = frame.header / 2
+        covered, waypoints = int((~swarm.uncovered).sum()), len(swarm.uncovered)
+        middle = f"covered {covered} / {waypoints}"
+        write(image, (frame.side / 2, y), middle, 14 * unit, colours.INK, align=0.5)
+        end = f"step {swarm.step} / {self._scenario.max_steps}"
+        write(image, (frame.side - 8 * unit, y), end, 14 * unit, colours.INK, align=1.0)
+        y = (frame.footer + frame.side) / 2
+        if len(swarm.names) > _NAMED_UAS:
+            write(image, (8 * unit, y), _summed_up(swarm), 12 * unit, colours.INK)
+            return
+        for i, name in enumerate(swarm.names):
+            x = (8 + i * 496 / _NAMED_UAS) * unit
+            draw.ellipse((x, y - 4 * unit, x + 8 * unit, y + 4 * unit), fill=_colour(i))
+            doing = f"{-swarm.x[i, Z]:.0f} m"
+            if swarm.status[i] != FLYING:
+                doing = STATUS_NAMES[swarm.status[i]]
+            words = f"{name[:9]} {100 * (1 - swarm.x[i, DOD]):.0f} %, {doing}"
+            write(image, (x + 11 * unit, y), words, 10.5 * unit, colours.INK)
+
+
+def _colour(i: int) -> colours.Colour:
+    return colours.UAS[i % len(colours.UAS)]
+
+
+def _summed_up(swarm: SwarmState) -> str:
+    counts = [int((swarm.status == status).sum()) for status in range(len(STATUS_NAMES))]
+    parts = [f"{n} {name}" for n, name in zip(counts, STATUS_NAMES, strict=True) if n]
+    lowest = 100 * (1 - swarm.x[:, DOD].max())
+    return f"{len(swarm.names)} UAS: {', '.join(parts)}; lowest charge {lowest:.0f} %"

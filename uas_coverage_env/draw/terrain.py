@@ -1,0 +1,163 @@
+"""What stays the same in all pictures of a scenario: ground, obstacles, fence, pads, scales."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.draw import colours
+from uas_coverage_env.draw.frame import Frame
+from uas_coverage_env.draw.text import write
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.scenario import Scenario
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
+# Towards the light, north-west and up (NED): the common direction on maps.
+_LIGHT = np.array([0.45, -0.45, -0.77])
+# Metres of shadow per metre of height, towards the south-east.
+_SHADOW = np.array([-0.32, 0.32])
+_TALL_M = 50.0
+# Sum of red, green and blue below which dark words cannot be read.
+_DARK = 400
+
+
+def terrain(scenario: Scenario, frame: Frame) -> "Image":
+    """The background of all pictures of a scenario.
+
+    Args:
+        scenario: What is drawn.
+        frame: Where it is drawn.
+    """
+    from PIL import Image, ImageDraw
+
+    image = Image.new("RGB", (frame.side, frame.side), colours.PAPER)
+    draw = ImageDraw.Draw(image)
+    fence = _outline(scenario.fence.vertices_m)
+    draw.polygon(_flat(frame.pixels(fence)), fill=colours.GROUND)
+    _grid(image, draw, frame, fence)
+    for decoration in scenario.decorations:
+        fill = colours.DECORATIONS.get(decoration.kind or "", colours.OTHER_DECORATION)
+        corners = _flat(frame.pixels(np.array(decoration.polygon_m)))
+        draw.polygon(corners, fill=fill)
+        if decoration.kind == "pad":
+            draw.line([*corners, *corners[:2]], fill=colours.FAINT, width=round(frame.unit))
+    _shadows(image, frame, scenario.hulls)
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        _obstacle(image, draw, frame, obstacle.kind or "", hull)
+    edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
+    draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
+    _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
+    _margins(image, draw, frame, scenario.name)
+    return image
+
+
+def _grid(image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]) -> None:
+    """Lines every 1, 2 or 5 × 10^k metres, about five over the map, and how far apart they are."""
+    extent_m = np.ptp(fence, axis=0).max()
+    power = 10.0 ** np.floor(np.log10(extent_m / 4))
+    step_m = power * max(factor for factor in (1, 2, 5) if factor * power <= extent_m / 4)
+    low, high = fence.min(axis=0), fence.max(axis=0)
+    for axis in (0, 1):
+        for at in np.arange(np.ceil(low[axis] / step_m), high[axis] / step_m) * step_m:
+            ends = np.array([low, high])
+            ends[:, axis] = at
+            draw.line(_flat(frame.pixels(ends)), fill=colours.GRID, width=round(frame.unit))
+    start = frame.pixels(low) + np.array([8, -8]) * frame.unit
+    end = start + np.array([step_m * frame.scale, 0])
+    draw.line(_flat(np.array([start, end])), fill=colours.INK, width=round(2 * frame.unit))
+    place = (float(start[0]), float(start[1]) - 7 * frame.unit)
+    write(image, place, f"{step_m:g} m", 9 * frame.unit, colours.INK)
+
+
+def _shadows(image: "Image", frame: Frame, hulls: tuple[ConvexPolytope, ...]) -> None:
+    """All shadows in one layer, so that where two meet they do not add up."""
+    from PIL import Image, ImageDraw
+
+    mask = Image.new("L", image.size, 0)
+    draw = ImageDraw.Draw(mask)
+    for hull in hulls:
+        ground_z = hull.vertices_m[:, 2].max()
+        height_m = ground_z - hull.vertices_m[:, 2]
+        shadow = hull.vertices_m[:, :2] + height_m[:, None] * _SHADOW
+        outline = _outline(np.vstack([shadow, hull.vertices_m[:, :2]]))
+        draw.polygon(_flat(frame.pixels(outline)), fill=60)
+    image.paste(colours.INK, mask=mask)
+
+
+def _obstacle(
+    image: "Image", draw: "ImageDraw", frame: Frame, kind: str, hull: ConvexPolytope
+) -> None:
+    """The faces that can be seen from above, lit, in the tint of the kind; darker where taller."""
+    height_m = float(np.ptp(hull.vertices_m[:, 2]))
+    tint = colours.OBSTACLES.get(kind, colours.OTHER_OBSTACLE)
+    tint = colours.shaded(tint, 1.08 - 0.3 * min(1.0, height_m / _TALL_M))
+    distances = hull.face_distances(hull.vertices_m)
+    for face in np.flatnonzero(hull.normals[:, 2] < -1e-6):
+        corners = hull.vertices_m[np.abs(distances[:, face]) < 1e-6]
+        light = 0.62 + 0.5 * max(0.0, float(hull.normals[face] @ _LIGHT))
+        draw.polygon(_flat(frame.pixels(_outline(corners))), fill=colours.shaded(tint, light))
+    outline = _outline(hull.vertices_m)
+    edge = _flat(frame.pixels(np.vstack([outline, outline[:1]])))
+    width = round((1 + min(1.0, height_m / _TALL_M)) * frame.unit)
+    draw.line(edge, fill=colours.shaded(tint, 0.55), width=width, joint="curve")
+    if np.ptp(frame.pixels(outline), axis=0).min() > 14 * frame.unit:
+        x, y = frame.pixels(outline.mean(axis=0)).tolist()
+        ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.5)
+        write(image, (x, y), f"{height_m:.0f} m", 8.5 * frame.unit, ink, align=0.5)
+
+
+def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> None:
+    radius = 5 * frame.unit
+    for x, y in frame.pixels(starts_m):
+        box = (x - radius, y - radius, x + radius, y + radius)
+        draw.ellipse(box, fill=colours.WHITE, outline=colours.BLUE, width=round(1.5 * frame.unit))
+
+
+def _margins(image: "Image", draw: "ImageDraw", frame: Frame, name: str) -> None:
+    """The name above the map and the altitude scale beside it."""
+    unit = frame.unit
+    write(image, (8 * unit, frame.header / 2), name, 14 * unit, colours.INK)
+    x = frame.gauge + 8 * unit
+    top, bottom = frame.gauge_height(frame.ceiling_m), frame.gauge_height(frame.floor_m)
+    draw.line((x, top, x, bottom), fill=colours.FAINT, width=round(1.5 * unit))
+    for altitude_m in np.linspace(frame.floor_m, frame.ceiling_m, 6).tolist():
+        y = frame.gauge_height(altitude_m)
+        draw.line((x, y, x + 4 * unit, y), fill=colours.FAINT, width=round(unit))
+        write(image, (x + 7 * unit, y), f"{altitude_m:.0f}", 9 * unit, colours.FAINT)
+    write(image, (x - 4 * unit, top - 12 * unit), "alt [m]", 9 * unit, colours.FAINT)
+
+
+def _outline(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners of the convex hull of points seen from above, in order.
+
+    Args:
+        points_m: (P, 2 or 3) [m].
+
+    Returns:
+        (C, 2) [m].
+    """
+    points = sorted({(float(north), float(east)) for north, east in points_m[:, :2]})
+    if len(points) < 3:
+        return np.array(points)
+    return np.array([*_chain(points), *_chain(points[::-1])])
+
+
+def _chain(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """One side of the hull of sorted points, without its last corner (monotone chain)."""
+    chain: list[tuple[float, float]] = []
+    for point in points:
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+            chain.pop()
+        chain.append(point)
+    return chain[:-1]
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _flat(pixels: NDArray[np.float64]) -> list[float]:
+    return pixels.ravel().tolist()

@@ -1,0 +1,38 @@
+"""What a learner sees: environments for PettingZoo and Gymnasium on one world."""
+
+from uas_coverage_env.env.actions import ACTION_NAMES, HOME_CHOICE
+from uas_coverage_env.env.aec import env, raw_env
+from uas_coverage_env.env.layout import (
+    K_WAYPOINTS,
+    OBSERVATION_LAYOUT,
+    OBSERVATION_SIZE,
+    layout_table,
+    observation_bounds,
+    observation_columns,
+)
+from uas_coverage_env.env.parallel import CoverageParallelEnv
+from uas_coverage_env.env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
+from uas_coverage_env.env.rewards import REWARD_TERMS, rewards_table
+from uas_coverage_env.env.single import CoverageSwarmEnv
+from uas_coverage_env.env.vector import vector_env
+
+__all__ = [
+    "ACTION_NAMES",
+    "GYMNASIUM_ID",
+    "HOME_CHOICE",
+    "K_WAYPOINTS",
+    "OBSERVATION_LAYOUT",
+    "OBSERVATION_SIZE",
+    "PETTINGZOO_ID",
+    "REWARD_TERMS",
+    "CoverageParallelEnv",
+    "CoverageSwarmEnv",
+    "env",
+    "layout_table",
+    "observation_bounds",
+    "observation_columns",
+    "raw_env",
+    "register_environments",
+    "rewards_table",
+    "vector_env",
+]

@@ -1,0 +1,261 @@
+"""One mission as learners fly it: what the multi-agent and the single-agent environment share."""
+
+import numbers
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.actions import HOME_CHOICE, actions_of
+from uas_coverage_env.env.global_state import global_space, global_state
+from uas_coverage_env.env.kernel import (
+    ACCEPTED,
+    CONTACT,
+    CONTACT_WITH,
+    COVERED,
+    ENERGY,
+    FILTERED,
+    REPORT_SIZE,
+    RETURNING,
+    STATUS,
+    step_episode,
+)
+from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
+from uas_coverage_env.env.nearest import NO_TARGET, neighbours_of
+from uas_coverage_env.env.observation import observe, scales_of
+from uas_coverage_env.env.rewards import REWARD_TERMS, weights_of
+from uas_coverage_env.scenario import Scenario, load_scenario
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    CONTACT_NAMES,
+    FLYING,
+    KIND_NAMES,
+    OUTCOME_DTYPE,
+    STATUS_NAMES,
+    SwarmState,
+    World,
+)
+
+_N_TERMS = len(REWARD_TERMS)
+_LONGEST = 100_000
+
+
+class Episode:
+    """One mission after another, in arrays.
+
+    Args:
+        scenario: Name of a shipped scenario, path of a scenario file, or a scenario.
+        action: A name of `ACTION_NAMES`.
+        dynamics: "lpv" or "nonlinear".
+        return_mode: Bring every UAS home in time.
+        safety_filter: Keep commands clear of harm.
+        reward_weights: Reward term -> weight; the others keep their defaults.
+        max_cycles: Steps after which the episode is cut; None: the scenario's.
+
+    Attributes:
+        scenario: The scenario flown, with `max_steps` as given by `max_cycles`.
+        names: Of all UAS, in order.
+        actions: The kind of action.
+        max_cycles: As given; may be changed.
+        chooses: Whether the action is a choice of waypoints.
+        steps: Flown since t = 0.
+        asked: (U, 4) the actions of the coming step, to be written before it.
+        observation: (U, OBSERVATION_SIZE) the latest; a new array in every step.
+
+    Raises:
+        ValueError: An argument is none of what is allowed; says what is.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario,
+        *,
+        action: str,
+        dynamics: str,
+        return_mode: bool,
+        safety_filter: bool,
+        reward_weights: Mapping[str, float] | None,
+        max_cycles: int | None,
+    ) -> None:
+        for name, switch in (("return_mode", return_mode), ("safety_filter", safety_filter)):
+            if not isinstance(switch, bool | np.bool_):
+                raise ValueError(f"{name} is {switch!r}; it is True or False")
+        if not isinstance(scenario, Scenario):
+            scenario = load_scenario(scenario)
+        if max_cycles is not None:
+            scenario = _cut(scenario, max_cycles)
+        self._weights = weights_of(reward_weights)
+        self.actions = actions_of(action, scenario)
+        self._world = World(
+            scenario,
+            dynamics=dynamics,  # pyright: ignore[reportArgumentType]  # the world checks it
+            return_mode=bool(return_mode),
+            safety_filter=bool(safety_filter),
+        )
+        self.scenario = scenario
+        self.names = self._world.names
+        self.max_cycles = scenario.max_steps
+        self._filters = bool(safety_filter)
+        self.chooses = action == "waypoint"
+        self._partners = {
+            "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
+            "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
+            "uas": self.names,
+        }
+        n_uas = len(self.names)
+        self._scales = scales_of(scenario)
+        self._neighbours = neighbours_of(scenario)
+        self.asked = np.zeros((n_uas, 4))
+        self._targets = np.full(n_uas, NO_TARGET)
+        self._candidates = np.full((n_uas, K_WAYPOINTS), -1)
+        self._commands = np.zeros(n_uas, dtype=COMMAND_DTYPE)
+        self._outcome = np.zeros(n_uas, dtype=OUTCOME_DTYPE)
+        self._report = np.zeros((n_uas, REPORT_SIZE))
+        self.observation = np.zeros((n_uas, OBSERVATION_SIZE), np.float32)
+        self.steps = 0
+        # what the kernel is given in every step: the arrays are written in place
+        self._fixed = (
+            *self._world.arena,
+            *self._world.state,
+            self.actions.kind,
+            self.actions.ranges,
+            self._scales,
+            self._neighbours,
+            self._weights,
+            dynamics == "nonlinear",
+            bool(return_mode),
+            bool(safety_filter),
+            self.asked,
+            self._targets,
+            self._candidates,
+            self._commands,
+            self._outcome,
+            self._report,
+        )
+
+    def reset(self) -> None:
+        """Begin a new mission."""
+        world = self._world
+        world.reset()
+        self.asked[:] = 0.0
+        self.steps = 0
+        self._targets[:] = NO_TARGET
+        self._outcome[:] = np.zeros((), dtype=OUTCOME_DTYPE)
+        self._commands[:] = np.zeros((), dtype=COMMAND_DTYPE)
+        self._report[:] = 0.0
+        self._report[:, CONTACT_WITH] = -1
+        self._report[:, STATUS] = world.state.status
+        self._report[:, COVERED] = (~world.state.uncovered).sum()
+        self.observation = np.empty_like(self.observation)
+        observe(
+            world.arena,
+            world.state,
+            self._scales,
+            self._neighbours,
+            world.state.status == FLYING,
+            self._targets,
+            self.max_cycles,
+            self._candidates,
+            self.observation,
+        )
+
+    def step(self) -> list[list[float]]:
+        """Fly what was asked for one step.
+
+        Returns:
+            The report, one row for each UAS: reward terms, then the columns of `kernel`.
+
+        Raises:
+            ValueError: An action is not finite; names UAS and value, and nothing has changed.
+        """
+        observation = self.observation.copy()
+        invalid = step_episode(*self._fixed, self.max_cycles, observation)
+        if invalid != ACCEPTED:
+            numbers_asked = self.asked[invalid, : self.actions.size].tolist()
+            self.asked[invalid] = 0.0
+            raise ValueError(
+                f"action of {self.names[invalid]} is {numbers_asked}; give finite numbers"
+            )
+        self.observation = observation
+        self.steps += 1
+        return self._report.tolist()
+
+    @property
+    def report(self) -> list[list[float]]:
+        """The report of the latest step; before the first, one in which nothing happened."""
+        return self._report.tolist()
+
+    def global_state(self) -> NDArray[np.float32]:
+        """The whole mission as one vector, see `global_state`."""
+        state = self._world.state
+        sample = min(self.steps, len(self._world.arena.moving_path_m) - 1)
+        return global_state(
+            self.observation,
+            state.status,
+            state.uncovered,
+            self._world.arena.moving_path_m[sample],
+            self._world.arena.moving_velocity_mps[sample],
+            self._scales[0],
+        )
+
+    def state_space(self) -> spaces.Box:
+        """A new space of `global_state`."""
+        scenario = self.scenario
+        return global_space(
+            len(scenario.uas), len(scenario.moving_obstacles), len(scenario.waypoints)
+        )
+
+    @property
+    def positions_m(self) -> NDArray[np.float64]:
+        """(U, 3) [m] where the UAS are."""
+        return self._world.state.x[:, :3]
+
+    def swarm_state(self) -> SwarmState:
+        """What a player sees now."""
+        return self._world.swarm_state()
+
+    def info(self, i: int, row: list[float]) -> dict[str, Any]:
+        """What is told about a UAS beside its observation and reward, see `CoverageParallelEnv`."""
+        info: dict[str, Any] = {
+            "status": STATUS_NAMES[int(row[STATUS])],
+            "contact": None,
+            "contact_with": None,
+            "returning": row[RETURNING] > 0.0,
+            "covered": int(row[COVERED]),
+            "energy_Wh": row[ENERGY],
+            "reward_terms": dict(zip(REWARD_TERMS, row, strict=False)),
+        }
+        if row[CONTACT]:
+            info["contact"] = kind = CONTACT_NAMES[int(row[CONTACT])]
+            if kind in self._partners:
+                info["contact_with"] = self._partners[kind][int(row[CONTACT_WITH])]
+        if self.chooses:
+            info["action_mask"] = self.action_mask(i)
+        if self._filters:
+            info["filter"] = {
+                "changed": row[FILTERED] > 0.0,
+                "asked": _described(self._commands[i]),
+                "applied": _described(self._outcome[i]["applied_command"]),
+            }
+        return info
+
+    def action_mask(self, i: int) -> NDArray[np.int8]:
+        """(K_WAYPOINTS + 1,) 1 where a choice of UAS i names a waypoint, and for home."""
+        mask = np.ones(HOME_CHOICE + 1, np.int8)
+        mask[:HOME_CHOICE] = self._candidates[i] >= 0
+        return mask
+
+
+def _cut(scenario: Scenario, max_cycles: int) -> Scenario:
+    """The scenario with another limit of steps; return mode and the observed time know it."""
+    whole = isinstance(max_cycles, numbers.Integral) and not isinstance(max_cycles, bool)
+    if not whole or not 1 <= max_cycles <= _LONGEST:
+        raise ValueError(f"max_cycles is {max_cycles!r}; give a whole number from 1 to {_LONGEST}")
+    return scenario.model_copy(update={"max_steps": int(max_cycles)})
+
+
+def _described(command: np.void) -> dict[str, Any]:
+    return {"kind": KIND_NAMES[int(command["kind"])], "values": command["values"].tolist()}

@@ -1,0 +1,62 @@
+"""The whole mission as one vector, for learners with a central critic.
+
+For each UAS its `own` group of the observation, then whether it has landed and whether it is lost;
+for each moving obstacle its place in the box around the fence (north, east, up; ±1 are the sides)
+and its velocity (north, east, down / 20 m/s); for each waypoint whether it is still to be covered.
+"""
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.layout import OBSERVATION_LAYOUT, observation_bounds
+from uas_coverage_env.world import LANDED, LOST
+
+_OWN = OBSERVATION_LAYOUT[0].size
+_MOVING_BOUND = 2.0
+_MOVING_MPS = 20.0
+
+
+def global_space(n_uas: int, n_moving: int, n_waypoints: int) -> spaces.Box:
+    """The space of the vector; its size depends on the scenario."""
+    own_low, own_high = (bounds[:_OWN] for bounds in observation_bounds())
+    low = np.concatenate(
+        [
+            np.tile(np.append(own_low, [0, 0]), n_uas),
+            np.full(6 * n_moving, -_MOVING_BOUND),
+            np.zeros(n_waypoints),
+        ]
+    )
+    high = np.concatenate(
+        [
+            np.tile(np.append(own_high, [1, 1]), n_uas),
+            np.full(6 * n_moving, _MOVING_BOUND),
+            np.ones(n_waypoints),
+        ]
+    )
+    return spaces.Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+
+
+def global_state(
+    observation: NDArray[np.float32],
+    status: NDArray[np.int64],
+    uncovered: NDArray[np.bool_],
+    moving_position_m: NDArray[np.float64],
+    moving_velocity_mps: NDArray[np.float64],
+    scale: np.void,
+) -> NDArray[np.float32]:
+    """The vector.
+
+    Args:
+        observation: (U, OBSERVATION_SIZE) of all UAS.
+        status: (U,) FLYING, LANDED or LOST.
+        uncovered: (W,).
+        moving_position_m: (M, 3) [m] centres.
+        moving_velocity_mps: (M, 3) [m/s].
+        scale: A record of SCALES_DTYPE, for the box around the fence.
+    """
+    uas = np.column_stack([observation[:, :_OWN], status == LANDED, status == LOST])
+    place = (moving_position_m - scale["centre_m"]) * scale["per_half_side"] * [1, 1, -1]
+    moving = np.column_stack([place, moving_velocity_mps / _MOVING_MPS])
+    moving = np.clip(moving, -_MOVING_BOUND, _MOVING_BOUND)
+    return np.concatenate([uas.ravel(), moving.ravel(), uncovered], dtype=np.float32)

@@ -1,0 +1,206 @@
+"""The observations of all UAS, compiled; what the numbers mean is in `layout`.
+
+One function per group of `OBSERVATION_LAYOUT`, in its order. Each writes its numbers into a row
+from column k on and returns the column after its last.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.layout import FAR_M, HEIGHT_M, K_WAYPOINTS, MARGIN, OBSERVATION_LAYOUT
+from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
+from uas_coverage_env.env.relative import charge_left, close, direction, within
+from uas_coverage_env.env.surroundings import surroundings
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import (
+    DOD,
+    PHI,
+    PSI,
+    THETA,
+    U_TH,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    WZ,
+    X,
+    Y,
+    Z,
+)
+from uas_coverage_env.world import FLYING, HOME
+from uas_coverage_env.world.guidance import target_position
+from uas_coverage_env.world.routes import route
+
+_OWN_SIZE = OBSERVATION_LAYOUT[0].size
+_HOME_SIZE = OBSERVATION_LAYOUT[1].size
+
+SCALES_DTYPE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                # one over the limits of the vehicle
+                ("per_v_xy", "f8"),
+                ("per_v_z", "f8"),
+                ("per_tilt", "f8"),
+                ("per_yaw", "f8"),
+                ("per_rate", "f8"),
+                ("per_yaw_rate", "f8"),
+                ("rank", "f8"),
+                # the box around the fence: its centre and one over half its sides
+                ("centre_m", "f8", (3,)),
+                ("per_half_side", "f8", (3,)),
+                # one over all weight, and over the heaviest
+                ("per_weight", "f8"),
+                ("per_heaviest", "f8"),
+            ],
+            align=True,
+        ),
+    )
+)
+"""What one UAS's numbers are divided by."""
+
+
+def scales_of(scenario: Scenario) -> NDArray[np.void]:
+    """The scales of all UAS.
+
+    Returns:
+        (U,) of SCALES_DTYPE.
+    """
+    corners_m = scenario.fence.vertices_m
+    low_m, high_m = corners_m.min(axis=0), corners_m.max(axis=0)
+    weights = [waypoint.weight for waypoint in scenario.waypoints]
+    scales = np.zeros(len(scenario.uas), dtype=SCALES_DTYPE)
+    for i, (scale, vehicle) in enumerate(zip(scales, scenario.vehicles, strict=True)):
+        limits = vehicle.limits
+        scale["per_v_xy"] = 1 / limits.v_xy_max_mps
+        scale["per_v_z"] = 1 / max(limits.v_up_max_mps, limits.v_down_max_mps)
+        scale["per_tilt"] = 1 / limits.tilt_max_rad
+        scale["per_yaw"] = 1 / limits.yaw_max_rad
+        scale["per_rate"] = 1 / limits.rate_max_radps
+        scale["per_yaw_rate"] = 1 / limits.yaw_rate_max_radps
+        scale["rank"] = i / max(1, len(scales) - 1)
+        scale["centre_m"] = (low_m + high_m) / 2
+        scale["per_half_side"] = 2 / (high_m - low_m)
+        scale["per_weight"] = 1 / sum(weights)
+        scale["per_heaviest"] = 1 / max(weights)
+    return scales
+
+
+@njit(cache=True, error_model="numpy")
+def observe(arena, state, scales, neighbours, sees, targets, max_cycles, candidates, observation):
+    """Write the observations of those UAS that are to see.
+
+    Args:
+        arena: The arena.
+        state: The state of the world.
+        scales: (U,) of SCALES_DTYPE.
+        neighbours: (W,) of NEIGHBOURS_DTYPE.
+        sees: (U,) whose observations are written; those of the others stay.
+        targets: (U,) where each is flying to; NO_TARGET where unknown.
+        max_cycles: Steps after which the episode is cut.
+        candidates: (U, K_WAYPOINTS) the open waypoints in the order of the observation; -1 where
+            there is none; written.
+        observation: (U, OBSERVATION_SIZE) float32; written.
+    """
+    nearest_m2 = np.empty(K_WAYPOINTS)
+    for i in range(state.status.shape[0]):
+        if not sees[i]:
+            continue
+        row = observation[i]
+        nearest_waypoints(arena, state, i, candidates[i], nearest_m2)
+        home_dod = _home(arena, state, i, row, _OWN_SIZE)
+        k = _own(arena, state, scales[i], i, home_dod, max_cycles, row, 0) + _HOME_SIZE
+        k = _remaining(arena, state, i, row, k)
+        k = surroundings(arena, state, i, row, k)
+        k = waypoints(arena, state, scales[i], neighbours, i, targets, candidates[i], row, k)
+        k = others(arena, state, scales[i], i, row, k)
+        moving_obstacles(arena, state, scales[i], i, row, k)
+
+
+@njit(cache=True, error_model="numpy")
+def _own(arena, state, scale, i, home_dod, max_cycles, row, k):
+    x = state.x[i]
+    row[k] = within((x[X] - scale.centre_m[0]) * scale.per_half_side[0], -1.0, 1.0)
+    row[k + 1] = within((x[Y] - scale.centre_m[1]) * scale.per_half_side[1], -1.0, 1.0)
+    row[k + 2] = within((scale.centre_m[2] - x[Z]) * scale.per_half_side[2], -1.0, 1.0)
+    row[k + 3] = within(x[VX] * scale.per_v_xy, -2.0, 2.0)
+    row[k + 4] = within(x[VY] * scale.per_v_xy, -2.0, 2.0)
+    row[k + 5] = within(x[VZ] * scale.per_v_z, -2.0, 2.0)
+    row[k + 6] = within(x[PHI] * scale.per_tilt, -2.0, 2.0)
+    row[k + 7] = within(x[THETA] * scale.per_tilt, -2.0, 2.0)
+    row[k + 8] = within(x[PSI] * scale.per_yaw, -2.0, 2.0)
+    row[k + 9] = within(x[WX] * scale.per_rate, -2.0, 2.0)
+    row[k + 10] = within(x[WY] * scale.per_rate, -2.0, 2.0)
+    row[k + 11] = within(x[WZ] * scale.per_yaw_rate, -2.0, 2.0)
+    row[k + 12] = within(state.reference[i, 0] * scale.per_v_xy, -2.0, 2.0)
+    row[k + 13] = within(state.reference[i, 1] * scale.per_v_xy, -2.0, 2.0)
+    row[k + 14] = 1.0 if state.status[i] == FLYING else 0.0
+    row[k + 15] = 1.0 if state.departed[i] else 0.0
+    row[k + 16] = 1.0 if state.returning[i] else 0.0
+    row[k + 17] = scale.rank
+    row[k + 18] = within(x[DOD], 0.0, 1.0)
+    row[k + 19] = within(x[U_TH], -1.0, 1.0)
+    row[k + 20] = charge_left(arena, state, i)
+    row[k + 21] = within((arena.uas[i].dod_max - x[DOD] - home_dod) / MARGIN, -1.0, 1.0)
+    row[k + 22] = within((max_cycles - state.step[0]) / max_cycles, 0.0, 1.0)
+    left = 0.0
+    for w in range(state.uncovered.shape[0]):
+        if state.uncovered[w]:
+            left += arena.waypoints[w].weight
+    row[k + 23] = within(left * scale.per_weight, 0.0, 1.0)
+    return k + 24
+
+
+@njit(cache=True, error_model="numpy")
+def _home(arena, state, i, row, k):
+    """Write where home is; returns the depth of discharge that the way there costs."""
+    uas = arena.uas[i]
+    x = state.x[i, X]
+    y = state.x[i, Y]
+    z = state.x[i, Z]
+    target, x1, y1, z1 = target_position(arena, i, HOME)
+    leg_x, leg_y, way_m, _ = route(arena, target, x, y, z, x1, y1, z1)
+    direction(leg_x - x, leg_y - y, row, k)
+    row[k + 2] = close(way_m)
+    row[k + 3] = within((z1 - z) / HEIGHT_M, -1.0, 1.0)
+    return (way_m / uas.speed_mps + max(0.0, z1 - z) / uas.descent_mps) * uas.dod_per_s
+
+
+@njit(cache=True, error_model="numpy")
+def _sector(dx, dy):
+    """Which eighth of the horizon a place lies in: 0 from north to north-east, and on clockwise."""
+    if dy >= 0.0:
+        if dx > 0.0:
+            return 0 if dy < dx else 1
+        return 2 if -dx < dy else 3
+    if dx < 0.0:
+        return 4 if dy > dx else 5
+    return 6 if dx < -dy else 7
+
+
+@njit(cache=True, error_model="numpy")
+def _remaining(arena, state, i, row, k):
+    row[k : k + 10] = 0.0
+    x = state.x[i, X]
+    y = state.x[i, Y]
+    weight = 0.0
+    north_m = 0.0
+    east_m = 0.0
+    for w in range(state.uncovered.shape[0]):
+        if state.uncovered[w]:
+            waypoint = arena.waypoints[w]
+            dx = waypoint.position_m[0] - x
+            dy = waypoint.position_m[1] - y
+            weight += waypoint.weight
+            north_m += waypoint.weight * dx
+            east_m += waypoint.weight * dy
+            row[k + _sector(dx, dy)] += waypoint.weight
+    if weight > 0.0:
+        for sector in range(k, k + 8):
+            row[sector] = within(row[sector] / weight, 0.0, 1.0)
+        row[k + 8] = within(north_m / weight / FAR_M, -1.0, 1.0)
+        row[k + 9] = within(east_m / weight / FAR_M, -1.0, 1.0)
+    return k + 10

@@ -1,0 +1,302 @@
+"""The multi-agent environment: one agent per UAS, all act at once (PettingZoo)."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, NoReturn
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import seeding
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from uas_coverage_env.env.documentation import with_tables
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.kernel import STATUS
+from uas_coverage_env.env.layout import observation_bounds
+from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import FLYING
+
+_N_TERMS = len(REWARD_TERMS)
+
+Observations = dict[str, NDArray[np.float32]]
+Infos = dict[str, dict[str, Any]]
+
+
+@with_tables
+class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
+    """Several UAS cover the waypoints of an area and come home before their batteries end.
+
+    Description:
+        Every agent is a UAS of the scenario and has its name there. It flies among fixed and
+        moving obstacles inside a geofence. A waypoint is covered when a flying UAS is within its
+        radius at a sample. Flying costs energy: airframe and battery are the linear
+        parameter-varying model of Gasche et al., Sec. II. A step is a time step of the scenario,
+        1 s in those shipped.
+
+    Action Space:
+        velocity (default), `Box(-1, 1, (3,))`: north and east velocity in units of the vehicle's
+        limit, and an altitude to hold, from the lowest (-1) to the highest (1) that lies 1 m
+        inside of the fence's margin.
+
+        acceleration, `Box(-1, 1, (3,))`: north and east in units of g · tilt limit; down, from the
+        largest lift (-1) over hover (0) to the smallest (1).
+
+        wrench, `Box(-1, 1, (4,))`: lift, from the smallest (-1) over the weight alone (0) to the
+        largest (1); three torques in units of the limits.
+
+        waypoint, `Discrete(13)`: which of the 12 nearest open waypoints to fly to, in the order of
+        the observation, or home (12). `infos[agent]["action_mask"]` is 1 for choices that exist;
+        another choice keeps the former target or, where there is none, the place.
+
+        Finite numbers beyond ±1 are clipped. An action that is NaN, infinite, of a wrong type or
+        shape, missing, or for an agent that does not fly raises a ValueError and changes nothing.
+
+    Observation Space:
+        A float32 `Box`, the same for all agents and all scenarios. What lies beyond its bounds is
+        clipped. Directions are those of the map: they do not turn with the UAS.
+
+        {observations}
+
+        `state()` is the whole mission in one vector, see `uas_coverage_env.env.global_state`.
+
+    Rewards:
+        The sum of `infos[agent]["reward_terms"]`: terms times weights, and `reward_weights` changes
+        the weights.
+
+        {rewards}
+
+    Infos:
+        `status` (flying, landed, lost); `contact` and `contact_with` (what it was lost to, else
+        None); `returning` (it flies home); `covered` (waypoints the swarm has covered so far);
+        `energy_Wh` (drawn by this UAS so far); `reward_terms`; `action_mask` with the waypoint
+        action; `filter` (changed, asked, applied) with the safety filter.
+
+    Starting State:
+        All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
+        random: the seed seeds `np_random` alone, and equal actions make equal missions.
+
+    Episode End:
+        Terminated: landed (slow and near its start, which it has left before or returns to), or
+        lost (contact with an obstacle or a UAS, outside of the fence, battery overdrawn).
+        Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`.
+
+    Arguments:
+        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`.
+        action: "velocity", "acceleration", "wrench" or "waypoint".
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world takes a UAS home in time, whatever it is asked for.
+        safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
+        render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window; extra `human`).
+
+    Version History:
+        v0: First version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "uas_coverage_v0",
+        "render_modes": list(RENDER_MODES),
+        "render_fps": RENDER_FPS,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario = "village",
+        *,
+        action: str = "velocity",
+        dynamics: str = "lpv",
+        return_mode: bool = False,
+        safety_filter: bool = False,
+        reward_weights: Mapping[str, float] | None = None,
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self._episode = Episode(
+            scenario,
+            action=action,
+            dynamics=dynamics,
+            return_mode=return_mode,
+            safety_filter=safety_filter,
+            reward_weights=reward_weights,
+            max_cycles=max_cycles,
+        )
+        self._screen = Screen(self._episode.scenario, render_mode)
+        self.render_mode = render_mode
+        self.possible_agents = list(self._episode.names)
+        self.agents: list[str] = []
+        self._begun = False
+        self._index = {name: i for i, name in enumerate(self.possible_agents)}
+        low, high = observation_bounds()
+        # one object per agent: a learner seeds them one by one
+        self._observation_spaces = {
+            agent: spaces.Box(low, high, dtype=np.float32) for agent in self.possible_agents
+        }
+        self._action_spaces = {
+            agent: self._episode.actions.space() for agent in self.possible_agents
+        }
+        self.state_space = self._episode.state_space()
+        self.np_random, self.np_random_seed = seeding.np_random()
+
+    @property
+    def max_cycles(self) -> int:
+        """Steps after which the episode is cut."""
+        return self._episode.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, steps: int) -> None:
+        self._episode.max_cycles = steps
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario flown."""
+        return self._episode.scenario
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """The space of an agent's observations; always the same object."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """The space of an agent's actions; always the same object."""
+        return self._action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, Infos]:
+        """Begin a new mission.
+
+        Args:
+            seed: Seeds `np_random`; the mission itself holds nothing random.
+            options: None are known; they are ignored.
+
+        Returns:
+            Observations and infos of all agents.
+        """
+        if seed is not None:
+            self.np_random, self.np_random_seed = seeding.np_random(seed)
+        episode = self._episode
+        episode.reset()
+        self.agents = list(self.possible_agents)
+        self._begun = True
+        if self.render_mode is not None:
+            self._screen.begin()
+            self._screen.see(episode.positions_m)
+            self._show()
+        observations = dict(zip(self.agents, episode.observation, strict=True))
+        infos = {
+            agent: episode.info(i, row)
+            for i, (agent, row) in enumerate(zip(self.agents, episode.report, strict=True))
+        }
+        return observations, infos
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """Fly every agent for one step.
+
+        Args:
+            actions: One action for each agent of `agents`.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos of the agents that acted.
+
+        Raises:
+            ValueError: An action is invalid, missing, or for an agent that does not fly; names
+                agent and value. Nothing has changed.
+            ResetNeeded: `reset` was not called before.
+        """
+        if not self._begun:
+            raise ResetNeeded("step() before reset(): call reset() first")
+        agents, index, episode = self.agents, self._index, self._episode
+        known = type(actions) is dict or isinstance(actions, Mapping)
+        if not known or len(actions) != len(agents):
+            self._refuse(actions)
+        accept, asked = episode.actions.accept, episode.asked
+        for agent in agents:
+            if agent not in actions:
+                self._refuse(actions)
+            accept(agent, actions[agent], asked[index[agent]])
+        report = episode.step()
+
+        observation = episode.observation
+        over = episode.steps >= episode.max_cycles
+        observations: Observations = {}
+        rewards: dict[str, float] = {}
+        terminations: dict[str, bool] = {}
+        truncations: dict[str, bool] = {}
+        infos: Infos = {}
+        alive: list[str] = []
+        for agent in agents:
+            i = index[agent]
+            row = report[i]
+            flies = row[STATUS] == FLYING
+            observations[agent] = observation[i]
+            rewards[agent] = sum(row[:_N_TERMS])
+            terminations[agent] = not flies
+            truncations[agent] = over and flies
+            infos[agent] = episode.info(i, row)
+            if flies and not over:
+                alive.append(agent)
+        if len(alive) < len(agents):
+            # what one that has ended was asked last must not count as its next action
+            self._forget(alive)
+        if self.render_mode is not None:
+            self._screen.see(episode.positions_m)
+            self._show()
+        return observations, rewards, terminations, truncations, infos
+
+    def check_action(self, agent: str, action: Any) -> None:
+        """Whether an agent could be given an action.
+
+        Raises:
+            ValueError: It could not; names agent and value.
+        """
+        asked = np.zeros(4)
+        self._episode.actions.accept(agent, action, asked)
+        if not np.isfinite(asked).all():
+            raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
+
+    def state(self) -> NDArray[np.float32]:
+        """The whole mission as one vector of `state_space`."""
+        return self._episode.global_state()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The picture of the present state for "rgb_array"; the window for "human"."""
+        if not self._begun:
+            raise ResetNeeded("render() before reset(): call reset() first")
+        return self._screen.render(self._episode.swarm_state())
+
+    def close(self) -> None:
+        """Close the window, if there is one; closing twice does no harm."""
+        self._screen.close()
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def _forget(self, alive: list[str]) -> None:
+        self._episode.asked[:] = 0.0
+        self.agents = alive
+
+    def _refuse(self, actions: Any) -> NoReturn:
+        """Say which agents were given actions that they should not have, or none."""
+        if not isinstance(actions, Mapping):
+            raise ValueError(
+                f"actions are {actions!r} of type {type(actions).__name__}; "
+                f"give a mapping from agent to action"
+            )
+        for agent, action in actions.items():
+            if agent not in self._index:
+                known = ", ".join(self.possible_agents)
+                raise ValueError(
+                    f"action {action!r} for {agent!r}: there is no such agent: {known}"
+                )
+            if agent not in self.agents:
+                raise ValueError(f"action {action!r} for {agent}, which does not fly any more")
+        missing = [agent for agent in self.agents if agent not in actions]
+        raise ValueError(f"{missing[0]} has no action; give one for each agent that flies")

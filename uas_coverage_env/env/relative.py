@@ -1,0 +1,48 @@
+"""Small compiled functions that every part of the observation is made of."""
+
+import math
+
+from numba import njit
+
+from uas_coverage_env.env.layout import NEARBY_M
+from uas_coverage_env.vehicle import DOD
+
+
+@njit(cache=True, error_model="numpy")
+def within(value, low, high):
+    """The value, kept between two bounds; NaN becomes the lower one and does not travel."""
+    if value > low:
+        return value if value < high else high
+    return low
+
+
+@njit(cache=True, error_model="numpy")
+def close(distance_m):
+    """1 at the place itself, 1/2 at NEARBY_M, towards 0 far away."""
+    return 1.0 / (1.0 + distance_m / NEARBY_M)
+
+
+@njit(cache=True, error_model="numpy")
+def direction(dx, dy, row, k):
+    """Write the horizontal unit vector towards a place; returns the next column."""
+    distance_m = math.sqrt(dx * dx + dy * dy)
+    if distance_m > 1e-6:
+        row[k] = within(dx / distance_m, -1.0, 1.0)
+        row[k + 1] = within(dy / distance_m, -1.0, 1.0)
+    else:
+        row[k] = 0.0
+        row[k + 1] = 0.0
+    return k + 2
+
+
+@njit(cache=True, error_model="numpy")
+def apart_m(dx, dy, dz):
+    """Length of a vector [m]."""
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(cache=True, error_model="numpy")
+def charge_left(arena, state, i):
+    """Share of the usable charge of UAS i that is left; negative once overdrawn."""
+    dod_max = arena.uas[i].dod_max
+    return within((dod_max - state.x[i, DOD]) / dod_max, -1.0, 1.0)

@@ -1,0 +1,195 @@
+"""The single-agent environment: one agent flies the whole swarm (Gymnasium)."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.documentation import with_tables
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.kernel import COVERED, ENERGY, STATUS
+from uas_coverage_env.env.layout import observation_bounds
+from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import FLYING
+
+_N_TERMS = len(REWARD_TERMS)
+
+
+@with_tables
+class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
+    """One agent flies several UAS that cover an area; `CoverageParallelEnv` for a single mind.
+
+    Description:
+        The mission of `CoverageParallelEnv`.
+
+    Action Space:
+        The actions of all UAS one after the other: `Box(-1, 1)` of 3 (velocity, acceleration) or 4
+        (wrench) numbers for each UAS, or `MultiDiscrete` with one choice of 13 for each (waypoint).
+        What is asked of a UAS that does not fly has no effect.
+
+    Observation Space:
+        The observations of all UAS one after the other, flying or not; of each:
+
+        {observations}
+
+    Rewards:
+        The sum over the UAS and over these terms, which is also the sum of `info["reward_terms"]`.
+
+        {rewards}
+
+    Infos:
+        `reward_terms`, `covered` and `energy_Wh` of the swarm; `uas`, the infos of every UAS by
+        name as in `CoverageParallelEnv`; with the waypoint action `action_mask`, those of all UAS
+        one after the other.
+
+    Starting State:
+        That of `CoverageParallelEnv`.
+
+    Episode End:
+        Terminated: no UAS flies any more. Truncated: one still flies after `max_cycles` steps.
+
+    Arguments:
+        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`.
+        action: "velocity", "acceleration", "wrench" or "waypoint".
+        dynamics: "lpv" or "nonlinear".
+        return_mode: The world takes a UAS home in time, whatever it is asked for.
+        safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
+        render_mode: None, "rgb_array" or "human".
+
+    Version History:
+        v0: First version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
+        "render_modes": list(RENDER_MODES),
+        "render_fps": RENDER_FPS,
+    }
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario = "village",
+        *,
+        action: str = "velocity",
+        dynamics: str = "lpv",
+        return_mode: bool = False,
+        safety_filter: bool = False,
+        reward_weights: Mapping[str, float] | None = None,
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self._episode = Episode(
+            scenario,
+            action=action,
+            dynamics=dynamics,
+            return_mode=return_mode,
+            safety_filter=safety_filter,
+            reward_weights=reward_weights,
+            max_cycles=max_cycles,
+        )
+        self._screen = Screen(self._episode.scenario, render_mode)
+        self.render_mode = render_mode
+        self._begun = False
+        n_uas = len(self._episode.names)
+        low, high = (np.tile(bounds, n_uas) for bounds in observation_bounds())
+        self.observation_space = spaces.Box(low, high, dtype=np.float32)
+        self.action_space = self._episode.actions.joint_space(n_uas)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario flown."""
+        return self._episode.scenario
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin a new mission.
+
+        Args:
+            seed: Seeds `np_random`; the mission itself holds nothing random.
+            options: None are known; they are ignored.
+        """
+        super().reset(seed=seed)
+        self._episode.reset()
+        self._begun = True
+        if self.render_mode is not None:
+            self._screen.begin()
+            self._see()
+        return self._episode.observation.ravel(), self._info(self._episode.report)
+
+    def step(self, action: Any) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Fly all UAS for one step.
+
+        Args:
+            action: Of `action_space`.
+
+        Raises:
+            ValueError: The action is invalid; names UAS and value. Nothing has changed.
+            ResetNeeded: `reset` was not called before.
+        """
+        if not self._begun:
+            raise ResetNeeded("step() before reset(): call reset() first")
+        episode = self._episode
+        rows = episode.actions.joint_rows(action, len(episode.names))
+        for i, (name, row) in enumerate(zip(episode.names, rows, strict=True)):
+            episode.actions.accept(name, row, episode.asked[i])
+        report = episode.step()
+        info = self._info(report)
+        flies = any(row[STATUS] == FLYING for row in report)
+        truncated = flies and episode.steps >= episode.max_cycles
+        if self.render_mode is not None:
+            self._see()
+        reward = sum(info["reward_terms"].values())
+        return episode.observation.ravel(), reward, not flies, truncated, info
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """The choices that exist now, of all UAS one after the other (sb3-contrib's MaskablePPO).
+
+        Raises:
+            ValueError: The action is not "waypoint".
+        """
+        if not self._episode.chooses:
+            raise ValueError('only action="waypoint" has masks; the others are continuous')
+        masks = [self._episode.action_mask(i) for i in range(len(self._episode.names))]
+        return np.concatenate(masks).astype(np.bool_)
+
+    def render(self) -> Any:
+        """The picture of the present state for "rgb_array"; the window for "human"."""
+        if not self._begun:
+            raise ResetNeeded("render() before reset(): call reset() first")
+        return self._screen.render(self._episode.swarm_state())
+
+    def close(self) -> None:
+        """Close the window, if there is one; closing twice does no harm."""
+        self._screen.close()
+
+    def _see(self) -> None:
+        self._screen.see(self._episode.positions_m)
+        if self.render_mode == "human":
+            self.render()
+
+    def _info(self, report: list[list[float]]) -> dict[str, Any]:
+        episode = self._episode
+        sums = [sum(column) for column in zip(*report, strict=True)]
+        info: dict[str, Any] = {
+            "reward_terms": dict(zip(REWARD_TERMS, sums, strict=False)),
+            "covered": int(report[0][COVERED]),
+            "energy_Wh": sums[ENERGY],
+            "uas": {
+                name: episode.info(i, row)
+                for i, (name, row) in enumerate(zip(episode.names, report, strict=True))
+            },
+        }
+        if episode.chooses:
+            info["action_mask"] = np.concatenate(
+                [entry["action_mask"] for entry in info["uas"].values()]
+            )
+        return info

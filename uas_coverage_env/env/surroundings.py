@@ -1,0 +1,108 @@
+"""What lies around a UAS: free ways to obstacles and fence, compiled."""
+
+import math
+
+from numba import njit
+
+from uas_coverage_env.env.layout import HEIGHT_M, N_RAYS, RAY_M
+from uas_coverage_env.env.relative import within
+from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.vehicle import X, Y, Z
+
+_DIAGONAL = math.sqrt(0.5)
+_RAYS = (
+    (1.0, 0.0, 0.0),
+    (_DIAGONAL, _DIAGONAL, 0.0),
+    (0.0, 1.0, 0.0),
+    (-_DIAGONAL, _DIAGONAL, 0.0),
+    (-1.0, 0.0, 0.0),
+    (-_DIAGONAL, -_DIAGONAL, 0.0),
+    (0.0, -1.0, 0.0),
+    (_DIAGONAL, -_DIAGONAL, 0.0),
+    (0.0, 0.0, -1.0),
+    (0.0, 0.0, 1.0),
+)
+
+
+@njit(cache=True, error_model="numpy")
+def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
+    """How far a ray goes before it enters a hull, at most free_m."""
+    enters_m = 0.0
+    leaves_m = free_m
+    for h in range(first, last):
+        d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+        slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+        if d > 0.0:
+            if slope >= 0.0:
+                return free_m
+            enters_m = max(enters_m, -d / slope)
+        elif slope > 0.0:
+            leaves_m = min(leaves_m, -d / slope)
+        if enters_m >= leaves_m:
+            return free_m
+    return enters_m
+
+
+@njit(cache=True, error_model="numpy")
+def _ray_out(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
+    """How far a ray goes before it leaves the fence, at most free_m."""
+    for h in range(first, last):
+        slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+        if slope > 0.0:
+            d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+            free_m = min(free_m, max(0.0, -d / slope))
+    return free_m
+
+
+@njit(cache=True, error_model="numpy")
+def _out_of_sight(obstacle, x, y, z):
+    """Whether the obstacle is surely farther than rays and clearance reach."""
+    # its box holds all that is nearer than near_m: from RAY_M outside of it nothing is seen
+    lower = obstacle.lower_m
+    upper = obstacle.upper_m
+    return (
+        x < lower[0] - RAY_M
+        or x > upper[0] + RAY_M
+        or y < lower[1] - RAY_M
+        or y > upper[1] + RAY_M
+        or z < lower[2] - RAY_M
+        or z > upper[2] + RAY_M
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def surroundings(arena, state, i, row, k):
+    """Write what lies around UAS i: rays, nearest obstacle, fence; returns the next column."""
+    normals = arena.normals
+    offsets_m = arena.offsets_m
+    rules = arena.rules[0]
+    x = state.x[i, X]
+    y = state.x[i, Y]
+    z = state.x[i, Z]
+    for ray in range(N_RAYS):
+        dx, dy, dz = _RAYS[ray]
+        row[k + ray] = _ray_out(
+            normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z, dx, dy, dz, RAY_M
+        )
+    clearance_m = HEIGHT_M
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        if _out_of_sight(obstacle, x, y, z):
+            continue
+        first = obstacle.first_face
+        last = obstacle.last_face
+        away_m = signed_distance(normals, offsets_m, first, last, x, y, z)
+        clearance_m = min(clearance_m, away_m)
+        if away_m < RAY_M:
+            for ray in range(N_RAYS):
+                dx, dy, dz = _RAYS[ray]
+                row[k + ray] = _ray_to_hull(
+                    normals, offsets_m, first, last, x, y, z, dx, dy, dz, row[k + ray]
+                )
+    for ray in range(k, k + N_RAYS):
+        row[ray] = within(1.0 - row[ray] / RAY_M, 0.0, 1.0)
+    k += N_RAYS
+    row[k] = within(clearance_m / HEIGHT_M, -1.0, 1.0)
+    inside_m = -signed_distance(normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z)
+    row[k + 1] = within((inside_m - rules.fence_margin_m) / HEIGHT_M, -1.0, 1.0)
+    return k + 2

@@ -1,0 +1,47 @@
+"""What is kept of a flight: planners by name, the rollout, its record, measures and directory."""
+
+from uas_coverage_env.flight.directory import check_directory
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home, summary
+from uas_coverage_env.flight.planner import (
+    Assistants,
+    AssistedOptions,
+    Decision,
+    Planner,
+    PlannerError,
+    PlannerOptions,
+)
+from uas_coverage_env.flight.record import MODES, DecisionRecord, Flight, Violation
+from uas_coverage_env.flight.registry import (
+    OptionDescription,
+    PlannerDescription,
+    describe_planners,
+    load_planner,
+    planner_names,
+)
+from uas_coverage_env.flight.rollout import Progress, rollout
+
+__all__ = [
+    "MODES",
+    "Assistants",
+    "AssistedOptions",
+    "Decision",
+    "DecisionRecord",
+    "Flight",
+    "OptionDescription",
+    "Planner",
+    "PlannerDescription",
+    "PlannerError",
+    "PlannerOptions",
+    "Progress",
+    "Violation",
+    "accomplished",
+    "check_directory",
+    "coverage",
+    "describe_planners",
+    "energy_Wh",
+    "home",
+    "load_planner",
+    "planner_names",
+    "rollout",
+    "summary",
+]

@@ -1,0 +1,170 @@
+"""The log of a flight under way: samples and steps as they come, arrays in the end."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.flight.planner import Decision
+from uas_coverage_env.flight.record import (
+    COVERING,
+    LANDED,
+    LOST,
+    MODES,
+    PLAN_DTYPE,
+    RETURN,
+    DecisionRecord,
+    Violation,
+    last_samples,
+)
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD, N_INPUTS, U_TH, open_circuit_V
+from uas_coverage_env.world import CONTACT_NAMES, FLYING, Command, World, command_mode
+from uas_coverage_env.world import LANDED as HAS_LANDED
+
+
+@dataclass(frozen=True)
+class _Sample:
+    x: NDArray[np.float64]
+    status: NDArray[np.int64]
+    covered: int
+
+
+@dataclass(frozen=True)
+class _Step:
+    outcome: NDArray[np.void]
+    modes: list[int]
+    decision: DecisionRecord
+    plan: NDArray[np.void]
+    sample: _Sample
+
+
+class FlightLog:
+    """Keeps a flight while it is flown; Ctrl-C at any moment leaves whole steps behind."""
+
+    def __init__(self, world: World, scenario: Scenario) -> None:
+        self._world = world
+        self._scenario = scenario
+        self._start = self._sample()
+        self._steps: list[_Step] = []
+
+    @property
+    def steps(self) -> int:
+        """Steps flown so far."""
+        return len(self._steps)
+
+    @property
+    def covered(self) -> int:
+        """Waypoints that the swarm has covered so far."""
+        return (self._steps[-1].sample if self._steps else self._start).covered
+
+    def add(
+        self,
+        commands: Mapping[str, Command],
+        duration_s: float,
+        decision: Decision | None,
+        outcome: NDArray[np.void],
+    ) -> None:
+        """Keep the step just flown: the commands, how they were found, and what came of them."""
+        names = self._world.names
+        modes = [
+            _mode(commands.get(name), returning)
+            for name, returning in zip(names, outcome["returning"], strict=True)
+        ]
+        record = _decision_record(duration_s, decision)
+        plan = _plan_rows(decision, self.steps, names)
+        # one append, so that there is no half a step
+        self._steps.append(_Step(outcome, modes, record, plan, self._sample()))
+
+    def series(self) -> dict[str, Any]:
+        """The fields of `Flight` that follow from what was kept."""
+        samples = [self._start, *(step.sample for step in self._steps)]
+        x = np.array([sample.x for sample in samples])
+        mode = self._mode(np.array([sample.status for sample in samples]))
+        u = np.zeros((*mode.shape, N_INPUTS))
+        current_A, voltage_V = np.zeros(mode.shape), np.zeros(mode.shape)
+        for k, step in enumerate(self._steps):
+            flying = mode[k] < LANDED
+            u[k, flying] = step.outcome["u"][flying]
+            current_A[k, flying] = step.outcome["current_A"][flying]
+            voltage_V[k, flying] = step.outcome["voltage_V"][flying]
+        for i, k in enumerate(last_samples(mode)):
+            # nothing is drawn any more: the battery shows what it has
+            vehicle = self._world.arena.vehicles[i]
+            x[k:, i] = x[k, i]
+            voltage_V[k:, i] = open_circuit_V(vehicle, x[k, i, DOD]) - x[k, i, U_TH]
+        return {
+            **{"x": x, "u": u, "voltage_V": voltage_V, "current_A": current_A, "mode": mode},
+            "covered": np.array([sample.covered for sample in samples], np.int64),
+            "moving_position_m": np.array(self._world.arena.moving_path_m[: len(samples)]),
+            "plan": np.concatenate([np.empty(0, PLAN_DTYPE), *(step.plan for step in self._steps)]),
+            "decisions": tuple(step.decision for step in self._steps),
+            "violations": tuple(self._violations()),
+            "breaches": sum(int(step.outcome["breaches"].sum()) for step in self._steps),
+            "min_separation_m": self._smallest("separation_m"),
+            "min_obstacle_clearance_m": self._smallest("obstacle_clearance_m"),
+        }
+
+    def _sample(self) -> _Sample:
+        state = self._world.state
+        covered = len(state.uncovered) - int(state.uncovered.sum())
+        return _Sample(state.x.copy(), state.status.copy(), covered)
+
+    def _mode(self, status: NDArray[np.int64]) -> NDArray[np.int8]:
+        """(T, U) the mode of the command that acts from a sample on, or how the UAS has ended."""
+        modes = [step.modes for step in self._steps]
+        # nothing acts from the last sample on; a UAS that still flies there keeps its mode
+        final = modes[-1] if modes else [COVERING] * status.shape[1]
+        ended = np.where(status == HAS_LANDED, LANDED, LOST)
+        return np.where(status == FLYING, [*modes, final], ended).astype(np.int8)
+
+    def _violations(self) -> list[Violation]:
+        scenario = self._scenario
+        partners = {
+            "obstacle": [obstacle.name for obstacle in scenario.obstacles],
+            "moving_obstacle": [obstacle.name for obstacle in scenario.moving_obstacles],
+            "uas": self._world.names,
+        }
+        found = []
+        for k, step in enumerate(self._steps):
+            for name, entry in zip(self._world.names, step.outcome, strict=True):
+                if entry["contact"]:
+                    kind = CONTACT_NAMES[entry["contact"]]
+                    partner = partners[kind][entry["contact_with"]] if kind in partners else None
+                    found.append(Violation((k + 1) * scenario.dt_s, name, kind, partner))
+        return found
+
+    def _smallest(self, field: str) -> float | None:
+        """The smallest distance met in flight; None where there never was a partner (infinity)."""
+        smallest = min((float(step.outcome[field].min()) for step in self._steps), default=math.inf)
+        return smallest if math.isfinite(smallest) else None
+
+
+def _mode(command: Command | None, returning: bool) -> int:
+    """The mode of a UAS in a step; COVERING stands in for one that does not fly."""
+    if returning:
+        return RETURN
+    return COVERING if command is None else MODES.index(command_mode(command))
+
+
+def _plan_rows(decision: Decision | None, step: int, names: tuple[str, ...]) -> NDArray[np.void]:
+    parts = [np.empty(0, PLAN_DTYPE)]
+    for name, positions_m in (decision.predicted_m if decision else {}).items():
+        rows = np.empty(len(positions_m), PLAN_DTYPE)
+        rows["step"], rows["uas"] = step, names.index(name)
+        rows["n"], rows["position_m"] = np.arange(len(positions_m)), positions_m
+        parts.append(rows)
+    return np.concatenate(parts)
+
+
+def _decision_record(duration_s: float, decision: Decision | None) -> DecisionRecord:
+    if decision is None:
+        return DecisionRecord(duration_s)
+    gap = decision.mip_gap
+    if gap is not None:
+        # an infinite gap says that there is no bound
+        gap = float(gap) if math.isfinite(gap) else None
+    return DecisionRecord(duration_s, decision.fallback, gap)

@@ -1,0 +1,76 @@
+"""Measures of one flight, each a pure function of its record, and the summary made of them."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.flight.record import LANDED, Flight
+
+_J_PER_WH = 3600.0
+
+
+def coverage(flight: Flight) -> float:
+    """Fraction of the waypoints that the swarm has covered, 0..1."""
+    return float(flight.covered[-1] / len(flight.scenario.waypoints))
+
+
+def energy_Wh(flight: Flight) -> NDArray[np.float64]:
+    """(U,) [Wh] sum over samples of voltage times current times dt."""
+    power_W = flight.voltage_V * flight.current_A
+    return power_W.sum(axis=0) * flight.scenario.dt_s / _J_PER_WH
+
+
+def home(flight: Flight) -> NDArray[np.bool_]:
+    """(U,) whether each UAS has landed."""
+    return flight.mode[-1] == LANDED
+
+
+def accomplished(flight: Flight) -> bool:
+    """Whether the mission succeeded: everything covered, everyone home, no violation."""
+    everything = flight.covered[-1] == len(flight.scenario.waypoints)
+    return bool(everything and home(flight).all() and not flight.violations)
+
+
+def decision_time_s(flight: Flight) -> dict[str, float | None]:
+    """Percentiles of the planner's time per decision [s]; None where there was no decision."""
+    names = ("p50", "p95", "p99", "max")
+    durations_s = [decision.duration_s for decision in flight.decisions]
+    if not durations_s:
+        return dict.fromkeys(names)
+    return dict(zip(names, np.percentile(durations_s, (50, 95, 99, 100)).tolist(), strict=True))
+
+
+def mip_gap_p50(flight: Flight) -> float | None:
+    """Median gap of the optimising planner, relative to what a plan can influence; None: none."""
+    gaps = [decision.mip_gap for decision in flight.decisions if decision.mip_gap is not None]
+    return float(np.median(gaps)) if gaps else None
+
+
+def summary(flight: Flight) -> dict[str, Any]:
+    """The fields of `summary.json`, in their order."""
+    return {
+        "coverage": coverage(flight),
+        "steps": flight.steps,
+        "energy_Wh": float(energy_Wh(flight).sum()),
+        "all_home": bool(home(flight).all()),
+        "min_separation_m": flight.min_separation_m,
+        "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
+        "violations": [
+            {
+                "t_s": violation.time_s,
+                "uas": violation.uas,
+                "kind": violation.kind,
+                "with": violation.partner,
+            }
+            for violation in flight.violations
+        ],
+        "breaches": flight.breaches,
+        "wall_time_s": flight.wall_time_s,
+        "decision_time_s": decision_time_s(flight),
+        "fallbacks": sum(decision.fallback for decision in flight.decisions),
+        "mip_gap_p50": mip_gap_p50(flight),
+        "versions": dict(flight.versions),
+        "seed": flight.seed,
+        "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
+    }

@@ -1,0 +1,80 @@
+"""What a planner is: the protocol, what it may tell about a decision, and its options."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
+
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.world import Command, SwarmState
+
+
+@dataclass(frozen=True)
+class Assistants:
+    """The assistants of the world that fly along, see `World`."""
+
+    return_mode: bool = False
+    safety_filter: bool = False
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a planner may tell about its last decision.
+
+    Attributes:
+        predicted_m: Name of a UAS -> (N+1, 3) [m] positions, n = 0 is now.
+        fallback: Whether the decision was flown on a fallback.
+        mip_gap: Relative to what the plan can influence; None where there is none.
+    """
+
+    predicted_m: Mapping[str, NDArray[np.float64]]
+    fallback: bool = False
+    mip_gap: float | None = None
+
+
+class Planner(Protocol):
+    """Anything that flies a swarm: two methods are all that is needed.
+
+    A rollout reads more where a planner has it:
+        `warm_up(scenario)`: compiles what needs compiling; called once, before `reset`, untimed.
+        `last_decision`: a `Decision` about the last `act`, or None.
+        `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
+        `options`: the pydantic model it was made with; goes into the record.
+
+    A planner that is found by name (entry-point group `uas_coverage.planners`) is a class with an
+    attribute `Options` (see `PlannerOptions`), made as `PlannerClass(options)`.
+    """
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Start a new mission; a planner that draws lots draws them from the seed alone."""
+        ...
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Give each active UAS its command for the coming step."""
+        ...
+
+
+class PlannerError(ValueError):
+    """A planner gave commands that cannot be flown; names planner, time, UAS and value."""
+
+
+class PlannerOptions(StrictModel):
+    """Base of a planner's options: frozen, unknown names are errors, text is read as a number."""
+
+    model_config = ConfigDict(strict=False)
+
+
+class AssistedOptions(PlannerOptions):
+    """Options of a planner that flies with both assistants unless they are taken away."""
+
+    filter: bool = Field(default=True, description="keep commands clear of harm (safety filter)")
+    return_mode: bool = Field(default=True, description="bring each UAS home in time")
+
+    @property
+    def assistants(self) -> Assistants:
+        """The assistants that these options ask for."""
+        return Assistants(return_mode=self.return_mode, safety_filter=self.filter)

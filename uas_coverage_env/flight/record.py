@@ -1,0 +1,166 @@
+"""What is kept of a flight: one frozen record that metrics, pictures and benchmarks read."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD
+
+MODES = ("covering", "transit", "return", "landed", "lost")
+COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))
+
+PLAN_DTYPE = np.dtype(
+    [("step", np.int64), ("uas", np.int64), ("n", np.int64), ("position_m", np.float64, (3,))]
+)
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A contact that cost a UAS: when, which, of what kind, and with whom (None: nobody)."""
+
+    time_s: float
+    uas: str
+    kind: str
+    partner: str | None
+
+
+@dataclass(frozen=True)
+class DecisionRecord:
+    """One decision of the planner: how long it took and how it came about."""
+
+    duration_s: float
+    fallback: bool = False
+    mip_gap: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One mission as it was flown, sample by sample, with all that is needed to repeat it.
+
+    Samples run from t = 0 to the end of the flight (T = steps + 1). Inputs and current of a sample
+    act from its time to the next; after a UAS has landed or is lost its last sample is repeated.
+
+    Attributes:
+        scenario: The scenario flown.
+        planner: Name of the planner.
+        planner_options: Its options as plain data.
+        seed: The seed of the planner.
+        dynamics: `lpv` or `nonlinear`.
+        return_mode: Whether the world brought UAS home in time.
+        safety_filter: Whether the world kept commands clear of harm.
+        ended: `complete` (nobody flies any more), `steps` (limit of steps) or `stopped` (by hand).
+        x: (T, U, 14) states, see `uas_coverage_env.vehicle.layout`.
+        u: (T, U, 5) inputs, zero once landed or lost.
+        voltage_V: (T, U) [V] battery voltage under the current.
+        current_A: (T, U) [A] battery current.
+        mode: (T, U) index into `MODES`.
+        covered: (T,) number of waypoints that the swarm has covered so far.
+        moving_position_m: (T, M, 3) [m] centres of the moving obstacles.
+        plan: PLAN_DTYPE rows of what the planner predicted; empty where it does not predict.
+        decisions: One entry per step.
+        violations: The contacts, in order of time.
+        breaches: Count of samples closer than the safe distances.
+        min_separation_m: Smallest distance between two flying UAS [m]; None: never two.
+        min_obstacle_clearance_m: Smallest clearance from any obstacle [m]; None: no obstacle.
+        wall_time_s: Time the flight took to compute [s], compilation apart.
+        versions: Package -> version.
+    """
+
+    scenario: Scenario
+    planner: str
+    planner_options: Mapping[str, Any]
+    seed: int
+    dynamics: str
+    return_mode: bool
+    safety_filter: bool
+    ended: str
+    x: NDArray[np.float64]
+    u: NDArray[np.float64]
+    voltage_V: NDArray[np.float64]
+    current_A: NDArray[np.float64]
+    mode: NDArray[np.int8]
+    covered: NDArray[np.int64]
+    moving_position_m: NDArray[np.float64]
+    plan: NDArray[np.void]
+    decisions: tuple[DecisionRecord, ...]
+    violations: tuple[Violation, ...]
+    breaches: int
+    min_separation_m: float | None
+    min_obstacle_clearance_m: float | None
+    wall_time_s: float
+    versions: Mapping[str, str]
+
+    def __eq__(self, other: object) -> bool:
+        """Two flights are equal when every field is, arrays to the last bit."""
+        if not isinstance(other, Flight):
+            return NotImplemented
+        return all(
+            _equal(getattr(self, field.name), getattr(other, field.name))
+            for field in dataclasses.fields(self)
+        )
+
+    __hash__ = None  # pyright: ignore[reportAssignmentType]  # arrays cannot be hashed
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the UAS, in the order of the axis U."""
+        return tuple(uas.name for uas in self.scenario.uas)
+
+    @property
+    def steps(self) -> int:
+        """Steps until the last UAS was home, lost, or the flight ended."""
+        return len(self.x) - 1
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """(T,) [s] times of the samples."""
+        return np.arange(len(self.x), dtype=np.float64) * self.scenario.dt_s
+
+    @property
+    def soc(self) -> NDArray[np.float64]:
+        """(T, U) state of charge, 0..1."""
+        return 1.0 - self.x[..., DOD]
+
+    @property
+    def last_sample(self) -> NDArray[np.int64]:
+        """(U,) the sample in which each UAS has landed or is lost, else the last of the flight."""
+        return last_samples(self.mode)
+
+    def save(self, directory: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the flight as a flight directory, see `uas_coverage_env.flight.directory`.
+
+        Raises:
+            InputError: The directory cannot be written, or is not empty and `overwrite` not set.
+        """
+        from uas_coverage_env.flight.directory import write_flight  # it imports Flight
+
+        return write_flight(self, Path(directory), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, directory: str | Path) -> Self:
+        """Read a flight directory back; equal to the flight that was saved.
+
+        Raises:
+            InputError: A file is missing or was damaged.
+        """
+        from uas_coverage_env.flight.directory import read_flight  # it imports Flight
+
+        return cls(**read_flight(Path(directory)))
+
+
+def last_samples(mode: NDArray[np.int8]) -> NDArray[np.int64]:
+    """(U,) the first sample of each column of `mode` (T, U) that is LANDED or LOST, else T - 1."""
+    over = mode >= LANDED
+    return np.where(over.any(axis=0), over.argmax(axis=0), len(mode) - 1)
+
+
+def _equal(mine: Any, theirs: Any) -> bool:
+    if isinstance(mine, np.ndarray):
+        return np.array_equal(mine, theirs)
+    return mine == theirs

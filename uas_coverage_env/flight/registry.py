@@ -1,0 +1,141 @@
+"""Planners by name: whatever announces itself in the entry-point group `uas_coverage.planners`."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from uas_coverage_env.flight.planner import Planner
+from uas_coverage_env.strict_toml import InputError
+
+GROUP = "uas_coverage.planners"
+
+
+@dataclass(frozen=True)
+class OptionDescription:
+    """One option of a planner, as a person reads it."""
+
+    name: str
+    values: str
+    default: str
+    description: str
+
+
+@dataclass(frozen=True)
+class PlannerDescription:
+    """One planner, as a person reads it; `missing` says why it cannot be used here, if so."""
+
+    name: str
+    summary: str
+    options: tuple[OptionDescription, ...] = ()
+    missing: str = ""
+
+
+def planner_names() -> tuple[str, ...]:
+    """The names of all planners that are installed."""
+    return tuple(sorted(_installed()))
+
+
+def load_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner:
+    """Make a planner by name.
+
+    Args:
+        name: One of `planner_names()`.
+        options: Option -> value; text is read as the type of the option.
+
+    Raises:
+        InputError: Unknown name, unknown option, or a value that does not fit; one line.
+    """
+    installed = _installed()
+    if name not in installed:
+        raise InputError(f"unknown planner {name!r}; allowed: {', '.join(planner_names())}")
+    try:
+        planner_class = installed[name].load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"planner {name!r} cannot be loaded: {error}") from error
+    return planner_class(_checked_options(name, planner_class.Options, options or {}))
+
+
+def describe_planners() -> tuple[PlannerDescription, ...]:
+    """All planners with their options, in the order of their names."""
+    return tuple(_description(name, entry) for name, entry in sorted(_installed().items()))
+
+
+def name_of(planner: Planner) -> str:
+    """The name under which the class of a planner is installed, else the name of the class."""
+    for name, entry in _installed().items():
+        # a planner at hand has its module loaded; loading the other planners would be a waste
+        if getattr(sys.modules.get(entry.module), entry.attr, None) is type(planner):
+            return name
+    return type(planner).__name__
+
+
+def options_of(planner: Planner) -> dict[str, Any]:
+    """The options of a planner as plain data; empty where it keeps none."""
+    options = getattr(planner, "options", None)
+    return options.model_dump(mode="json") if isinstance(options, BaseModel) else {}
+
+
+def _installed() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _checked_options(name: str, model: type[BaseModel], given: Mapping[str, Any]) -> BaseModel:
+    allowed = ", ".join(model.model_fields) or "none"
+    for key in given:
+        if key not in model.model_fields:
+            raise InputError(f"planner {name!r} has no option {key!r}; allowed: {allowed}")
+    try:
+        return model.model_validate(dict(given))
+    except ValidationError as error:
+        mistake = error.errors(include_url=False)[0]
+    key = str(mistake["loc"][0]) if mistake["loc"] else ""
+    reason = mistake["msg"].removeprefix("Input ").removeprefix("Value error, ")
+    if key not in model.model_fields:
+        raise InputError(f"planner {name!r}: {reason}")
+    option = _option(key, model.model_fields[key])
+    raise InputError(
+        f"planner {name!r}: option {key} = {given.get(key)!r}: {reason[:1].lower()}{reason[1:]}; "
+        f"allowed: {option.values} (default {option.default})"
+    )
+
+
+def _description(name: str, entry: EntryPoint) -> PlannerDescription:
+    try:
+        planner_class = entry.load()
+    except (ImportError, AttributeError) as error:
+        return PlannerDescription(name, "", missing=" ".join(str(error).split()))
+    summary = (planner_class.__doc__ or "").strip().partition("\n")[0]
+    fields = planner_class.Options.model_fields
+    return PlannerDescription(
+        name, summary, tuple(_option(key, field) for key, field in fields.items())
+    )
+
+
+def _option(name: str, field: FieldInfo) -> OptionDescription:
+    default = field.get_default(call_default_factory=True)
+    return OptionDescription(
+        name, _values(field.annotation), _plain(default), field.description or ""
+    )
+
+
+def _values(annotation: Any) -> str:
+    """The values of a type as a person types them: `true|false`, `lpv|nonlinear`, `float`."""
+    if annotation is bool:
+        return "true|false"
+    if get_origin(annotation) is Literal:
+        return "|".join(_plain(value) for value in get_args(annotation))
+    if get_origin(annotation) in (Union, UnionType):
+        return "|".join(_values(argument) for argument in get_args(annotation))
+    if annotation is type(None):
+        return "none"
+    return getattr(annotation, "__name__", str(annotation))
+
+
+def _plain(value: Any) -> str:
+    return str(value).lower() if value is None or isinstance(value, bool) else str(value)

@@ -1,0 +1,159 @@
+"""Fly one mission: planner and world in turn, sample by sample, until nobody flies any more."""
+
+import contextlib
+import platform
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.flight.log import FlightLog
+from uas_coverage_env.flight.planner import Assistants, Planner, PlannerError
+from uas_coverage_env.flight.record import Flight
+from uas_coverage_env.flight.registry import load_planner, name_of, options_of
+from uas_coverage_env.scenario import Scenario, load_scenario
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.world import Command, Dynamics, SwarmState, Velocity, World, pack
+
+_RECORDED_PACKAGES = ("uas-coverage-env", "numpy", "scipy", "numba", "highspy")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a flight stands: told before the first decision and after every step."""
+
+    swarm: SwarmState
+    max_steps: int
+    covered: int
+    decision_time_s: float | None
+
+
+def rollout(
+    scenario: Scenario | str | Path,
+    planner: Planner | str,
+    seed: int = 0,
+    *,
+    dynamics: Dynamics = "lpv",
+    return_mode: bool | None = None,
+    safety_filter: bool | None = None,
+    max_steps: int | None = None,
+    on_step: Callable[[Progress], object] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Flight:
+    """Fly one mission and keep its record.
+
+    Ctrl-C ends the flight as `should_stop` does: what was flown so far is returned.
+
+    Args:
+        scenario: A scenario, the name of a shipped one, or the path of a scenario file.
+        planner: A planner, or the name of an installed one (flown with its default options).
+        seed: The seed of the planner.
+        dynamics: `lpv` or `nonlinear`.
+        return_mode: Let the world bring UAS home in time; None: as the planner asks.
+        safety_filter: Let the world keep commands clear of harm; None: as the planner asks.
+        max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
+        on_step: Called with a `Progress` once all is compiled and after every step.
+        should_stop: Asked before every decision.
+
+    Raises:
+        InputError: Unknown scenario or planner, or the planner refuses the scenario.
+        ValueError: Unknown dynamics, or a number of steps below one.
+        PlannerError: The planner gave commands that cannot be flown.
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    if isinstance(planner, str):
+        planner = load_planner(planner)
+    if max_steps is not None and max_steps < 1:
+        raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
+    assistants: Assistants = getattr(planner, "assistants", Assistants())
+    if return_mode is None:
+        return_mode = assistants.return_mode
+    if safety_filter is None:
+        safety_filter = assistants.safety_filter
+    world = World(scenario, dynamics=dynamics, return_mode=return_mode, safety_filter=safety_filter)
+    _make_ready(world, planner, scenario, seed)
+
+    limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
+    log = FlightLog(world, scenario)
+    started = time.perf_counter()
+    ended = "stopped"
+    with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid
+        ended = _fly(world, planner, log, limit, on_step, should_stop)
+    return Flight(
+        scenario=scenario,
+        planner=name_of(planner),
+        planner_options=options_of(planner),
+        seed=seed,
+        dynamics=dynamics,
+        return_mode=return_mode,
+        safety_filter=safety_filter,
+        ended=ended,
+        wall_time_s=time.perf_counter() - started,
+        versions=_versions(),
+        **log.series(),
+    )
+
+
+def _make_ready(world: World, planner: Planner, scenario: Scenario, seed: int) -> None:
+    """Compile world and planner, then put both at the start: no decision pays for compilation."""
+    state = world.swarm_state()
+    world.step({name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)})
+    world.reset()
+    warm_up = getattr(planner, "warm_up", None)
+    try:
+        if warm_up is not None:
+            warm_up(scenario)
+        planner.reset(scenario, seed)
+    except ValueError as error:
+        reason = f"planner {name_of(planner)!r} refuses scenario {scenario.name!r}: {error}"
+        raise InputError(reason) from error
+
+
+def _fly(
+    world: World,
+    planner: Planner,
+    log: FlightLog,
+    limit: int,
+    on_step: Callable[[Progress], object] | None,
+    should_stop: Callable[[], bool] | None,
+) -> str:
+    """Fly until the end; returns how it came about, see `Flight.ended`."""
+    swarm = world.swarm_state()
+    if on_step is not None:
+        on_step(Progress(swarm, limit, log.covered, None))
+    while not world.done:
+        if log.steps >= limit:
+            return "steps"
+        if should_stop is not None and should_stop():
+            return "stopped"
+        commands, packed, decision = _decide(planner, swarm)
+        outcome = world.step(packed)
+        log.add(commands, decision, getattr(planner, "last_decision", None), outcome)
+        swarm = world.swarm_state()
+        if on_step is not None:
+            on_step(Progress(swarm, limit, log.covered, decision))
+    return "complete"
+
+
+def _decide(
+    planner: Planner, swarm: SwarmState
+) -> tuple[Mapping[str, Command], NDArray[np.void], float]:
+    """One decision, checked and timed."""
+    started = time.perf_counter()
+    try:
+        commands = planner.act(swarm)
+        duration_s = time.perf_counter() - started
+        return commands, pack(commands, swarm.names, swarm.active, len(swarm.uncovered)), duration_s
+    except ValueError as error:
+        reason = f"planner {name_of(planner)!r} at t = {swarm.time_s:g} s: {error}"
+        raise PlannerError(reason) from error
+
+
+def _versions() -> dict[str, str]:
+    packages = {name: version(name) for name in _RECORDED_PACKAGES}
+    return {**packages, "python": platform.python_version()}

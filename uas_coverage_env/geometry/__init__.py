@@ -1,0 +1,29 @@
+"""Convex hulls, the paper's round shapes, and exact tests of straight segments against them."""
+
+from uas_coverage_env.geometry.polytope import ConvexPolytope
+from uas_coverage_env.geometry.round_shapes import (
+    closed_cylinder_faces,
+    cylinder_faces,
+    faces_for_slack_variables,
+    inner_factor,
+    sphere_faces,
+)
+from uas_coverage_env.geometry.segments import (
+    cylinder_clearance,
+    segment_clearance,
+    segment_meets,
+    signed_distance,
+)
+
+__all__ = [
+    "ConvexPolytope",
+    "closed_cylinder_faces",
+    "cylinder_clearance",
+    "cylinder_faces",
+    "faces_for_slack_variables",
+    "inner_factor",
+    "segment_clearance",
+    "segment_meets",
+    "signed_distance",
+    "sphere_faces",
+]

@@ -1,0 +1,196 @@
+"""Exact distances of points and straight segments from hulls and cylinders, compiled.
+
+A hull is the range [first, last) of rows of `normals` (F, 3) and `offsets_m` (F,), so that all
+hulls of a scenario fit in two arrays. Coordinates are scalars: no array is made in a time step.
+"""
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy")
+def signed_distance(normals, offsets_m, first, last, x, y, z):
+    """D(p): largest face distance of a point (Gasche et al., Sec. III-B.4).
+
+    Args:
+        normals: (F, 3) [-] outward unit normals.
+        offsets_m: (F,) [m].
+        first: First row of the hull.
+        last: Row after its last; greater than `first`.
+        x: North [m].
+        y: East [m].
+        z: Down [m].
+
+    Returns:
+        [m], negative inside.
+    """
+    largest = -math.inf
+    for h in range(first, last):
+        distance = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+        if distance > largest:
+            largest = distance
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
+    """Smallest D(p) on the straight segment from p0 to p1, exact.
+
+    Along the segment each face distance is a straight line, and D is their upper envelope, which
+    is convex: follow it from p0, line by line, until it rises or the segment ends.
+
+    Args:
+        normals: (F, 3) [-] outward unit normals.
+        offsets_m: (F,) [m].
+        first: First row of the hull.
+        last: Row after its last; greater than `first`.
+        x0: Start, north [m].
+        y0: Start, east [m].
+        z0: Start, down [m].
+        x1: End, north [m].
+        y1: End, east [m].
+        z1: End, down [m].
+
+    Returns:
+        [m], negative where the segment enters the hull.
+    """
+    dx = x1 - x0
+    dy = y1 - y0
+    dz = z1 - z0
+    height = -math.inf
+    slope = 0.0
+    for h in range(first, last):
+        a = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offsets_m[h]
+        if a > height:
+            height = a
+            slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+    at = 0.0
+    while slope < 0.0:
+        # of the lines that fall less, the first to cross takes over
+        at = 1.0
+        takes_over = -1
+        for h in range(first, last):
+            s = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+            if s > slope:
+                a = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offsets_m[h]
+                if height - a < at * (s - slope):
+                    at = (height - a) / (s - slope)
+                    takes_over = h
+        if takes_over < 0:
+            break
+        h = takes_over
+        height = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offsets_m[h]
+        slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+    return height + slope * at
+
+
+@njit(cache=True, error_model="numpy")
+def segment_meets(normals, offsets_m, first, last, inflation_m, x0, y0, z0, x1, y1, z1):
+    """Whether the segment enters the inflated hull: segment_clearance < inflation_m.
+
+    Clips the segment to each inflated half-space in turn and stops when nothing is left, which
+    for most obstacles is at once.
+
+    Args:
+        normals: (F, 3) [-] outward unit normals.
+        offsets_m: (F,) [m].
+        first: First row of the hull.
+        last: Row after its last; greater than `first`.
+        inflation_m: Distance that should be kept [m].
+        x0: Start, north [m].
+        y0: Start, east [m].
+        z0: Start, down [m].
+        x1: End, north [m].
+        y1: End, east [m].
+        z1: End, down [m].
+
+    Returns:
+        True where some point of the segment is closer than `inflation_m`.
+    """
+    enters = 0.0
+    leaves = 1.0
+    for h in range(first, last):
+        offset = offsets_m[h] - inflation_m
+        d0 = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offset
+        d1 = normals[h, 0] * x1 + normals[h, 1] * y1 + normals[h, 2] * z1 + offset
+        if d0 >= 0.0:
+            if d1 >= 0.0:
+                return False
+            enters = max(enters, d0 / (d0 - d1))
+        elif d1 >= 0.0:
+            leaves = min(leaves, d0 / (d0 - d1))
+        if enters >= leaves:
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _outside_cylinder(radius_m, half_height_m, x, y, z):
+    return max(math.sqrt(x * x + y * y) - radius_m, abs(z) - half_height_m)
+
+
+@njit(cache=True, error_model="numpy")
+def cylinder_clearance(radius_m, half_height_m, x0, y0, z0, x1, y1, z1):
+    """Smallest distance from a closed upright cylinder about the origin on a segment, exact.
+
+    The distance of a point is max(hypot(x, y) - radius, |z| - half_height): far enough
+    horizontally or vertically. With the positions of two moving bodies relative to each other,
+    this is the clearance between them; with radius and half height zero, the separation of two
+    UAS.
+
+    Both terms are convex along the segment. So the smallest maximum is at an end, at the closest
+    horizontal approach, at equal height, or where the two terms are equal.
+
+    Args:
+        radius_m: Radius [m].
+        half_height_m: Half the height [m].
+        x0: Start relative to the centre, north [m].
+        y0: Start relative to the centre, east [m].
+        z0: Start relative to the centre, down [m].
+        x1: End relative to the centre, north [m].
+        y1: End relative to the centre, east [m].
+        z1: End relative to the centre, down [m].
+
+    Returns:
+        [m], negative inside the cylinder.
+    """
+    dx = x1 - x0
+    dy = y1 - y0
+    dz = z1 - z0
+    smallest = min(
+        _outside_cylinder(radius_m, half_height_m, x0, y0, z0),
+        _outside_cylinder(radius_m, half_height_m, x1, y1, z1),
+    )
+    for candidate in range(6):
+        at = 0.0
+        if candidate == 0:
+            # closest horizontal approach
+            travelled = dx * dx + dy * dy
+            if travelled > 0.0:
+                at = -(x0 * dx + y0 * dy) / travelled
+        elif candidate == 1:
+            # equal height
+            if dz != 0.0:
+                at = -z0 / dz
+        else:
+            # equal terms: x² + y² = (side z + c)² with c = radius - half_height: two roots a side
+            side = 1.0 if candidate < 4 else -1.0
+            level = side * z0 + radius_m - half_height_m
+            rise = side * dz
+            a = dx * dx + dy * dy - rise * rise
+            b = x0 * dx + y0 * dy - level * rise
+            c = x0 * x0 + y0 * y0 - level * level
+            root = math.sqrt(max(b * b - a * c, 0.0))
+            q = -(b + root) if b >= 0.0 else root - b
+            if candidate % 2 == 0:
+                if abs(q) < abs(a):
+                    at = q / a
+            elif abs(c) < abs(q):
+                at = c / q
+        if 0.0 < at < 1.0:
+            distance = _outside_cylinder(
+                radius_m, half_height_m, x0 + at * dx, y0 + at * dy, z0 + at * dz
+            )
+            smallest = min(smallest, distance)
+    return smallest

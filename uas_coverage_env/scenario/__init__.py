@@ -1,0 +1,30 @@
+"""What a mission is: scenarios from files, from code and from a seed, checked at the door."""
+
+from uas_coverage_env.scenario.checks import warnings
+from uas_coverage_env.scenario.generator import generate_scenario
+from uas_coverage_env.scenario.load import load_scenario, scenario_names
+from uas_coverage_env.scenario.model import (
+    Decoration,
+    Geofence,
+    MovingObstacle,
+    Obstacle,
+    Scenario,
+    ScheduledVelocity,
+    Uas,
+    Waypoint,
+)
+
+__all__ = [
+    "Decoration",
+    "Geofence",
+    "MovingObstacle",
+    "Obstacle",
+    "Scenario",
+    "ScheduledVelocity",
+    "Uas",
+    "Waypoint",
+    "generate_scenario",
+    "load_scenario",
+    "scenario_names",
+    "warnings",
+]

@@ -1,0 +1,224 @@
+"""What makes a scenario wrong or doubtful although every single value is allowed."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.vehicle import load_vehicle, vehicle_names
+
+if TYPE_CHECKING:
+    from uas_coverage_env.scenario.model import Geofence, Obstacle, Scenario
+
+
+def first_of(found: Sequence[str]) -> str:
+    """One line for many problems: the first, and how many more there are."""
+    return found[0] + (f" (+{len(found) - 1} more)" if len(found) > 1 else "")
+
+
+def problems(scenario: Scenario) -> list[str]:
+    """Why nobody can fly this scenario; one line each, empty where it is sound.
+
+    Each line names the field, the value and the fix.
+    """
+    found = [*_names_used_twice(scenario), *_vehicles(scenario)]
+    without_volume = list(_bodies_without_volume(scenario))
+    if without_volume:
+        # without hulls nothing can be said about places
+        return [*found, *without_volume]
+    return [
+        *found,
+        *_fence(scenario),
+        *_waypoints(scenario),
+        *_starts_and_fixed_things(scenario),
+        *_starts_and_moving_obstacles(scenario),
+        *_starts_and_each_other(scenario),
+        *_batteries(scenario),
+    ]
+
+
+def warnings(scenario: Scenario) -> list[str]:
+    """What is allowed but probably not meant; one line each."""
+    return [*_waypoints_out_of_reach(scenario), *_mission_too_long(scenario)]
+
+
+def _names_used_twice(scenario: Scenario) -> Iterator[str]:
+    for field in ("obstacles", "moving_obstacles", "uas", "decorations"):
+        seen: set[str] = set()
+        for index, entry in enumerate(getattr(scenario, field)):
+            if entry.name in seen:
+                yield f"{field}[{index}].name: {entry.name!r} is used twice; give each its own"
+            seen.add(entry.name)
+
+
+def _bodies_without_volume(scenario: Scenario) -> Iterator[str]:
+    bodies: list[tuple[str, Geofence | Obstacle]] = [("geofence", scenario.geofence)]
+    bodies += [(f"obstacles[{index}]", body) for index, body in enumerate(scenario.obstacles)]
+    for field, body in bodies:
+        try:
+            _ = body.hull
+        except ValueError as error:
+            yield f"{field}.vertices_m: {error}"
+
+
+def _vehicles(scenario: Scenario) -> Iterator[str]:
+    seen = set(vehicle_names())
+    for index, uas in enumerate(scenario.uas):
+        if uas.vehicle not in seen:
+            seen.add(uas.vehicle)
+            try:
+                load_vehicle(uas.vehicle)
+            except ValueError as error:
+                yield f"uas[{index}].vehicle: {error}"
+
+
+def _fence(scenario: Scenario) -> Iterator[str]:
+    fence, margin_m = scenario.fence, scenario.geofence.margin_m
+    width_m = float((-fence.face_distances(fence.vertices_m)).max(axis=0).min())
+    if width_m <= 2.0 * margin_m:
+        yield (
+            f"geofence.margin_m: {margin_m:g} leaves no room in a fence that is {width_m:.4g} m "
+            f"thin; make the margin smaller or the fence larger"
+        )
+
+
+def _waypoints(scenario: Scenario) -> Iterator[str]:
+    positions = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    outside_m = scenario.fence.signed_distance(positions)
+    for index in np.flatnonzero(outside_m > 0.0):
+        yield (
+            f"waypoints[{index}].position_m: {_point(positions[index])} lies "
+            f"{outside_m[index]:.3g} m outside the geofence; move it inside"
+        )
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        distance_m = hull.signed_distance(positions)
+        for index in np.flatnonzero(distance_m < 0.0):
+            yield (
+                f"waypoints[{index}].position_m: {_point(positions[index])} lies "
+                f"{-distance_m[index]:.3g} m inside obstacle {obstacle.name!r}; move it out"
+            )
+
+
+def _starts_and_fixed_things(scenario: Scenario) -> Iterator[str]:
+    margin_m = scenario.geofence.margin_m
+    for index, uas in enumerate(scenario.uas):
+        start = f"uas[{index}].start_m: {_point(uas.start_m)}"
+        outside_m = float(scenario.fence.signed_distance(uas.start_m))
+        if outside_m > 0.0:
+            yield f"{start} lies {outside_m:.3g} m outside the geofence; move it inside"
+        elif outside_m > -margin_m:
+            yield (
+                f"{start} is {-outside_m:.3g} m from the geofence, within its margin_m "
+                f"{margin_m:g}, where no planner can start; move it further in"
+            )
+        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+            distance_m = float(hull.signed_distance(uas.start_m))
+            named = f"obstacle {obstacle.name!r}"
+            yield from _too_close(start, distance_m, named, uas.radius_m, obstacle.safe_distance_m)
+
+
+def _starts_and_moving_obstacles(scenario: Scenario) -> Iterator[str]:
+    for index, uas in enumerate(scenario.uas):
+        start = f"uas[{index}].start_m: {_point(uas.start_m)}"
+        for obstacle in scenario.moving_obstacles:
+            x, y, z = np.subtract(uas.start_m, obstacle.start_m)
+            distance_m = max(math.hypot(x, y) - obstacle.radius_m, abs(z) - 0.5 * obstacle.height_m)
+            named = f"moving obstacle {obstacle.name!r} at t = 0"
+            yield from _too_close(start, distance_m, named, uas.radius_m, obstacle.safe_distance_m)
+
+
+def _too_close(
+    start: str, distance_m: float, named: str, radius_m: float, safe_distance_m: float
+) -> Iterator[str]:
+    if distance_m < radius_m:
+        yield (
+            f"{start} is {distance_m:.3g} m from {named}, closer than radius_m {radius_m:g}: "
+            f"the UAS would be lost at once; move it away"
+        )
+    elif distance_m < radius_m + safe_distance_m:
+        yield (
+            f"{start} is {distance_m:.3g} m from {named}, closer than radius_m + safe_distance_m "
+            f"= {radius_m + safe_distance_m:g}, where no planner can start; move it away"
+        )
+
+
+def _starts_and_each_other(scenario: Scenario) -> Iterator[str]:
+    for (i, one), (j, other) in itertools.combinations(enumerate(scenario.uas), 2):
+        x, y, z = np.subtract(one.start_m, other.start_m)
+        distance_m = max(math.hypot(x, y), abs(z))
+        kept_m = one.radius_m + other.radius_m + scenario.uas_safe_distance_m
+        if distance_m < kept_m:
+            yield (
+                f"uas[{j}].start_m: {_point(other.start_m)} is {distance_m:.3g} m from the start "
+                f"of {one.name!r} (uas[{i}]), closer than both radii + uas_safe_distance_m = "
+                f"{kept_m:g}; move them apart"
+            )
+
+
+def _batteries(scenario: Scenario) -> Iterator[str]:
+    for index, uas in enumerate(scenario.uas):
+        if 1.0 - uas.soc_0 >= uas.dod_max:
+            yield (
+                f"uas[{index}].soc_0: {uas.soc_0:g} is a depth of discharge of "
+                f"{1.0 - uas.soc_0:.3g}, not below dod_max {uas.dod_max:g}; charge it"
+            )
+
+
+def _waypoints_out_of_reach(scenario: Scenario) -> Iterator[str]:
+    radius_m = min(uas.radius_m for uas in scenario.uas)
+    for index, waypoint in enumerate(scenario.waypoints):
+        points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
+        free = scenario.fence.signed_distance(points) <= -scenario.geofence.margin_m
+        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+            free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m
+        if not free.any():
+            yield (
+                f"waypoints[{index}].position_m: no part of the sphere around "
+                f"{_point(waypoint.position_m)} keeps all safe distances, so no planner will "
+                f"cover it; move it or enlarge radius_m"
+            )
+
+
+def _mission_too_long(scenario: Scenario) -> Iterator[str]:
+    plan = back_and_forth(scenario)
+    if not plan.complete:
+        yield (
+            f"uas: the batteries will hardly finish this mission: flown back and forth it takes "
+            f"about {plan.flight_s.sum():.0f} s in the air, and they hold "
+            f"{plan.air_time_s.sum():.0f} s ({_each(scenario, plan.air_time_s)}); add UAS, "
+            f"charge them or take waypoints away"
+        )
+    if plan.makespan_s > scenario.max_steps * scenario.dt_s:
+        yield (
+            f"max_steps: {scenario.max_steps} steps of {scenario.dt_s:g} s end before a plan "
+            f"that flies back and forth, in about {plan.makespan_s:.0f} s; raise it"
+        )
+
+
+def _each(scenario: Scenario, seconds: NDArray[np.float64]) -> str:
+    named = zip(scenario.uas[:4], seconds, strict=False)
+    more = ", …" if len(seconds) > 4 else ""
+    return ", ".join(f"{uas.name} {time_s:.0f} s" for uas, time_s in named) + more
+
+
+def _point(position_m: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in position_m) + ")"
+
+
+def _ball() -> NDArray[np.float64]:
+    """Points spread over the unit ball: its centre and three shells of 100."""
+    rank = np.arange(0.5, 100.0)
+    z = 1.0 - rank / 50.0
+    turn = math.pi * (1.0 + math.sqrt(5.0)) * rank
+    ring = np.sqrt(1.0 - z**2)
+    shell = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
+    return np.vstack([np.zeros((1, 3)), 0.4 * shell, 0.7 * shell, shell]).astype(np.float64)
+
+
+_BALL = _ball()

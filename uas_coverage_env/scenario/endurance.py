@@ -1,0 +1,211 @@
+"""Do the batteries suffice? A rough plan that anybody could fly: back and forth, row by row.
+
+The plan bounds from above what a mission takes: a sensible planner needs less. Legs that an
+obstacle blocks are flown over the top of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.vehicle import VehicleParams
+
+if TYPE_CHECKING:
+    from uas_coverage_env.scenario.model import Scenario
+
+# Share of the top speed that is left on average by turns, starts and stops.
+_PACE = 0.85
+# Power on the way, relative to hovering: drag at speed, climbs and turns.
+_POWER = 1.11
+# Taking off and landing.
+_AT_HOME_S = 6.0
+
+
+@dataclass(frozen=True)
+class RoughPlan:
+    """What each UAS has to fly when the waypoints are visited back and forth.
+
+    Attributes:
+        flight_s: (U,) time in the air [s].
+        air_time_s: (U,) time in the air that the battery allows [s].
+        complete: Whether every waypoint has been given to a UAS whose battery allows it.
+    """
+
+    flight_s: NDArray[np.float64]
+    air_time_s: NDArray[np.float64]
+    complete: bool
+
+    @property
+    def makespan_s(self) -> float:
+        """When the last UAS is home [s]."""
+        return float(self.flight_s.max())
+
+
+def back_and_forth(scenario: Scenario, spare: float = 0.0) -> RoughPlan:
+    """Visit the waypoints row by row, split into one run per UAS of about equal time.
+
+    Args:
+        scenario: The mission.
+        spare: Share of every battery that the plan must leave [-].
+
+    Returns:
+        The quickest of the plans tried that the batteries allow; where they allow none, the plan
+        of a fleet with endless batteries, marked as not complete.
+    """
+    waypoints = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    starts = np.array([uas.start_m for uas in scenario.uas])
+    air_time_s = np.array(
+        [
+            _air_time_s(vehicle, uas.soc_0, uas.dod_max)
+            for vehicle, uas in zip(scenario.vehicles, scenario.uas, strict=True)
+        ]
+    )
+    legs = _Legs(scenario)
+    limits_s = air_time_s * (1.0 - spare)
+    outward = legs.between(starts[:, None], waypoints[None])
+    runs = [_Runs(legs, waypoints[order], outward.through(order)) for order in _orders(waypoints)]
+    plans = [flight_s for run in runs if (flight_s := run.balanced(limits_s)) is not None]
+    complete = bool(plans)
+    if not complete:
+        endless = np.full(len(starts), math.inf)
+        plans = [flight_s for run in runs if (flight_s := run.balanced(endless)) is not None]
+    return RoughPlan(min(plans, key=lambda flight_s: flight_s.max()), air_time_s, complete)
+
+
+def _air_time_s(vehicle: VehicleParams, soc_0: float, dod_max: float) -> float:
+    """Seconds of flight at the usual pace until the depth of discharge is dod_max."""
+    battery = vehicle.battery
+    dod = np.linspace(1.0 - soc_0, dod_max, 33)
+    voltage_V = float(np.interp(dod, battery.ocv_dod, battery.ocv_V).mean())
+    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
+    power_W = _POWER * vehicle.power.hover_W
+    # U I - R I² = P; a battery too weak for that gives its largest power, at I = U / 2R
+    root = math.sqrt(max(voltage_V**2 - 4.0 * resistance_ohm * power_W, 0.0))
+    current_A = (voltage_V - root) / (2.0 * resistance_ohm)
+    return (dod_max - (1.0 - soc_0)) * battery.capacity_Ah * 3600.0 / current_A
+
+
+class _Legs:
+    """Flight times between points: straight where that is free, else over the obstacles."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        limits = [vehicle.limits for vehicle in scenario.vehicles]
+        self.ground_mps = _PACE * min(limit.v_xy_max_mps for limit in limits)
+        self.climb_mps = min(limit.v_up_max_mps for limit in limits)
+        self.sink_mps = min(limit.v_down_max_mps for limit in limits)
+        radius_m = max(uas.radius_m for uas in scenario.uas)
+        kept_m = [radius_m + obstacle.safe_distance_m for obstacle in scenario.obstacles]
+        corners = [hull.vertices_m for hull in scenario.hulls]
+        self.boxes = [
+            (points.min(axis=0) - kept, points.max(axis=0) + kept)
+            for points, kept in zip(corners, kept_m, strict=True)
+        ]
+
+    def between(self, start_m: NDArray[np.float64], end_m: NDArray[np.float64]) -> _Times:
+        """Flight times from start_m (..., 3) to end_m (..., 3), broadcast together, and back."""
+        way = end_m - start_m
+        start_m = end_m - way
+        top_m = np.full(way.shape[:-1], -np.inf)
+        for low, high in self.boxes:
+            hit = _meets_box(start_m, way, low, high)
+            top_m = np.where(hit, np.maximum(top_m, -low[2]), top_m)
+        ground_s = np.hypot(way[..., 0], way[..., 1]) / self.ground_mps
+        before_m, after_m = top_m + start_m[..., 2], top_m + end_m[..., 2]
+        return _Times(
+            there_s=np.maximum(
+                np.maximum(ground_s, self._vertical_s(-way[..., 2], way[..., 2])),
+                ground_s + self._vertical_s(before_m, after_m),
+            ),
+            back_s=np.maximum(
+                np.maximum(ground_s, self._vertical_s(way[..., 2], -way[..., 2])),
+                ground_s + self._vertical_s(after_m, before_m),
+            ),
+        )
+
+    def _vertical_s(self, climb_m: NDArray, sink_m: NDArray) -> NDArray:
+        return np.maximum(climb_m, 0.0) / self.climb_mps + np.maximum(sink_m, 0.0) / self.sink_mps
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Flight times of legs and of the same legs flown back (..., W) [s]."""
+
+    there_s: NDArray[np.float64]
+    back_s: NDArray[np.float64]
+
+    def through(self, order: NDArray[np.intp]) -> _Times:
+        """The same legs with their last axis in another order."""
+        return _Times(self.there_s[..., order], self.back_s[..., order])
+
+
+def _meets_box(start_m: NDArray, way: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """(...) Whether the segments start_m + [0, 1] way enter an upright box."""
+    enters: NDArray | float = 0.0
+    leaves: NDArray | float = 1.0
+    for axis in range(3):
+        start, step = start_m[..., axis], way[..., axis]
+        # along a wall, a tiny step keeps the quotients finite and their order right
+        per_step = 1.0 / np.where(np.abs(step) < 1e-12, 1e-12, step)
+        one, other = (low[axis] - start) * per_step, (high[axis] - start) * per_step
+        enters = np.maximum(enters, np.minimum(one, other))
+        leaves = np.minimum(leaves, np.maximum(one, other))
+    return np.less(enters, leaves)
+
+
+def _orders(waypoints: NDArray[np.float64]) -> list[NDArray[np.intp]]:
+    """Back and forth along rows to the north and to the east, each from both ends."""
+    orders = []
+    for across, along in ((0, 1), (1, 0)):
+        size = np.ptp(waypoints[:, :2], axis=0) + 1.0
+        n_rows = max(1, round(math.sqrt(len(waypoints) * size[across] / size[along])))
+        share = (waypoints[:, across] - waypoints[:, across].min()) / size[across]
+        row = np.minimum((share * n_rows).astype(int), n_rows - 1)
+        order = np.lexsort([waypoints[:, along] * (1 - 2 * (row % 2)), row])
+        orders += [order, order[::-1]]
+    return orders
+
+
+class _Runs:
+    """An order of waypoints that is cut into one run per UAS."""
+
+    def __init__(self, legs: _Legs, route: NDArray[np.float64], outward: _Times) -> None:
+        between_s = legs.between(route[:-1], route[1:]).there_s
+        self.at_s = np.concatenate([[0.0], np.cumsum(between_s)])
+        self.out_s = outward.there_s + 0.5 * _AT_HOME_S
+        self.home_s = outward.back_s + 0.5 * _AT_HOME_S
+
+    def balanced(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """(U,) flight times with the smallest largest one; None where the limits allow none."""
+        best = self._greedy(limits_s)
+        if best is None:
+            return None
+        low, high = 0.0, float(best.max())
+        while high - low > 1.0:
+            middle = 0.5 * (low + high)
+            found = self._greedy(np.minimum(limits_s, middle))
+            if found is None:
+                low = middle
+            else:
+                best, high = found, middle
+        return best
+
+    def _greedy(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Give each UAS the longest run that its limit allows."""
+        flight_s = np.zeros(len(limits_s))
+        first = 0
+        for uas, limit_s in enumerate(limits_s):
+            if first == len(self.at_s):
+                break
+            run_s = self.at_s[first:] - self.at_s[first] + self.home_s[uas, first:]
+            run_s += self.out_s[uas, first]
+            too_long = run_s > limit_s
+            length = int(np.argmax(too_long)) if too_long.any() else len(run_s)
+            if length:
+                flight_s[uas] = run_s[length - 1]
+                first += length
+        return flight_s if first == len(self.at_s) else None

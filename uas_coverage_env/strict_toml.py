@@ -1,0 +1,240 @@
+"""Strict reading of TOML files: every mistake is one line with file, field, value and fix."""
+
+import datetime
+import difflib
+import json
+import math
+import tomllib
+import types
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Self, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+M = TypeVar("M", bound=BaseModel)
+
+_LONGEST_VALUE = 60
+
+# pydantic speaks of JSON where our readers look at TOML
+_PLAIN = {
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "float_type": "a number",
+}
+
+
+class InputError(ValueError):
+    """A mistake in what a person gave us: one line that names file, field, value and fix."""
+
+
+class StrictModel(BaseModel):
+    """A frozen record whose numbers are finite, whose keys are known, whose types are exact.
+
+    Whole numbers are valid where a float is asked; strings and booleans are not numbers.
+    """
+
+    model_config = ConfigDict(
+        strict=True,
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        validate_default=True,
+    )
+
+    def __getstate__(self) -> dict[Any, Any]:
+        # cached properties can be computed again: they do not travel to worker processes
+        state = super().__getstate__()
+        fields = type(self).model_fields
+        state["__dict__"] = {name: self.__dict__[name] for name in fields}
+        return state
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with some fields changed, checked like a new record (pydantic does not check).
+
+        Args:
+            update: New values by field name.
+            deep: Without meaning here: a frozen record may be shared.
+        """
+        changes = dict(update or {})
+        unknown = sorted(set(changes) - set(type(self).model_fields))
+        if unknown:
+            known = ", ".join(type(self).model_fields)
+            raise ValueError(f"unknown field {unknown[0]!r}; {type(self).__name__} has {known}")
+        return type(self)(
+            **{
+                field.alias or name: changes.get(name, getattr(self, name))
+                for name, field in type(self).model_fields.items()
+            }
+        )
+
+
+def read_toml(path: str | Path, model: type[M], *, context: Any = None) -> M:
+    """Read a TOML file into a pydantic model.
+
+    Args:
+        path: The file.
+        model: The pydantic model; it should forbid unknown keys (see `StrictModel`).
+        context: Handed to the model's validators.
+
+    Raises:
+        InputError: The file is missing, is not TOML, or does not fit the model; one line.
+    """
+    source = str(path)
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        data = tomllib.loads(text)
+    except FileNotFoundError:
+        raise _error(source, "no such file; check the path") from None
+    except IsADirectoryError:
+        raise _error(source, "is a folder; give the path of a TOML file") from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise _error(source, f"cannot be read ({reason}); check the path and its rights") from None
+    except UnicodeDecodeError as error:
+        fix = "save the file as UTF-8 text"
+        raise _error(source, f"byte {error.start} is not UTF-8; {fix}") from None
+    except RecursionError:
+        raise _error(source, "brackets are nested too deeply; flatten the arrays") from None
+    except ValueError as error:
+        raise _error(source, f"is not valid TOML: {error}; correct the syntax there") from None
+    return parse(data, model, source, context=context)
+
+
+def parse(data: Mapping[str, Any], model: type[M], source: str, *, context: Any = None) -> M:
+    """Check data already in memory as strictly as a file.
+
+    Args:
+        data: Nested mappings, sequences and plain values, as a TOML or JSON parser returns them.
+        model: The pydantic model.
+        source: Where the data comes from; the first words of every message.
+        context: Handed to the model's validators.
+
+    Raises:
+        InputError: The data do not fit the model; one line.
+    """
+    try:
+        problems = list(_values_no_field_takes(data, ()))
+        if problems:
+            raise _first_of(problems, source)
+        # JSON, because pydantic's strict mode takes a JSON array for a tuple, but no Python list
+        text = json.dumps(data, default=dict)
+        return model.model_validate_json(text, strict=True, context=context)
+    except RecursionError:
+        raise _error(source, "keys are nested too deeply; flatten the tables") from None
+    except ValidationError as error:
+        mistakes = _without_echoes(error.errors(include_url=False))
+    # an unknown key is usually the misspelling that causes the "missing" ones: it comes first
+    mistakes.sort(key=lambda mistake: mistake["type"] != "extra_forbidden")
+    raise _first_of([_line(mistake, model) for mistake in mistakes], source)
+
+
+def _error(source: str, text: str) -> InputError:
+    return InputError(" ".join(f"{source}: {text}".split()))
+
+
+def _first_of(problems: list[str], source: str) -> InputError:
+    more = f" (+{len(problems) - 1} more)" if len(problems) > 1 else ""
+    return _error(source, problems[0] + more)
+
+
+def _values_no_field_takes(value: Any, location: tuple[str | int, ...]) -> Iterator[str]:
+    """One line for each value that no field of ours can hold: NaN, infinity, dates."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _values_no_field_takes(item, (*location, key))
+    elif isinstance(value, list | tuple):
+        for index, item in enumerate(value):
+            yield from _values_no_field_takes(item, (*location, index))
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield f"{_field(location)}: should be a finite number, not {value}"
+    elif isinstance(value, datetime.date | datetime.time):
+        yield f"{_field(location)}: should not be a date or time ({value}); quote text"
+    elif value is not None and not isinstance(value, str | int | float):
+        yield f"{_field(location)}: should be plain data, not {type(value).__name__}"
+
+
+def _without_echoes(mistakes: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Drop "too few entries" where it only says that an entry of the list was rejected."""
+    mistakes = list(mistakes)
+    locations = [mistake["loc"] for mistake in mistakes]
+    return [
+        mistake
+        for mistake, own in zip(mistakes, locations, strict=True)
+        if mistake["type"] != "too_short"
+        or not any(len(other) > len(own) and other[: len(own)] == own for other in locations)
+    ]
+
+
+def _line(mistake: Mapping[str, Any], model: type[BaseModel]) -> str:
+    location, kind = mistake["loc"], mistake["type"]
+    field = _field(location)
+    if kind == "extra_forbidden":
+        return f"{field}: unknown key; {_instead(location, model)}"
+    if kind == "missing":
+        return f"{field}: is missing; add it"
+    if kind == "too_short":
+        least, given = (mistake["ctx"][key] for key in ("min_length", "actual_length"))
+        return f"{field}: needs at least {least} of them, not {given}; add what is missing"
+    if kind == "too_long":
+        most, given = (mistake["ctx"][key] for key in ("max_length", "actual_length"))
+        return f"{field}: takes at most {most} of them, not {given}; take some away"
+    message = mistake["msg"]
+    if kind in ("value_error", "assertion_error"):
+        # our own validators name value and fix themselves
+        message = message.partition(", ")[2]
+        return f"{field}: {message}" if field else message
+    message = message.removeprefix("Input ")
+    message = message[:1].lower() + message[1:]
+    if kind in _PLAIN:
+        message = f"should be {_PLAIN[kind]}"
+    message += f", not {_shown(mistake['input'])}"
+    return f"{field}: {message}" if field else message
+
+
+def _field(location: Iterable[str | int]) -> str:
+    """`("waypoints", 12, "position_m")` as `waypoints[12].position_m`."""
+    parts = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in location]
+    return "".join(parts).removeprefix(".")
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
+
+
+def _instead(location: tuple[str | int, ...], model: type[BaseModel]) -> str:
+    """What to write in place of the unknown key at this location."""
+    keys = _keys_at(location[:-1], model)
+    close = difflib.get_close_matches(str(location[-1]), keys, n=1)
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"allowed here: {', '.join(keys)}" if keys else "remove it"
+
+
+def _keys_at(location: tuple[str | int, ...], model: type[BaseModel]) -> list[str]:
+    current: type[BaseModel] | None = model
+    for part in location:
+        if isinstance(part, int) or current is None:
+            continue
+        fields = {field.alias or name: field for name, field in current.model_fields.items()}
+        current = _model_in(fields[part].annotation) if part in fields else None
+    if current is None:
+        return []
+    return [field.alias or name for name, field in current.model_fields.items()]
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model inside `Model`, `tuple[Model, ...]`, `Model | None`, `dict[str, Model]`."""
+    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
+        return annotation if issubclass(annotation, BaseModel) else None
+    if get_origin(annotation) in (Union, types.UnionType, tuple, list, dict):
+        found = (_model_in(argument) for argument in get_args(annotation))
+        return next((inner for inner in found if inner is not None), None)
+    return None

@@ -1,0 +1,191 @@
+"""A vehicle as one structured record, the form in which the compiled kernels take it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.geometry import cylinder_faces
+from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
+from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.layout import LIFT, VZ, Z
+from uas_coverage_env.vehicle.linear import rigid_body, taylor
+from uas_coverage_env.vehicle.params import VehicleParams
+
+MAX_SEGMENTS = 8
+MAX_GOVERNOR_ROWS = 128
+PHYSICAL_SIDES = 8
+"""H_P, the sides of the polygons that stand for norms in the thrust correction."""
+
+_DT_MIN_S = 0.1  # so that MAX_GOVERNOR_ROWS suffice
+
+_f8, _i8 = "f8", "i8"
+VEHICLE_DTYPE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("dt_s", _f8),
+                # one-step map of the axes; a horizontal axis is position, velocity, tilt, rate
+                # with the angular acceleration as input, tilt positive forward
+                ("axis_A", _f8, (4, 4)),
+                ("axis_B", _f8, (4,)),
+                ("vertical_A", _f8, (2, 2)),
+                ("vertical_B", _f8, (2,)),
+                ("yaw_B", _f8, (2,)),
+                ("inertia_kgm2", _f8, (3,)),
+                ("mass_kg", _f8),
+                ("weight_N", _f8),
+                # battery: a row per segment of the discharge curve
+                ("n_segments", _i8),
+                ("dod_end", _f8, (MAX_SEGMENTS,)),
+                ("ocv_V", _f8, (MAX_SEGMENTS,)),
+                ("ocv_slope_V", _f8, (MAX_SEGMENTS,)),
+                ("current_A", _f8, (MAX_SEGMENTS,)),
+                ("current_A_per_V", _f8, (MAX_SEGMENTS,)),
+                ("current_A_per_N", _f8, (MAX_SEGMENTS,)),
+                ("drop_V", _f8, (MAX_SEGMENTS,)),
+                ("capacity_As", _f8),
+                ("resistance_0_ohm", _f8),
+                ("resistance_th_ohm", _f8),
+                ("time_constant_th_s", _f8),
+                ("polarisation_decay", _f8),
+                # thrust correction
+                ("faces", _f8, (PHYSICAL_SIDES, 2)),
+                ("speed_N_per_mps", _f8),
+                ("climb_N_per_mps", _f8),
+                ("descent_N_per_mps", _f8),
+                ("tilt_N_per_rad", _f8),
+                ("trim_rad_per_mps", _f8),
+                # limits
+                ("v_xy_max_mps", _f8),
+                ("v_up_max_mps", _f8),
+                ("v_down_max_mps", _f8),
+                ("tilt_max_rad", _f8),
+                ("rate_max_radps", _f8),
+                ("lift_min_N", _f8),
+                ("lift_max_N", _f8),
+                ("delta_thrust_min_N", _f8),
+                ("torque_max_Nm", _f8, (3,)),
+                ("alpha_xy_max_radps2", _f8),
+                ("alpha_z_max_radps2", _f8),
+                ("yaw_rate_max_radps", _f8),
+                # velocity loop
+                ("reference_max_mps", _f8),
+                ("gain", _f8, (3,)),
+                ("n_governor_rows", _i8),
+                ("governor_rows", _f8, (MAX_GOVERNOR_ROWS, 5)),
+                # nonlinear plant
+                ("n_motors", _i8),
+                ("drag_kgps", _f8),
+                ("drag_vertical_kgps", _f8),
+                ("gravity_mps2", _f8),
+                ("arm_m", _f8),
+                ("first_arm_angle_rad", _f8),
+                ("thrust_N_per_radps2", _f8),
+                ("torque_Nm_per_radps2", _f8),
+                ("propeller_radius_m", _f8),
+                ("induced_power_factor", _f8),
+                ("profile_power_advance_factor", _f8),
+                ("air_density_kgpm3", _f8),
+                ("motor_speed_max_radps", _f8),
+                ("back_emf_Vs_per_rad", _f8),
+                ("motor_resistance_ohm", _f8),
+                ("no_load_current_A", _f8),
+                ("esc_loss_W", _f8),
+                ("esc_efficiency", _f8),
+                ("auxiliary_W", _f8),
+                ("hover_W", _f8),
+            ],
+            align=True,
+        ),
+    )
+)
+"""A vehicle at one sampling time."""
+
+
+def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
+    """The record of a vehicle for the kernels.
+
+    Args:
+        vehicle: parameters.
+        dt_s: [s] sampling time in [0.1, 2].
+
+    Returns:
+        Array of shape () and type VEHICLE_DTYPE; kernels take its element, `record[()]`.
+
+    Raises:
+        ValueError: dt_s out of range, or limits that no inner loop can keep.
+    """
+    check_step(dt_s)
+    if dt_s < _DT_MIN_S:
+        raise ValueError(f"dt_s is {dt_s}; the vehicle's inner loop needs {_DT_MIN_S} s at least")
+    record = np.zeros(1, VEHICLE_DTYPE)
+    body, battery, limits = vehicle.airframe, vehicle.battery, vehicle.limits
+    A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
+    record["dt_s"] = dt_s
+    record["axis_A"], record["axis_B"] = horizontal_axis(vehicle, dt_s)
+    record["vertical_A"] = A[np.ix_([Z, VZ], [Z, VZ])]
+    record["vertical_B"] = B[[Z, VZ], LIFT]
+    record["yaw_B"] = 0.5 * dt_s * dt_s, dt_s
+    record["mass_kg"], record["weight_N"] = body.mass_kg, vehicle.weight_N
+    record["inertia_kgm2"] = body.inertia_kgm2
+    segments = battery_segments(vehicle)
+    record["n_segments"] = len(segments)
+    for row, segment in enumerate(segments):
+        for name, value in segment._asdict().items():
+            record[name][0, row] = value
+    record["capacity_As"] = 3600.0 * battery.capacity_Ah
+    for name in ("resistance_0_ohm", "resistance_th_ohm", "time_constant_th_s"):
+        record[name] = getattr(battery, name)
+    record["polarisation_decay"] = polarisation_decay(vehicle, dt_s)
+    record["faces"] = cylinder_faces(PHYSICAL_SIDES)[:, :2]
+    for name, value in vehicle.thrust_correction:
+        record[name] = value
+    record["trim_rad_per_mps"] = vehicle.trim_tilt_rad_per_mps
+    for name in (
+        "v_xy_max_mps",
+        "v_up_max_mps",
+        "v_down_max_mps",
+        "tilt_max_rad",
+        "rate_max_radps",
+        "lift_min_N",
+        "lift_max_N",
+        "delta_thrust_min_N",
+    ):
+        record[name] = getattr(limits, name)
+    record["torque_max_Nm"] = vehicle.torque_max_Nm
+    record["alpha_xy_max_radps2"] = limits.angular_acceleration_xy_max_radps2
+    record["alpha_z_max_radps2"] = limits.angular_acceleration_z_max_radps2
+    record["yaw_rate_max_radps"] = limits.yaw_rate_max_radps
+    gain, rows, record["reference_max_mps"] = design_velocity_loop(vehicle, float(dt_s))
+    if len(rows) > MAX_GOVERNOR_ROWS:
+        raise ValueError(f"dt_s is {dt_s}; too short for the limits of {vehicle.name!r}")
+    record["gain"] = gain
+    record["n_governor_rows"] = len(rows)
+    record["governor_rows"][0, : len(rows)] = rows
+    for name in (
+        "n_motors",
+        "drag_kgps",
+        "drag_vertical_kgps",
+        "gravity_mps2",
+        "arm_m",
+        "first_arm_angle_rad",
+    ):
+        record[name] = getattr(body, name)
+    rotor, motor = vehicle.rotor, vehicle.motor
+    for name in (
+        "thrust_N_per_radps2",
+        "torque_Nm_per_radps2",
+        "propeller_radius_m",
+        "induced_power_factor",
+        "profile_power_advance_factor",
+        "air_density_kgpm3",
+    ):
+        record[name] = getattr(rotor, name)
+    record["motor_speed_max_radps"] = rotor.speed_max_radps
+    record["back_emf_Vs_per_rad"] = motor.back_emf_Vs_per_rad
+    record["motor_resistance_ohm"] = motor.resistance_ohm
+    record["no_load_current_A"] = motor.no_load_current_A
+    record["esc_loss_W"] = vehicle.esc.constant_loss_W
+    record["esc_efficiency"] = vehicle.esc.efficiency
+    record["auxiliary_W"], record["hover_W"] = vehicle.power.auxiliary_W, vehicle.power.hover_W
+    return record.reshape(())

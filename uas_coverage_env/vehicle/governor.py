@@ -1,0 +1,140 @@
+"""Design of the velocity loop: feedback gain, and the rows by which the governor keeps bounds.
+
+Everything here happens once, when a vehicle is compiled. A horizontal axis is velocity, tilt and
+rate with the angular acceleration as input; both axes are the same, so a linear combination of
+quantities that each keep a Euclidean bound over both axes keeps the combined bound, too. That is
+why the tests below, which look at one axis, certify norms over two.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
+from scipy.optimize import linprog
+
+from uas_coverage_env.vehicle.layout import TAU_Y, THETA, VX, WY, X
+from uas_coverage_env.vehicle.linear import rigid_body, taylor
+from uas_coverage_env.vehicle.params import VehicleParams
+
+FloatArray = NDArray[np.float64]
+
+ORDER = 4
+"""N_dis of the compiled vehicle."""
+
+_TORQUE_COST = 30.0  # settles 12 m/s in about 7 s, near the time optimum
+_REFERENCE_SHARE = 0.999  # of the speed limit: a bound that is only approached is certified
+_SETTLED_S = 10.0
+_LONGEST_S = 60.0
+_IMPLIED = 1.0 - 1e-6  # the linear programs are exact to 1e-7
+
+
+class VelocityLoop(NamedTuple):
+    """Angular acceleration = -gain · (v - r, tilt - trim r, rate) for a governed reference r.
+
+    A row (a_v, a_tilt, a_rate, b, bound) says that a · (v, tilt, rate) + b r, a quantity of one of
+    the coming steps while r is held, stays within its bound.
+    """
+
+    gain: FloatArray
+    """(3,)"""
+    rows: FloatArray
+    """(R, 5)"""
+    reference_max_mps: float
+
+
+def horizontal_axis(vehicle: VehicleParams, dt_s: float) -> tuple[FloatArray, FloatArray]:
+    """One-step map A (4, 4), B (4,) of position, velocity, tilt and rate along one axis.
+
+    The input is the angular acceleration [rad/s²]; tilt and rate are positive where they push
+    along the axis: pitch and its rate negated for north, roll and its rate for east.
+    """
+    A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
+    chain = [X, VX, THETA, WY]
+    forward = np.array([1.0, 1.0, -1.0, -1.0])
+    axis_A = A[np.ix_(chain, chain)] * np.outer(forward, forward)
+    return axis_A, -B[chain, TAU_Y] * forward * vehicle.airframe.inertia_kgm2[1]
+
+
+@lru_cache(maxsize=64)
+def design_velocity_loop(vehicle: VehicleParams, dt_s: float) -> VelocityLoop:
+    """Feedback gain and governor rows of a vehicle.
+
+    The predicted quantities of the first ten seconds are taken, more where that is not enough for
+    the quantities of the step after to be implied. Then the set of states and references that keep
+    all rows is invariant while the reference is held, and the bounds hold for ever. Rows implied
+    by the others are dropped.
+
+    Raises:
+        ValueError: no such horizon: the limits contradict each other.
+    """
+    axis_A, axis_B = horizontal_axis(vehicle, dt_s)
+    A, B = axis_A[1:, 1:], axis_B[1:, None]
+    P = solve_discrete_are(A, B, np.diag([1.0, 0.0, 0.0]), np.array([[_TORQUE_COST]]))
+    gain = np.linalg.solve(_TORQUE_COST + B.T @ P @ B, B.T @ P @ A)[0]
+    reference_max_mps = _REFERENCE_SHARE * vehicle.limits.v_xy_max_mps
+    held = np.array([0.0, 0.0, 0.0, 1.0, reference_max_mps])
+    steps = int(np.ceil(_SETTLED_S / dt_s))
+    while True:
+        rows, following = _predicted(vehicle, A - B @ gain[None], gain, steps)
+        known = np.vstack([rows, held])
+        if all(_is_implied(row, known) for row in following):
+            break
+        steps += max(steps // 4, 1)
+        if steps * dt_s > _LONGEST_S:
+            raise ValueError(
+                f"limits of {vehicle.name!r} cannot be kept at dt_s {dt_s}; "
+                "raise limits.tilt_max_rad or lower limits.v_xy_max_mps"
+            )
+    return VelocityLoop(gain, _without_implied(rows, held), reference_max_mps)
+
+
+def _predicted(
+    vehicle: VehicleParams, closed: FloatArray, gain: FloatArray, steps: int
+) -> tuple[FloatArray, FloatArray]:
+    """Rows of the coming steps, and the rows of the step after them."""
+    trim, limits = vehicle.trim_tilt_rad_per_mps, vehicle.limits
+    at_rest = np.array([1.0, trim, 0.0])
+    rate, tilt, velocity = np.eye(3)[::-1]
+    # the torques act in the present step, everything else can be changed in the next at the soonest
+    quantities = (
+        (-gain, 0.0, limits.angular_acceleration_xy_max_radps2, 0),
+        (rate, 0.0, limits.rate_max_radps, 1),
+        (tilt, trim, limits.tilt_max_rad, 1),
+        (velocity, 1.0, limits.v_xy_max_mps, 1),
+    )
+    rows: list[list[float]] = []
+    last: list[list[float]] = []
+    power = np.eye(3)
+    for step in range(steps + 1):
+        for pick, settled, bound, first in quantities:
+            if step >= first:
+                row = pick @ power
+                entry = [*row, settled - row @ at_rest, bound]
+                (rows if step < steps else last).append(entry)
+        power = closed @ power
+    return np.array(rows), np.array(last)
+
+
+def _is_implied(row: FloatArray, known: FloatArray) -> bool:
+    """Whether the known rows alone keep |a · s + b r| within its bound, by a linear program."""
+    scaled = known[:, :4] / known[:, 4:]
+    result = linprog(
+        -row[:4] / row[4],
+        A_ub=np.vstack([scaled, -scaled]),
+        b_ub=np.ones(2 * len(scaled)),
+        bounds=(None, None),
+        method="highs",
+    )
+    return result.status == 0 and -result.fun <= _IMPLIED
+
+
+def _without_implied(rows: FloatArray, held: FloatArray) -> FloatArray:
+    """The rows less those that the others imply; late steps go first."""
+    kept = list(range(len(rows)))
+    for index in reversed(range(len(rows))):
+        others = [k for k in kept if k != index]
+        if _is_implied(rows[index], np.vstack([rows[others], held])):
+            kept = others
+    return rows[kept]

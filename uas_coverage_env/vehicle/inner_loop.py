@@ -1,0 +1,206 @@
+"""The vehicle's inner loop: commanded velocities and accelerations into wrenches, compiled.
+
+Horizontally a linear feedback tracks a velocity reference, and a scalar reference governor moves
+the reference towards the command only as far as every bound (angular acceleration, rate, tilt,
+speed, each a norm over both axes) is predicted to hold. Keeping the reference is always
+admissible, because the tail of the last prediction was (see `governor`): no bound is ever
+exceeded, and no program has to be solved.
+
+The reference (2,) [m/s] is memory of the loop, kept by the caller: zero at the start of a flight.
+After wrenches that the loop did not make, `reseed_reference` lets it take over.
+"""
+
+import math
+
+from numba import njit
+
+from uas_coverage_env.vehicle.layout import (
+    LIFT,
+    PHI,
+    PSI,
+    TAU_X,
+    TAU_Y,
+    TAU_Z,
+    THETA,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    WZ,
+    Z,
+)
+
+_TINY = 1e-12
+
+
+@njit(cache=True, error_model="numpy")
+def reseed_reference(x, reference):
+    """Let the loop take over from the velocity reached.
+
+    Args:
+        x: (14,) state.
+        reference: (2,) [m/s] written.
+    """
+    reference[0] = x[VX]
+    reference[1] = x[VY]
+
+
+@njit(cache=True, error_model="numpy")
+def _within_limit(vehicle, speed_mps):
+    """By what to scale a velocity of a speed so that it is a valid reference."""
+    return min(1.0, vehicle.reference_max_mps / max(speed_mps, _TINY))
+
+
+@njit(cache=True, error_model="numpy")
+def _govern(vehicle, x, reference, north_mps, east_mps):
+    """Move the reference towards a velocity as far as all bounds are predicted to hold."""
+    share = _within_limit(vehicle, math.hypot(reference[0], reference[1]))
+    reference[0] *= share
+    reference[1] *= share
+    share = _within_limit(vehicle, math.hypot(north_mps, east_mps))
+    dn = share * north_mps - reference[0]
+    de = share * east_mps - reference[1]
+    if abs(dn) + abs(de) < _TINY:
+        return
+    share = 1.0
+    for q in range(vehicle.n_governor_rows):
+        row = vehicle.governor_rows[q]
+        # tilt and rate forward along north are negative pitch and pitch rate
+        n0 = row[0] * x[VX] - row[1] * x[THETA] - row[2] * x[WY] + row[3] * reference[0]
+        e0 = row[0] * x[VY] + row[1] * x[PHI] + row[2] * x[WX] + row[3] * reference[1]
+        n1 = row[3] * dn
+        e1 = row[3] * de
+        bound = row[4] * row[4]
+        n = n0 + share * n1
+        e = e0 + share * e1
+        if n * n + e * e > bound:
+            a = n1 * n1 + e1 * e1
+            b = n0 * n1 + e0 * e1
+            # At an active bound c is zero but for rounding. The root has to be taken in any case:
+            # to let c = +1e-16 pass as "no root" is how a bound breaks. Beyond a bound (a wrench
+            # of the player's own led there) the same root moves on only if that leads back.
+            c = min(n0 * n0 + e0 * e0 - bound, 0.0)
+            if a < _TINY:
+                return
+            share = min(share, (-b + math.sqrt(max(b * b - a * c, 0.0))) / a)
+            if share <= 0.0:
+                return
+    reference[0] += share * dn
+    reference[1] += share * de
+
+
+@njit(cache=True, error_model="numpy")
+def _track(vehicle, x, reference, u):
+    """Roll and pitch torques that track the reference."""
+    k = vehicle.gain
+    trim = vehicle.trim_rad_per_mps
+    north = -k[0] * (x[VX] - reference[0]) - k[1] * (-x[THETA] - trim * reference[0])
+    north += k[2] * x[WY]
+    east = -k[0] * (x[VY] - reference[1]) - k[1] * (x[PHI] - trim * reference[1])
+    east -= k[2] * x[WX]
+    # never active on a governed flight: it is for states that a player's wrench led to
+    alpha = math.hypot(north, east)
+    share = min(1.0, vehicle.alpha_xy_max_radps2 / max(alpha, _TINY))
+    u[TAU_X] = vehicle.inertia_kgm2[0] * share * east
+    u[TAU_Y] = -vehicle.inertia_kgm2[1] * share * north
+
+
+@njit(cache=True, error_model="numpy")
+def _speed_towards(distance, speed, per_speed, per_next_speed, brake):
+    """Fastest next speed towards a point from which a stop at the point is still possible.
+
+    A step leads per_speed · v + per_next_speed · v⁺ ahead. Braking by `brake` per step from v⁺
+    takes n steps, the last one a partial one. The way to stop is the largest of straight lines,
+    one for each n, so the speed is the smallest of their solutions.
+
+    Args:
+        distance: to the point, not negative.
+        speed: present speed towards it.
+        per_speed: [s].
+        per_next_speed: [s].
+        brake: how much one step can reduce the speed.
+
+    Returns:
+        The next speed, negative where the point is overshot.
+    """
+    both = per_speed + per_next_speed
+    left = (distance - per_speed * speed) / both
+    n = 1.0
+    if left > 0.0:
+        n = max(math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * left / brake) - 1.0)), 1.0)
+    return left / n + 0.5 * brake * (n - 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _hold_heading(vehicle, x, u):
+    """Yaw torque that brings the heading to 0, at which the model is linearised, and keeps it."""
+    dt = vehicle.dt_s
+    towards = -1.0 if x[PSI] > 0.0 else 1.0
+    brake = vehicle.alpha_z_max_radps2 * dt
+    rate = _speed_towards(abs(x[PSI]), towards * x[WZ], 0.5 * dt, 0.5 * dt, brake)
+    rate = min(max(rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
+    alpha = (towards * rate - x[WZ]) / dt
+    alpha = min(max(alpha, -vehicle.alpha_z_max_radps2), vehicle.alpha_z_max_radps2)
+    u[TAU_Z] = vehicle.inertia_kgm2[2] * alpha
+
+
+@njit(cache=True, error_model="numpy")
+def _lift_towards(vehicle, x, down_mps, u):
+    """Lift that reaches a vertical speed in one step, or as nearly as its limits allow."""
+    down = min(max(down_mps, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
+    needed = (down - vehicle.vertical_A[1, 1] * x[VZ]) / vehicle.vertical_B[1]
+    u[LIFT] = min(max(needed, vehicle.lift_min_N), vehicle.lift_max_N)
+
+
+@njit(cache=True, error_model="numpy")
+def velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down_mps, u):
+    """Wrench for a horizontal velocity and a vertical speed; the heading is brought to 0.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state.
+        reference: (2,) [m/s] governed velocity reference, updated; zero at the start of a flight.
+        north_mps: [m/s]; a horizontal velocity beyond 0.999 of the limit is scaled to that.
+        east_mps: [m/s].
+        down_mps: [m/s] positive down, kept within its limits.
+        u: (5,) lift and torques are written.
+    """
+    _govern(vehicle, x, reference, north_mps, east_mps)
+    _track(vehicle, x, reference, u)
+    _hold_heading(vehicle, x, u)
+    _lift_towards(vehicle, x, down_mps, u)
+
+
+@njit(cache=True, error_model="numpy")
+def velocity_wrench(vehicle, x, reference, north_mps, east_mps, altitude_m, u):
+    """Wrench for a horizontal velocity and an altitude to hold, positive up.
+
+    The altitude is approached as fast as the limits allow and is not overshot where a stop at it
+    is possible. Arguments as for `velocity_climb_wrench`.
+    """
+    per_next_speed = vehicle.vertical_B[0] / vehicle.vertical_B[1]
+    per_speed = vehicle.vertical_A[0, 1] - per_next_speed * vehicle.vertical_A[1, 1]
+    way = -altitude_m - x[Z]
+    if way > 0.0:
+        brake = -vehicle.vertical_B[1] * vehicle.lift_max_N
+        down = _speed_towards(way, x[VZ], per_speed, per_next_speed, brake)
+    else:
+        brake = vehicle.vertical_B[1] * vehicle.lift_min_N
+        down = -_speed_towards(-way, -x[VZ], per_speed, per_next_speed, brake)
+    velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down, u)
+
+
+@njit(cache=True, error_model="numpy")
+def acceleration_wrench(vehicle, x, reference, north_mps2, east_mps2, down_mps2, u):
+    """Wrench for an acceleration held over the step, within the limits of speed.
+
+    Horizontally the acceleration moves the governed reference, so that its bounds stay certified;
+    vertically it is lift, -m times the acceleration. Arguments as for `velocity_climb_wrench`.
+    """
+    dt = vehicle.dt_s
+    north = reference[0] + dt * north_mps2
+    east = reference[1] + dt * east_mps2
+    push = -vehicle.vertical_B[1] * vehicle.mass_kg
+    down = vehicle.vertical_A[1, 1] * x[VZ] + push * down_mps2
+    velocity_climb_wrench(vehicle, x, reference, north, east, down, u)

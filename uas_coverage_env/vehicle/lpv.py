@@ -1,0 +1,128 @@
+"""One step of the LPV model, compiled: rigid body, thrust correction, battery."""
+
+from numba import njit
+
+from uas_coverage_env.vehicle.layout import (
+    DELTA_THRUST,
+    DOD,
+    LIFT,
+    N_STATES,
+    PHI,
+    PSI,
+    TAU_X,
+    TAU_Y,
+    TAU_Z,
+    THETA,
+    U_TH,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    WZ,
+    X,
+    Y,
+    Z,
+)
+
+
+@njit(cache=True, error_model="numpy")
+def delta_thrust(vehicle, x, lift_N):
+    """Thrust correction dT = f_T(L, Psi, v) in the piecewise-linear form of the plan [N].
+
+    dT = L + climb or descent + k_v |v_xy| + k_q |tilt beyond trim|, the norms as H_P-sided
+    polygons; never below the vehicle's lower bound.
+    """
+    k = vehicle.trim_rad_per_mps
+    roll, pitch = x[PHI] - k * x[VY], x[THETA] + k * x[VX]
+    speed, tilt = 0.0, 0.0
+    for h in range(vehicle.faces.shape[0]):
+        a, b = vehicle.faces[h, 0], vehicle.faces[h, 1]
+        speed = max(speed, a * x[VX] + b * x[VY])
+        tilt = max(tilt, a * roll + b * pitch)
+    up = -x[VZ]
+    vertical = max(vehicle.climb_N_per_mps * up, vehicle.descent_N_per_mps * up)
+    total = lift_N + vertical + vehicle.speed_N_per_mps * speed + vehicle.tilt_N_per_rad * tilt
+    return max(total, vehicle.delta_thrust_min_N)
+
+
+@njit(cache=True, error_model="numpy")
+def _segment(vehicle, dod):
+    for j in range(vehicle.n_segments - 1):
+        if dod < vehicle.dod_end[j]:
+            return j
+    return vehicle.n_segments - 1
+
+
+@njit(cache=True, error_model="numpy")
+def open_circuit_V(vehicle, dod):
+    """Open-circuit voltage at a depth of discharge [V]."""
+    j = _segment(vehicle, dod)
+    return vehicle.ocv_V[j] - vehicle.ocv_slope_V[j] * dod
+
+
+@njit(cache=True, error_model="numpy")
+def lpv_step(vehicle, x, u, x_next):
+    """x_next = A(DoD) x + B(DoD) u + E(DoD); writes u[DELTA_THRUST].
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state.
+        u: (5,) lift and torques held over the step; dT is computed.
+        x_next: (14,) written; may be x itself.
+
+    Returns:
+        voltage_V and current_A at x, under u.
+    """
+    u[DELTA_THRUST] = delta_thrust(vehicle, x, u[LIFT])
+    j = _segment(vehicle, x[DOD])
+    drop = vehicle.ocv_slope_V[j] * x[DOD] + x[U_TH] - vehicle.drop_V[j]
+    current = vehicle.current_A[j] + vehicle.current_A_per_V[j] * drop
+    current += vehicle.current_A_per_N[j] * u[DELTA_THRUST]
+    open_circuit = vehicle.ocv_V[j] - vehicle.ocv_slope_V[j] * x[DOD]
+    voltage = open_circuit - x[U_TH] - vehicle.resistance_0_ohm * current
+    decay = vehicle.polarisation_decay
+    dod = x[DOD] + current * vehicle.dt_s / vehicle.capacity_As
+    u_th = decay * x[U_TH] + (1.0 - decay) * vehicle.resistance_th_ohm * current
+    for state in range(N_STATES):
+        x_next[state] = x[state]
+    fly_kinematics(vehicle, x_next, u)
+    x_next[DOD] = dod
+    x_next[U_TH] = u_th
+    return voltage, current
+
+
+@njit(cache=True, error_model="numpy")
+def fly_kinematics(vehicle, x, u):
+    """The twelve states of the rigid body one step on, in place; the battery is left alone."""
+    inertia = vehicle.inertia_kgm2
+    _axis_step(vehicle, x, X, VX, THETA, WY, -1.0, u[TAU_Y] / inertia[1])
+    _axis_step(vehicle, x, Y, VY, PHI, WX, 1.0, u[TAU_X] / inertia[0])
+    A, B = vehicle.vertical_A, vehicle.vertical_B
+    z, vz = x[Z], x[VZ]
+    x[Z] = A[0, 0] * z + A[0, 1] * vz + B[0] * u[LIFT]
+    x[VZ] = A[1, 1] * vz + B[1] * u[LIFT]
+    alpha = u[TAU_Z] / inertia[2]
+    x[PSI] += vehicle.dt_s * x[WZ] + vehicle.yaw_B[0] * alpha
+    x[WZ] += vehicle.yaw_B[1] * alpha
+
+
+@njit(cache=True, error_model="numpy")
+def _axis_step(vehicle, x, position, velocity, angle, rate, sign, angular_acceleration):
+    """One horizontal axis; `sign` turns the Euler angle into a tilt forward along the axis."""
+    A, B = vehicle.axis_A, vehicle.axis_B
+    v, tilt, w = x[velocity], sign * x[angle], sign * x[rate]
+    alpha = sign * angular_acceleration
+    x[position] += A[0, 1] * v + A[0, 2] * tilt + A[0, 3] * w + B[0] * alpha
+    x[velocity] = A[1, 1] * v + A[1, 2] * tilt + A[1, 3] * w + B[1] * alpha
+    x[angle] = sign * (tilt + A[2, 3] * w + B[2] * alpha)
+    x[rate] = sign * (w + B[3] * alpha)
+
+
+@njit(cache=True, error_model="numpy")
+def clip_wrench(vehicle, u):
+    """Lift and torques within the vehicle's input limits, in place."""
+    u[LIFT] = min(max(u[LIFT], vehicle.lift_min_N), vehicle.lift_max_N)
+    for axis in range(3):
+        largest = vehicle.torque_max_Nm[axis]
+        u[TAU_X + axis] = min(max(u[TAU_X + axis], -largest), largest)

@@ -1,0 +1,258 @@
+"""The parameters of a vehicle, read from a file and checked."""
+
+import math
+from functools import cached_property
+from importlib import resources
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from uas_coverage_env.strict_toml import InputError, StrictModel, read_toml
+
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Negative = Annotated[float, Field(lt=0.0)]
+Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class Airframe(StrictModel):
+    """Rigid body and rotor arrangement (the paper's Assumption 1: rotors equally spaced).
+
+    Neighbouring rotors turn against each other, so their number is even.
+    """
+
+    n_motors: Annotated[int, Field(ge=4, le=32, multiple_of=2)]
+    mass_kg: Positive
+    gravity_mps2: Positive
+    arm_m: Positive
+    first_arm_angle_rad: float
+    inertia_kgm2: tuple[Positive, Positive, Positive]
+    drag_kgps: NonNegative
+    drag_vertical_kgps: NonNegative
+
+
+class Rotor(StrictModel):
+    """One rotor with its propeller."""
+
+    thrust_N_per_radps2: Positive
+    torque_Nm_per_radps2: Positive
+    propeller_radius_m: Positive
+    induced_power_factor: Annotated[float, Field(ge=1.0)]
+    profile_power_advance_factor: NonNegative
+    air_density_kgpm3: Positive
+    speed_max_radps: Positive
+
+
+class Motor(StrictModel):
+    """One brushless motor, its speed controller's resistance included."""
+
+    back_emf_Vs_per_rad: Positive
+    resistance_ohm: Positive
+    no_load_current_A: NonNegative
+
+
+class Esc(StrictModel):
+    """One electronic speed controller."""
+
+    constant_loss_W: NonNegative
+    efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class Power(StrictModel):
+    """Battery power around hover."""
+
+    auxiliary_W: NonNegative
+    hover_W: Positive
+    slope_W_per_N: Positive
+
+
+class Battery(StrictModel):
+    """Thevenin battery with a piecewise-linear discharge curve."""
+
+    capacity_Ah: Positive
+    resistance_0_ohm: Positive
+    resistance_th_ohm: Positive
+    time_constant_th_s: Positive
+    polarisation_linearised_V: NonNegative
+    ocv_dod: tuple[NonNegative, ...]
+    ocv_V: tuple[Positive, ...]
+    ocv_dod_linearised: tuple[NonNegative, ...]
+    voltage_nominal_V: Positive
+    voltage_min_V: Positive
+    current_max_A: Positive
+    dod_max: Fraction
+    dod_cutoff: Fraction
+
+    @model_validator(mode="after")
+    def _curve_falls(self) -> Self:
+        dod, volt = self.ocv_dod, self.ocv_V
+        if len(dod) != len(volt) or len(dod) < 2:
+            raise ValueError("ocv_dod and ocv_V need the same number of points, two at least")
+        if len(dod) > 9:
+            raise ValueError(f"ocv_dod has {len(dod)} points; give at most 9 (8 segments)")
+        if dod[0] != 0.0 or dod[-1] != 1.0:
+            raise ValueError(f"ocv_dod runs from {dod[0]} to {dod[-1]}; it must run from 0 to 1")
+        if any(b <= a for a, b in pairwise(dod)):
+            raise ValueError("ocv_dod must increase from point to point")
+        if any(b >= a for a, b in pairwise(volt)):
+            raise ValueError("ocv_V must fall from point to point")
+        if len(self.ocv_dod_linearised) != len(dod) - 1:
+            raise ValueError(
+                f"ocv_dod_linearised has {len(self.ocv_dod_linearised)} values; "
+                f"give one for each of the {len(dod) - 1} segments"
+            )
+        if self.dod_max > self.dod_cutoff:
+            raise ValueError(f"dod_max {self.dod_max} exceeds dod_cutoff {self.dod_cutoff}")
+        if self.voltage_min_V >= volt[0]:
+            raise ValueError(f"voltage_min_V {self.voltage_min_V} exceeds the full battery's")
+        return self
+
+
+class Limits(StrictModel):
+    """Bounds of states and inputs (the paper's sets X and U)."""
+
+    v_xy_max_mps: Positive
+    v_cruise_mps: Positive
+    v_up_max_mps: Positive
+    v_down_max_mps: Positive
+    tilt_max_rad: Annotated[float, Field(gt=0.0, lt=1.2)]
+    yaw_max_rad: Positive
+    rate_max_radps: Positive
+    yaw_rate_max_radps: Positive
+    angular_acceleration_xy_max_radps2: Positive
+    angular_acceleration_z_max_radps2: Positive
+    delta_thrust_min_N: Negative
+    delta_thrust_max_N: Positive
+    lift_min_N: Negative
+    lift_max_N: Positive
+
+    @model_validator(mode="after")
+    def _cruise_below_maximum(self) -> Self:
+        if self.v_cruise_mps > self.v_xy_max_mps:
+            raise ValueError(
+                f"v_cruise_mps {self.v_cruise_mps} exceeds v_xy_max_mps {self.v_xy_max_mps}"
+            )
+        return self
+
+
+class ThrustCorrection(StrictModel):
+    """Slopes of the piecewise-linear thrust correction f_T, see `thrust_correction`."""
+
+    speed_N_per_mps: NonNegative
+    climb_N_per_mps: NonNegative
+    descent_N_per_mps: NonNegative
+    tilt_N_per_rad: NonNegative
+
+
+class ReturnRule(StrictModel):
+    """The overestimated way home of the return threshold DoD_r."""
+
+    distance_over_speed_s: Positive
+
+
+class VehicleParams(StrictModel):
+    """Everything the model knows of a vehicle; fields carry their units."""
+
+    name: str
+    airframe: Airframe
+    rotor: Rotor
+    motor: Motor
+    esc: Esc
+    power: Power
+    battery: Battery
+    limits: Limits
+    thrust_correction: ThrustCorrection
+    return_rule: ReturnRule
+
+    @model_validator(mode="after")
+    def _can_fly(self) -> Self:
+        body, limits = self.airframe, self.limits
+        if -limits.delta_thrust_min_N >= self.weight_N:
+            raise ValueError(
+                f"limits.delta_thrust_min_N {limits.delta_thrust_min_N} takes away more than the "
+                f"weight, {self.weight_N:.4g} N"
+            )
+        strongest = body.n_motors * self.rotor.thrust_N_per_radps2 * self.rotor.speed_max_radps**2
+        needed = self.weight_N + max(limits.lift_max_N, 0.0)
+        if strongest < needed:
+            raise ValueError(
+                f"the rotors lift {strongest:.4g} N at rotor.speed_max_radps; "
+                f"limits.lift_max_N asks for {needed:.4g} N"
+            )
+        battery = self.battery
+        if battery.ocv_V[-1] ** 2 <= 4.0 * battery.resistance_0_ohm * self.power.hover_W:
+            raise ValueError(
+                f"battery.resistance_0_ohm {battery.resistance_0_ohm} is too high to hover"
+            )
+        trim = self.trim_tilt_rad_per_mps * limits.v_xy_max_mps
+        if trim >= limits.tilt_max_rad:
+            raise ValueError(
+                f"limits.tilt_max_rad {limits.tilt_max_rad} does not hold v_xy_max_mps, "
+                f"which needs {trim:.4g} rad"
+            )
+        return self
+
+    @property
+    def weight_N(self) -> float:
+        """M g [N]."""
+        return self.airframe.mass_kg * self.airframe.gravity_mps2
+
+    @property
+    def trim_tilt_rad_per_mps(self) -> float:
+        """Tilt that holds a horizontal speed in the linear model [rad per m/s]."""
+        return self.airframe.drag_kgps / self.weight_N
+
+    @cached_property
+    def torque_max_Nm(self) -> tuple[float, float, float]:
+        """Largest torques: inertia times largest angular acceleration [N m]."""
+        inertia, limits = self.airframe.inertia_kgm2, self.limits
+        sideways = limits.angular_acceleration_xy_max_radps2
+        return (
+            inertia[0] * sideways,
+            inertia[1] * sideways,
+            inertia[2] * limits.angular_acceleration_z_max_radps2,
+        )
+
+
+def vehicle_names() -> tuple[str, ...]:
+    """The names of the shipped vehicles."""
+    files = resources.files(__package__).iterdir()
+    return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
+
+
+def load_vehicle(name_or_path: str | Path) -> VehicleParams:
+    """Load a shipped vehicle by name or any vehicle by the path of its file.
+
+    Args:
+        name_or_path: one of `vehicle_names()`, or a path that ends in .toml.
+
+    Raises:
+        InputError: unknown name, or a mistake in the file; one line.
+    """
+    text = str(name_or_path)
+    if text in vehicle_names():
+        with resources.as_file(resources.files(__package__) / f"{text}.toml") as path:
+            return read_toml(path, VehicleParams)
+    if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text:
+        return read_toml(name_or_path, VehicleParams)
+    raise InputError(
+        f"unknown vehicle {text!r}; allowed: {', '.join(vehicle_names())}, or a path to a file"
+    )
+
+
+def return_threshold(vehicle: VehicleParams, dod_max: float | None = None) -> float:
+    """DoD_r, from which on the way home is due (Gasche et al., Sec. III-C.6, return mode).
+
+    DoD_r = DoD_max - p_hover (D_r,max / v_cruise) / (Q_b u_nom)
+
+    Args:
+        vehicle: parameters.
+        dod_max: DoD_max of the UAS; the vehicle's own by default.
+    """
+    battery = vehicle.battery
+    energy_J = 3600.0 * battery.capacity_Ah * battery.voltage_nominal_V
+    taken = vehicle.power.hover_W * vehicle.return_rule.distance_over_speed_s / energy_J
+    result = (battery.dod_max if dod_max is None else dod_max) - taken
+    return result if math.isfinite(result) else 0.0

@@ -1,0 +1,66 @@
+"""What happens: state, commands, and the one compiled step (CONTRACT, "What counts")."""
+
+from uas_coverage_env.world.arena import Arena, build_arena
+from uas_coverage_env.world.commands import (
+    COMMAND_DTYPE,
+    HOME,
+    KIND_NAMES,
+    Acceleration,
+    Command,
+    GoTo,
+    Mode,
+    Velocity,
+    Wrench,
+    command_mode,
+    pack,
+)
+from uas_coverage_env.world.guidance import guide, path_length_home_m, target_position
+from uas_coverage_env.world.outcome import CONTACT_NAMES, OUTCOME_DTYPE
+from uas_coverage_env.world.return_mode import has_to_return, seconds_home
+from uas_coverage_env.world.routes import route
+from uas_coverage_env.world.simulation import Dynamics, World, initial_state
+from uas_coverage_env.world.state import (
+    FLYING,
+    LANDED,
+    LOST,
+    STATUS_NAMES,
+    SwarmState,
+    WorldState,
+)
+from uas_coverage_env.world.step import advance, begin_mission, first_invalid
+
+__all__ = [
+    "COMMAND_DTYPE",
+    "CONTACT_NAMES",
+    "FLYING",
+    "HOME",
+    "KIND_NAMES",
+    "LANDED",
+    "LOST",
+    "OUTCOME_DTYPE",
+    "STATUS_NAMES",
+    "Acceleration",
+    "Arena",
+    "Command",
+    "Dynamics",
+    "GoTo",
+    "Mode",
+    "SwarmState",
+    "Velocity",
+    "World",
+    "WorldState",
+    "Wrench",
+    "advance",
+    "begin_mission",
+    "build_arena",
+    "command_mode",
+    "first_invalid",
+    "guide",
+    "has_to_return",
+    "initial_state",
+    "pack",
+    "path_length_home_m",
+    "route",
+    "seconds_home",
+    "target_position",
+]

@@ -1,0 +1,301 @@
+"""A scenario as arrays, for the kernels: what never changes during a mission."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
+from uas_coverage_env.world.routes import node_distances
+
+NEAR_M = 20.0
+"""Obstacles that are farther need no exact distance, unless nothing is nearer [m]."""
+
+ROUTE_MARGIN_M = 1.0
+"""Routes keep this much more than the clearance that counts as a breach [m]."""
+
+NODE_MARGIN_M = 1.0
+"""Corners of routes lie this much outside of what routes avoid, so that they see past it [m]."""
+
+LOOKAHEAD_S = 12.0
+"""A braking flight takes less than this from the highest speed [s]."""
+
+SAMPLES_AFTER_END = 64
+"""Moving obstacles are known this long after max_steps, for missions flown over time."""
+
+
+def _record(fields: list) -> np.dtype:
+    # np.record: attributes work in plain Python too (NUMBA_DISABLE_JIT=1)
+    return np.dtype((np.record, np.dtype(fields, align=True)))
+
+
+UAS_DTYPE = _record(
+    [
+        ("home_m", "f8", (3,)),
+        ("radius_m", "f8"),
+        ("dod_max", "f8"),
+        # what guidance and return mode assume of the vehicle
+        ("speed_mps", "f8"),
+        ("climb_mps", "f8"),
+        ("descent_mps", "f8"),
+        ("dod_per_s", "f8"),
+    ]
+)
+
+OBSTACLE_DTYPE = _record(
+    [
+        # rows of `normals`: the hull, and the walls of its footprint widened by wall_m
+        ("first_face", "i8"),
+        ("last_face", "i8"),
+        ("first_side", "i8"),
+        ("last_side", "i8"),
+        ("safe_distance_m", "f8"),
+        # outside of this box every point is at least near_m away
+        ("near_m", "f8"),
+        ("lower_m", "f8", (3,)),
+        ("upper_m", "f8", (3,)),
+        # routes keep wall_m beside it, or pass over it at roof_m, positive up, unless it is tall
+        ("wall_m", "f8"),
+        ("roof_m", "f8"),
+        ("tall", "?"),
+    ]
+)
+
+MOVING_DTYPE = _record(
+    [("radius_m", "f8"), ("half_height_m", "f8"), ("safe_distance_m", "f8")],
+)
+
+WAYPOINT_DTYPE = _record(
+    [("position_m", "f8", (3,)), ("radius_m", "f8"), ("weight", "f8")],
+)
+
+RULES_DTYPE = _record(
+    [
+        ("dt_s", "f8"),
+        ("max_steps", "i8"),
+        ("landing_distance_m", "f8"),
+        ("landing_speed_mps", "f8"),
+        ("uas_safe_distance_m", "f8"),
+        ("fence_margin_m", "f8"),
+        # rows of `normals`
+        ("fence_first", "i8"),
+        ("fence_last", "i8"),
+        # the lowest and highest altitude that guidance flies at, positive up
+        ("floor_m", "f8"),
+        ("ceiling_m", "f8"),
+        # how far guidance and safety filter look ahead: time to brake from any speed
+        ("lookahead_steps", "i8"),
+    ]
+)
+
+
+class Arena(NamedTuple):
+    """The scenario for kernels: entities as records, planes in two arrays."""
+
+    vehicles: NDArray[np.void]
+    """(U,) of VEHICLE_DTYPE."""
+    uas: NDArray[np.void]
+    """(U,) of UAS_DTYPE."""
+    obstacles: NDArray[np.void]
+    """(O,) of OBSTACLE_DTYPE."""
+    normals: NDArray[np.float64]
+    """(F, 3) faces of the obstacles, the fence, and the walls of footprints."""
+    offsets_m: NDArray[np.float64]
+    """(F,) [m]."""
+    moving: NDArray[np.void]
+    """(M,) of MOVING_DTYPE."""
+    moving_path_m: NDArray[np.float64]
+    """(T+1, M, 3) [m] centres at every sample."""
+    moving_velocity_mps: NDArray[np.float64]
+    """(T+1, M, 3) [m/s] velocities at every sample."""
+    waypoints: NDArray[np.void]
+    """(W,) of WAYPOINT_DTYPE."""
+    rules: NDArray[np.void]
+    """(1,) of RULES_DTYPE."""
+    nodes_m: NDArray[np.float64]
+    """(K, 2) [m] corners at which routes turn."""
+    node_distance_m: NDArray[np.float64]
+    """(W+U, K) [m] way from a corner to a waypoint or a start; inf where there is none."""
+
+
+def build_arena(scenario: Scenario) -> Arena:
+    """The scenario as arrays.
+
+    Obstacles that can be flown over without climbing far above the usual waypoint are low, the
+    others are tall: routes go round them over the corners of their widened footprints.
+    """
+    uas = _uas(scenario)
+    rules = _rules(scenario)
+    waypoints = _waypoints(scenario)
+    radius_m = max((entry.radius_m for entry in scenario.uas), default=0.0)
+    targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
+    overfly_m = _overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
+    obstacles, planes, corners = _obstacles(scenario, radius_m, overfly_m)
+    fence = scenario.fence
+    rules["fence_first"] = sum(len(rows[1]) for rows in planes)
+    rules["fence_last"] = rules["fence_first"] + fence.n_faces
+    planes.append((fence.normals, fence.offsets_m))
+    normals = np.concatenate([rows[0] for rows in planes])
+    offsets_m = np.concatenate([rows[1] for rows in planes])
+    nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
+    times_s = scenario.dt_s * np.arange(scenario.max_steps + SAMPLES_AFTER_END + 1)
+    shape = (len(times_s), len(scenario.moving_obstacles), 3)
+    path_m = [scenario.moving_positions(float(time_s)) for time_s in times_s]
+    velocity_mps = [scenario.moving_velocities(float(time_s)) for time_s in times_s]
+    return Arena(
+        vehicles=np.stack([compile_vehicle(v, scenario.dt_s) for v in scenario.vehicles]),
+        uas=uas,
+        obstacles=obstacles,
+        normals=np.ascontiguousarray(normals),
+        offsets_m=np.ascontiguousarray(offsets_m),
+        moving=np.array(
+            [(m.radius_m, m.height_m / 2, m.safe_distance_m) for m in scenario.moving_obstacles],
+            dtype=MOVING_DTYPE,
+        ),
+        moving_path_m=np.array(path_m).reshape(shape),
+        moving_velocity_mps=np.array(velocity_mps).reshape(shape),
+        waypoints=waypoints,
+        rules=rules,
+        nodes_m=nodes_m,
+        node_distance_m=node_distances(
+            obstacles, normals, offsets_m, nodes_m, np.ascontiguousarray(targets_m[:, :2])
+        ),
+    )
+
+
+def _waypoints(scenario: Scenario) -> NDArray[np.void]:
+    rows = [(w.position_m, w.radius_m, w.weight) for w in scenario.waypoints]
+    return np.array(rows, dtype=WAYPOINT_DTYPE)
+
+
+def _uas(scenario: Scenario) -> NDArray[np.void]:
+    rows = []
+    for entry, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
+        limits = vehicle.limits
+        rows.append(
+            (
+                entry.start_m,
+                entry.radius_m,
+                entry.dod_max,
+                limits.v_xy_max_mps,
+                limits.v_up_max_mps,
+                limits.v_down_max_mps,
+                _dod_per_s(vehicle, entry.dod_max),
+            )
+        )
+    return np.array(rows, dtype=UAS_DTYPE)
+
+
+def _dod_per_s(vehicle: VehicleParams, dod_max: float) -> float:
+    """Depth of discharge per second of fast flight [1/s], with the battery nearly empty."""
+    battery = vehicle.battery
+    drag_N = vehicle.thrust_correction.speed_N_per_mps * vehicle.limits.v_xy_max_mps
+    power_W = vehicle.power.hover_W + vehicle.power.slope_W_per_N * drag_N
+    ocv_V = float(np.interp(dod_max, battery.ocv_dod, battery.ocv_V))
+    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
+    # U I - R I² = P; where no current gives that power, the largest power does
+    root = math.sqrt(max(ocv_V**2 - 4.0 * resistance_ohm * power_W, 0.0))
+    current_A = (ocv_V - root) / (2.0 * resistance_ohm)
+    return current_A / (3600.0 * battery.capacity_Ah)
+
+
+def _rules(scenario: Scenario) -> NDArray[np.void]:
+    rules = np.zeros(1, dtype=RULES_DTYPE)
+    rules["dt_s"] = scenario.dt_s
+    rules["max_steps"] = scenario.max_steps
+    rules["landing_distance_m"] = scenario.landing_distance_m
+    rules["landing_speed_mps"] = scenario.landing_speed_mps
+    rules["uas_safe_distance_m"] = scenario.uas_safe_distance_m
+    rules["fence_margin_m"] = scenario.geofence.margin_m
+    altitudes_m = -scenario.fence.vertices_m[:, 2]
+    rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
+    rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - ROUTE_MARGIN_M
+    rules["lookahead_steps"] = np.ceil(LOOKAHEAD_S / scenario.dt_s)
+    return rules
+
+
+def _overfly_limit(target_altitudes_m: NDArray[np.float64], ceiling_m: float) -> float:
+    """Roofs up to here are flown over: 15 m above the usual target, below the ceiling [m]."""
+    return min(float(np.median(target_altitudes_m)) + 15.0, ceiling_m)
+
+
+def _widened(hull: ConvexPolytope, distance_m: float) -> NDArray[np.float64]:
+    """Corners of {p : D(p) ≤ distance_m}: what the paper's clearance makes of a hull.
+
+    Args:
+        hull: The hull.
+        distance_m: [m].
+
+    Returns:
+        (V, 3) [m].
+    """
+    inside = hull.vertices_m.mean(axis=0)
+    offsets_m = hull.offsets_m - distance_m + hull.normals @ inside
+    corners = HalfspaceIntersection(np.column_stack([hull.normals, offsets_m]), np.zeros(3))
+    return corners.intersections + inside
+
+
+def _footprint(hull: ConvexPolytope, distance_m: float) -> ConvexHull:
+    corners = np.unique(_widened(hull, distance_m)[:, :2].round(6), axis=0)
+    return ConvexHull(corners)
+
+
+def _obstacles(
+    scenario: Scenario, radius_m: float, overfly_m: float
+) -> tuple[
+    NDArray[np.void],
+    list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    list[NDArray[np.float64]],
+]:
+    """The obstacles, the planes of their hulls and footprints, and the corners to turn at."""
+    records = np.zeros(len(scenario.obstacles), dtype=OBSTACLE_DTYPE)
+    planes = []
+    corners = []
+    first = 0
+    for record, obstacle, hull in zip(records, scenario.obstacles, scenario.hulls, strict=True):
+        wall_m = radius_m + obstacle.safe_distance_m + ROUTE_MARGIN_M
+        near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M)
+        footprint = _footprint(hull, wall_m)
+        sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
+        planes.append((hull.normals, hull.offsets_m))
+        planes.append((sides, footprint.equations[:, 2]))
+        near = _widened(hull, near_m)
+        record["first_face"] = first
+        record["last_face"] = record["first_side"] = first + hull.n_faces
+        first += hull.n_faces + len(sides)
+        record["last_side"] = first
+        record["safe_distance_m"] = obstacle.safe_distance_m
+        record["near_m"] = near_m
+        # the corners are rounded in the last digits: widen the box rather than miss a contact
+        record["lower_m"] = near.min(axis=0) - 1e-6
+        record["upper_m"] = near.max(axis=0) + 1e-6
+        record["wall_m"] = wall_m
+        record["roof_m"] = -_widened(hull, wall_m)[:, 2].min()
+        record["tall"] = record["roof_m"] > overfly_m
+        if record["tall"]:
+            outline = _footprint(hull, wall_m + NODE_MARGIN_M)
+            corners.append(outline.points[outline.vertices])
+    return records, planes, corners
+
+
+def _free_nodes(
+    scenario: Scenario,
+    corners: list[NDArray[np.float64]],
+    obstacles: NDArray[np.void],
+    normals: NDArray[np.float64],
+    offsets_m: NDArray[np.float64],
+    target_altitudes_m: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The corners that lie inside the fence and outside of all other tall obstacles."""
+    nodes_m = np.concatenate([np.zeros((0, 2)), *corners])
+    down_m = np.full((len(nodes_m), 1), -np.median(target_altitudes_m))
+    inset_m = scenario.geofence.margin_m + NODE_MARGIN_M
+    free = scenario.fence.signed_distance(np.hstack([nodes_m, down_m])) <= -inset_m
+    for obstacle in obstacles[obstacles["tall"]]:
+        sides = slice(obstacle["first_side"], obstacle["last_side"])
+        free &= (nodes_m @ normals[sides, :2].T + offsets_m[sides]).max(axis=1) > 0.0
+    return np.ascontiguousarray(nodes_m[free])

@@ -1,0 +1,41 @@
+"""From a command to the wrench that flies it."""
+
+from numba import njit
+
+from uas_coverage_env.vehicle import (
+    LIFT,
+    TAU_X,
+    TAU_Y,
+    TAU_Z,
+    acceleration_wrench,
+    clip_wrench,
+    velocity_climb_wrench,
+    velocity_wrench,
+)
+from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
+
+
+@njit(cache=True, error_model="numpy")
+def command_wrench(vehicle, x, reference, kind, values, u):
+    """Write into u the wrench for one step of a command, within the vehicle's limits.
+
+    Args:
+        vehicle: The compiled vehicle.
+        x: (14,) state.
+        reference: (2,) [m/s] the inner loop's governed velocity; updated.
+        kind: VELOCITY, ACCELERATION, WRENCH or CLIMB.
+        values: (4,) the numbers of the command.
+        u: (5,) inputs; lift and torques are written.
+    """
+    if kind == VELOCITY:
+        velocity_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
+    elif kind == CLIMB:
+        velocity_climb_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
+    elif kind == ACCELERATION:
+        acceleration_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
+    else:
+        u[LIFT] = values[0]
+        u[TAU_X] = values[1]
+        u[TAU_Y] = values[2]
+        u[TAU_Z] = values[3]
+        clip_wrench(vehicle, u)

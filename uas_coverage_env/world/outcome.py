@@ -1,0 +1,46 @@
+"""What happened to each UAS in one step."""
+
+import numpy as np
+
+from uas_coverage_env.vehicle import N_INPUTS
+from uas_coverage_env.world.commands import COMMAND_DTYPE
+
+NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY = range(6)
+"""What a lost UAS was lost to."""
+
+CONTACT_NAMES = ("none", "obstacle", "moving_obstacle", "uas", "geofence", "battery")
+
+OUTCOME_DTYPE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                # (lift, three torques, thrust correction) [N, N m, N] that acted over the step
+                ("u", "f8", (N_INPUTS,)),
+                ("voltage_V", "f8"),
+                ("current_A", "f8"),
+                ("energy_Wh", "f8"),
+                # waypoints that this UAS covered first, at the new sample
+                ("newly_covered", "i8"),
+                ("newly_covered_weight", "f8"),
+                # a code of this module, and the index of the obstacle or UAS, or -1
+                ("contact", "i8"),
+                ("contact_with", "i8"),
+                # how many obstacles and UAS are too near at the new sample; the fence counts too
+                ("breaches", "i8"),
+                # smallest over the segment flown; inf where there is nothing to be clear of
+                ("obstacle_clearance_m", "f8"),
+                ("separation_m", "f8"),
+                # what was flown, after guidance, return mode and filter
+                ("applied_command", COMMAND_DTYPE),
+                # the safety filter changed the command
+                ("filtered", "?"),
+                # the player returns, or return mode took over
+                ("returning", "?"),
+                ("landed", "?"),
+            ],
+            align=True,
+        ),
+    )
+)
+"""One UAS and one step; of a UAS that did not fly, all but the distances is zero."""

@@ -1,0 +1,211 @@
+"""Ways past the fixed obstacles: what a straight leg crosses, and the corners to turn at.
+
+Low obstacles are flown over, tall ones passed along the corners of their widened footprints, as in
+a visibility graph. Distances along the graph to every waypoint and start are computed once.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from uas_coverage_env.geometry import segment_meets, signed_distance
+
+_CREEP_M = 1e-3
+
+CLEAR, IN_SIGHT, ROUND_CORNER, NO_WAY = range(4)
+"""A leg to the target itself, free; to the target, over low obstacles; to a corner; to the target,
+over everything, because there is no way round."""
+
+
+@njit(cache=True, error_model="numpy")
+def box_apart(obstacle, x0, y0, z0, x1, y1, z1):
+    """Whether a segment misses the box in which the obstacle's clearance is below near_m."""
+    lower = obstacle.lower_m
+    upper = obstacle.upper_m
+    return (
+        max(x0, x1) < lower[0]
+        or min(x0, x1) > upper[0]
+        or max(y0, y1) < lower[1]
+        or min(y0, y1) > upper[1]
+        or max(z0, z1) < lower[2]
+        or min(z0, z1) > upper[2]
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1):
+    """Fraction of the leg at which it enters an inflated footprint; 2 where it does not."""
+    enters = 0.0
+    leaves = 1.0
+    for h in range(first, last):
+        offset = offsets_m[h] - inflation_m
+        d0 = normals[h, 0] * x0 + normals[h, 1] * y0 + offset
+        d1 = normals[h, 0] * x1 + normals[h, 1] * y1 + offset
+        if d0 >= 0.0:
+            if d1 >= 0.0:
+                return 2.0
+            enters = max(enters, d0 / (d0 - d1))
+        elif d1 >= 0.0:
+            leaves = min(leaves, d0 / (d0 - d1))
+        if enters >= leaves:
+            return 2.0
+    return enters
+
+
+@njit(cache=True, error_model="numpy")
+def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
+    """Where a horizontal leg crosses the widened footprint of an obstacle.
+
+    A leg that starts or ends beside the walls, inside the margin, may leave or reach that place
+    as long as it comes no closer to the walls.
+
+    Returns:
+        (fraction of the leg, over): the fraction is 2 where the leg does not cross; `over` tells
+        that the leg starts or ends above (or below) the obstacle itself.
+    """
+    lower = obstacle.lower_m
+    upper = obstacle.upper_m
+    if (
+        max(x0, x1) < lower[0]
+        or min(x0, x1) > upper[0]
+        or max(y0, y1) < lower[1]
+        or min(y0, y1) > upper[1]
+    ):
+        return 2.0, False
+    first = obstacle.first_side
+    last = obstacle.last_side
+    d0 = signed_distance(normals, offsets_m, first, last, x0, y0, 0.0)
+    d1 = signed_distance(normals, offsets_m, first, last, x1, y1, 0.0)
+    over = min(d0, d1) <= -obstacle.wall_m
+    inflation_m = 0.0
+    if d0 > -obstacle.wall_m:
+        inflation_m = min(inflation_m, d0 - _CREEP_M)
+    if d1 > -obstacle.wall_m:
+        inflation_m = min(inflation_m, d1 - _CREEP_M)
+    return _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1), over
+
+
+@njit(cache=True, error_model="numpy")
+def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
+    """Whether no tall obstacle lies between two places.
+
+    Obstacles above which the leg starts or ends do not count: it has to pass over them anyway.
+    """
+    for o in range(obstacles.shape[0]):
+        if obstacles[o].tall:
+            at, over = crossing(obstacles[o], normals, offsets_m, x0, y0, x1, y1)
+            if at <= 1.0 and not over:
+                return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def line_is_clear(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+    """Whether the straight line in space keeps the distance of routes from every obstacle."""
+    for o in range(obstacles.shape[0]):
+        obstacle = obstacles[o]
+        if box_apart(obstacle, x0, y0, z0, x1, y1, z1):
+            continue
+        first = obstacle.first_face
+        last = obstacle.last_face
+        keep_m = min(
+            obstacle.wall_m,
+            signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M,
+            signed_distance(normals, offsets_m, first, last, x1, y1, z1) - _CREEP_M,
+        )
+        if segment_meets(normals, offsets_m, first, last, keep_m, x0, y0, z0, x1, y1, z1):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def route(arena, target, x0, y0, z0, x1, y1, z1):
+    """The next leg on the shortest way to a target past the fixed obstacles.
+
+    Args:
+        arena: The arena.
+        target: Row of `node_distance_m`: a waypoint, or W + the UAS for its start.
+        x0: North of the UAS [m].
+        y0: East of the UAS [m].
+        z0: Down of the UAS [m].
+        x1: North of the target [m].
+        y1: East of the target [m].
+        z1: Down of the target [m].
+
+    Returns:
+        (north [m], east [m], length of the whole way [m], leg): where the next leg ends, and
+        which of CLEAR, IN_SIGHT, ROUND_CORNER and NO_WAY it is.
+    """
+    obstacles = arena.obstacles
+    normals = arena.normals
+    offsets_m = arena.offsets_m
+    straight_m = math.hypot(x1 - x0, y1 - y0)
+    if line_is_clear(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+        return x1, y1, straight_m, CLEAR
+    if in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
+        return x1, y1, straight_m, IN_SIGHT
+    nodes_m = arena.nodes_m
+    onward_m = arena.node_distance_m
+    shortest_m = math.inf
+    corner = -1
+    for n in range(nodes_m.shape[0]):
+        length_m = math.hypot(nodes_m[n, 0] - x0, nodes_m[n, 1] - y0) + onward_m[target, n]
+        if length_m < shortest_m and in_sight(
+            obstacles, normals, offsets_m, x0, y0, nodes_m[n, 0], nodes_m[n, 1]
+        ):
+            shortest_m = length_m
+            corner = n
+    if corner < 0:
+        return x1, y1, straight_m, NO_WAY
+    return nodes_m[corner, 0], nodes_m[corner, 1], shortest_m, ROUND_CORNER
+
+
+@njit(cache=True, error_model="numpy")
+def _sight_distances(obstacles, normals, offsets_m, from_m, to_m, distance_m):
+    for a in range(from_m.shape[0]):
+        for b in range(to_m.shape[0]):
+            seen = in_sight(
+                obstacles, normals, offsets_m, from_m[a, 0], from_m[a, 1], to_m[b, 0], to_m[b, 1]
+            )
+            if seen:
+                distance_m[a, b] = math.hypot(from_m[a, 0] - to_m[b, 0], from_m[a, 1] - to_m[b, 1])
+
+
+def node_distances(
+    obstacles: NDArray[np.void],
+    normals: NDArray[np.float64],
+    offsets_m: NDArray[np.float64],
+    nodes_m: NDArray[np.float64],
+    targets_m: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Shortest ways from every corner to every target over the visibility graph.
+
+    Args:
+        obstacles: (O,) of OBSTACLE_DTYPE.
+        normals: (F, 3) all planes.
+        offsets_m: (F,) [m].
+        nodes_m: (K, 2) [m] the corners.
+        targets_m: (P, 2) [m] the targets.
+
+    Returns:
+        (P, K) [m]; inf where there is no way.
+    """
+    n_nodes = len(nodes_m)
+    last_leg_m = np.full((len(targets_m), n_nodes), np.inf)
+    if n_nodes == 0:
+        return last_leg_m
+    _sight_distances(obstacles, normals, offsets_m, targets_m, nodes_m, last_leg_m)
+    legs_m = np.full((n_nodes, n_nodes), np.inf)
+    _sight_distances(obstacles, normals, offsets_m, nodes_m, nodes_m, legs_m)
+    from_node, to_node = np.nonzero(np.isfinite(legs_m))
+    graph = csr_array((legs_m[from_node, to_node], (from_node, to_node)), shape=legs_m.shape)
+    between_m = dijkstra(graph, directed=False)
+    ways_m = np.full_like(last_leg_m, np.inf)
+    for target, seen in enumerate(np.isfinite(last_leg_m)):
+        if seen.any():
+            ways_m[target] = (between_m[:, seen] + last_leg_m[target, seen]).min(axis=1)
+    return ways_m

@@ -1,0 +1,141 @@
+"""The world as an object: one mission, step by step."""
+
+from collections.abc import Mapping
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD, N_STATES
+from uas_coverage_env.world.arena import build_arena
+from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
+from uas_coverage_env.world.outcome import OUTCOME_DTYPE
+from uas_coverage_env.world.state import FLYING, SwarmState, WorldState
+from uas_coverage_env.world.step import ACCEPTED, begin_mission, step_world
+
+Dynamics = Literal["lpv", "nonlinear"]
+
+
+def initial_state(scenario: Scenario) -> WorldState:
+    """All UAS at rest at their starts, batteries rested, nothing covered."""
+    n_uas = len(scenario.uas)
+    x = np.zeros((n_uas, N_STATES))
+    x[:, :3] = [uas.start_m for uas in scenario.uas]
+    x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
+    return WorldState(
+        x=x,
+        reference=np.zeros((n_uas, 2)),
+        status=np.full(n_uas, FLYING),
+        departed=np.zeros(n_uas, dtype=np.bool_),
+        returning=np.zeros(n_uas, dtype=np.bool_),
+        uncovered=np.ones(len(scenario.waypoints), dtype=np.bool_),
+        step=np.zeros(1, dtype=np.int64),
+    )
+
+
+class World:
+    """One mission of a scenario.
+
+    Attributes:
+        scenario: The scenario.
+        names: Names of the UAS, in order.
+        arena: The scenario as arrays; not to be changed.
+        state: The state; written by `reset` and `step`.
+        dynamics: The model that is flown.
+        return_mode: Whether UAS are brought home in time.
+        safety_filter: Whether commands are kept clear of harm.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        dynamics: Dynamics = "lpv",
+        return_mode: bool = False,
+        safety_filter: bool = False,
+    ) -> None:
+        if dynamics not in get_args(Dynamics):
+            raise ValueError(f"dynamics is {dynamics!r}; it is one of {get_args(Dynamics)}")
+        self.scenario = scenario
+        self.dynamics = dynamics
+        self.return_mode = bool(return_mode)
+        self.safety_filter = bool(safety_filter)
+        self.names = tuple(uas.name for uas in scenario.uas)
+        self.arena = build_arena(scenario)
+        self._start = initial_state(scenario)
+        begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
+        self.state = self._start.copy()
+        self._switches = (dynamics == "nonlinear", self.return_mode, self.safety_filter)
+
+    def reset(self) -> None:
+        """Go back to t = 0."""
+        for array, start in zip(self.state, self._start, strict=True):
+            array[:] = start
+
+    def step(self, commands: NDArray[np.void] | Mapping[str, Command]) -> NDArray[np.void]:
+        """Fly all UAS for one step.
+
+        Args:
+            commands: One command for each active UAS, by name, or packed: (U,) of COMMAND_DTYPE.
+
+        Returns:
+            (U,) of OUTCOME_DTYPE, an array of its own.
+
+        Raises:
+            ValueError: A command is missing, surplus or invalid; nothing has changed.
+        """
+        if not isinstance(commands, np.ndarray):
+            active = self.active
+            commands = pack(commands, self.names, active, len(self.scenario.waypoints))
+        elif commands.dtype != COMMAND_DTYPE or commands.shape != (len(self.names),):
+            raise ValueError(
+                f"commands have dtype {commands.dtype} and shape {commands.shape}; "
+                f"give COMMAND_DTYPE and ({len(self.names)},)"
+            )
+        outcome = np.empty(len(self.names), dtype=OUTCOME_DTYPE)
+        invalid = step_world(*self.arena, *self.state, commands, *self._switches, outcome)
+        if invalid != ACCEPTED:
+            raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
+        return outcome
+
+    def _what_is_wrong(self, i: int, command: np.void) -> str:
+        kind = int(command["kind"])
+        name = KIND_NAMES[kind] if 0 <= kind < len(KIND_NAMES) else f"of kind {kind}"
+        return (
+            f"command of {self.names[i]} is {name} {command['values'].tolist()}; give finite "
+            f"values of a velocity, acceleration or wrench, or the index of a waypoint"
+        )
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the UAS that fly."""
+        status = self.state.status.tolist()
+        return tuple(name for name, s in zip(self.names, status, strict=True) if s == FLYING)
+
+    @property
+    def done(self) -> bool:
+        """Whether no UAS flies any more."""
+        return FLYING not in self.state.status
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start [s]."""
+        return int(self.state.step[0]) * self.scenario.dt_s
+
+    def swarm_state(self) -> SwarmState:
+        """What players see now, in arrays of their own."""
+        state = self.state
+        step = int(state.step[0])
+        sample = min(step, len(self.arena.moving_path_m) - 1)
+        return SwarmState(
+            time_s=self.time_s,
+            step=step,
+            names=self.names,
+            x=state.x.copy(),
+            status=state.status.copy(),
+            uncovered=state.uncovered.copy(),
+            home_m=self.arena.uas["home_m"].copy(),
+            moving_position_m=self.arena.moving_path_m[sample].copy(),
+            moving_velocity_mps=self.arena.moving_velocity_mps[sample].copy(),
+        )
