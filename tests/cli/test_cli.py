@@ -1,15 +1,18 @@
 """The commands in this process: what they say, write and return."""
 
+import io
 import json
 import re
 from importlib.resources import files
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from uas_coverage_env.cli import main
+from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.text_map import TextMap
-from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight import Flight, rollout
 from uas_coverage_env.scenario import load_scenario, scenario_names
 from uas_coverage_env.world import World
 
@@ -173,6 +176,37 @@ def test_every_command_has_help(command, capsys):
 def test_no_command_at_all_is_answered_with_help(capsys):
     assert main([]) == 0
     assert "planners" in capsys.readouterr().out
+
+
+def test_the_planner_of_the_paper_flies_by_default_and_leaves_its_predictions(elsewhere):
+    assert main(["run", "open_field", "--steps", "2", "--out", "mine"]) == 0
+    flight = Flight.load("mine")
+    assert flight.planner == "milp-mpc"
+    # how far it looks ahead in its time depends on the machine; it always begins where it is
+    now = flight.plan[flight.plan["n"] == 0]
+    assert now["step"].tolist() == [0, 0, 1, 1]
+    np.testing.assert_allclose(now["position_m"], flight.x[now["step"], now["uas"], :3])
+
+
+@pytest.mark.parametrize("watch", [True, False])
+def test_a_terminal_shows_a_line_that_changes_and_a_map_where_it_is_watched(watch):
+    scenario = load_scenario("open_field")
+    screen = Console(file=io.StringIO(), force_terminal=True, width=120, height=60)
+    with shown(screen, scenario, watch=watch) as on_step:
+        rollout(scenario, "hover", max_steps=3, on_step=on_step)
+    assert isinstance(screen.file, io.StringIO)
+    text = screen.file.getvalue()
+    assert "compiling" in text
+    assert "step 3/3" in text
+    assert "100%" in text
+    assert ("moving obstacle" in text) is watch
+
+
+def test_a_log_gets_few_lines(elsewhere, capsys):
+    assert main(["run", "open_field", "--planner", "nearest-waypoint", "--out", "mine"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(line.startswith("step ") for line in lines) <= 3
+    assert not any("\x1b" in line for line in lines)
 
 
 def test_a_map_of_letters_shows_what_is_where():

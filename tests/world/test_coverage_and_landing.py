@@ -86,7 +86,7 @@ def test_a_uas_that_returns_lands_without_having_left():
 def test_a_uas_that_has_left_lands_when_it_is_back_and_slow():
     world = World(meadow([(100.0, 100.0, -10.0)]))
     world.state.departed[0] = True
-    world.state.x[0, :3] = 101.0, 101.0, -11.0
+    world.state.x[0, :3] = 101.0, 101.0, -10.0
     world.step(hold())
     assert world.state.status[0] == LANDED
 

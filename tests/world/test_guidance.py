@@ -116,9 +116,9 @@ def test_the_way_home_goes_round_what_is_tall():
     assert straight_m == pytest.approx(0.0)
     x[:3] = 20.0, 75.0, -10.0
     round_m = path_length_home_m(world.arena, 0, x)
-    corner_m = 35.0 + 4.36
-    shortest = 40.0 + 8.72 + 2 * math.hypot(60.0 - 4.36, corner_m)
-    assert shortest < round_m < shortest + 8.0
+    # round the corners of the house, 2.36 m to keep and 1 m of margin beside its walls
+    shortest = 40.0 + 6.72 + 2 * math.hypot(60.0 - 3.36, 35.0 + 3.36)
+    assert shortest < round_m < shortest + 5.0
     x[2] = -49.4
     assert path_length_home_m(world.arena, 0, x) > 160.0
     assert seconds_home(world.arena, 0, x) > round_m / 12.0 + 48.4 / 1.5

@@ -24,7 +24,7 @@ VELOCITY, ACCELERATION, WRENCH = (KIND_NAMES.index(n) for n in ("velocity", "acc
 def crowded():
     """Everything that can be hit, close together: random flights end in every kind of contact."""
     return meadow(
-        [(60.0, 60.0, -8.0), (75.0, 60.0, -8.0), (60.0, 75.0, -8.0)],
+        [(60.0, 60.0, -8.0), (66.0, 60.0, -8.0), (60.0, 66.0, -8.0)],
         obstacles=[
             box("wall", (80.0, 20.0, -20.0), (81.0, 120.0, 0.0)),
             box("floating", (20.0, 90.0, -40.0), (70.0, 100.0, -25.0)),
@@ -33,7 +33,7 @@ def crowded():
             mover((30.0, 30.0, -10.0), (0.0, (3.0, 3.0, -0.2)), (9.0, (-4.0, 0.5, 0.0))),
             mover((100.0, 30.0, -5.0), (0.0, (-8.0, 2.0, 0.0)), name="second"),
         ],
-        waypoints=[waypoint((60.0 + 3 * w, 40.0 + 7 * w, -8.0), 6.0, 1.0 + w) for w in range(9)],
+        waypoints=[waypoint((60.0 + 3 * w, 57.0 + 6 * w, -8.0), 6.0, 1.0 + w) for w in range(9)],
         soc_0=0.27,
     )
 

@@ -60,10 +60,18 @@ class Frame:
         left = 8 * unit + (room_x - scale * (high[1] - low[1])) / 2
         bottom = footer - 6 * unit - (room_y - scale * (high[0] - low[0])) / 2
         return cls(
-            **{"side": side, "unit": unit, "header": header, "footer": footer, "gauge": gauge},
-            **{"south_m": float(low[0]), "west_m": float(low[1])},
-            **{"ceiling_m": float(-low[2]), "floor_m": float(-high[2])},
-            **{"scale": scale, "left": float(left), "bottom": float(bottom)},
+            side=side,
+            unit=unit,
+            header=header,
+            footer=footer,
+            gauge=gauge,
+            south_m=float(low[0]),
+            west_m=float(low[1]),
+            ceiling_m=float(-low[2]),
+            floor_m=float(-high[2]),
+            scale=scale,
+            left=float(left),
+            bottom=float(bottom),
         )
 
     def pixels(self, positions_m: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -122,10 +122,10 @@ class Picture:
         if self._map is None or self._map[0] != key:
             image = self._background().copy()
             draw = ImageDraw.Draw(image)
-            for at, radius, heavy, open_ in zip(
+            for (x, y), radius, heavy, open_ in zip(
                 self._waypoints, self._radii, self._heavy, uncovered.tolist(), strict=True
             ):
-                marks.waypoint(draw, self._frame, *at, radius, heavy=heavy, open_=open_)
+                marks.waypoint(draw, self._frame, x, y, radius, heavy=heavy, open_=open_)
             self._map = (key, image)
         return self._map[1]
 
@@ -173,7 +173,14 @@ class Picture:
                 marks.lost(draw, frame, x, y)
                 place = (x + 11 * unit, y)
             if labelled:
-                write(image, place, self._labels[i], 11 * unit, colour, halo=1.5 * unit)
+                if x > frame.gauge - 35 * unit:
+                    # no room at the edge of the map: write to the left
+                    place = (2 * x - place[0], place[1])
+                self._label(image, place, i, align=float(place[0] < x))
+
+    def _label(self, image: "Image", place: tuple[float, float], i: int, align: float) -> None:
+        unit = self._frame.unit
+        write(image, place, self._labels[i], 11 * unit, _colour(i), align=align, halo=1.5 * unit)
 
     def _margins(self, image: "Image") -> None:
         """Cover what has left the map: a helicopter that is gone, and its dotted circle."""
@@ -214,7 +221,7 @@ class Picture:
             doing = f"{-swarm.x[i, Z]:.0f} m"
             if swarm.status[i] != FLYING:
                 doing = STATUS_NAMES[swarm.status[i]]
-            words = f"{name[:9]} {100 * (1 - swarm.x[i, DOD]):.0f} %, {doing}"
+            words = f"{name[:10]} {100 * (1 - swarm.x[i, DOD]):.0f} %, {doing}"
             write(image, (x + 11 * unit, y), words, 10.5 * unit, colours.INK)
 
 

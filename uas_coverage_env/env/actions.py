@@ -18,7 +18,6 @@ Finite numbers beyond ±1 are clipped.
 """
 
 import math
-import numbers
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -54,17 +53,22 @@ RANGES_DTYPE = np.dtype(
 
 
 class Actions(Protocol):
-    """One kind of action.
+    """One kind of action."""
 
-    Attributes:
-        kind: The kind of command that it becomes.
-        size: Numbers per UAS.
-        ranges: (U,) of RANGES_DTYPE; not used by the waypoint action.
-    """
+    @property
+    def kind(self) -> int:
+        """The kind of command that it becomes."""
+        ...
 
-    kind: int
-    size: int
-    ranges: NDArray[np.void]
+    @property
+    def size(self) -> int:
+        """Numbers per UAS."""
+        ...
+
+    @property
+    def ranges(self) -> NDArray[np.void]:
+        """(U,) of RANGES_DTYPE; not used by the waypoint action."""
+        ...
 
     def space(self) -> spaces.Space[Any]:
         """A new space of one UAS."""
@@ -153,7 +157,7 @@ class Choice:
         """Write the choice; any whole number in range will do, also as an array without axes."""
         if isinstance(action, np.ndarray) and action.shape == ():
             action = action[()]
-        whole = isinstance(action, numbers.Integral) and not isinstance(action, bool | np.bool_)
+        whole = isinstance(action, int | np.integer) and not isinstance(action, bool)
         if not whole or not 0 <= action <= HOME_CHOICE:
             raise ValueError(
                 f"action of {name} is {_shown(action)} of type {type(action).__name__}; "

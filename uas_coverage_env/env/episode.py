@@ -1,6 +1,5 @@
 """One mission as learners fly it: what the multi-agent and the single-agent environment share."""
 
-import numbers
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from uas_coverage_env.env.kernel import (
     step_episode,
 )
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
-from uas_coverage_env.env.nearest import NO_TARGET, neighbours_of
+from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
 from uas_coverage_env.env.observation import observe, scales_of
 from uas_coverage_env.env.rewards import REWARD_TERMS, weights_of
 from uas_coverage_env.scenario import Scenario, load_scenario
@@ -111,13 +110,14 @@ class Episode:
         self.asked = np.zeros((n_uas, 4))
         self._targets = np.full(n_uas, NO_TARGET)
         self._candidates = np.full((n_uas, K_WAYPOINTS), -1)
+        self._company = np.zeros((len(scenario.waypoints), 2))
         self._commands = np.zeros(n_uas, dtype=COMMAND_DTYPE)
         self._outcome = np.zeros(n_uas, dtype=OUTCOME_DTYPE)
         self._report = np.zeros((n_uas, REPORT_SIZE))
         self.observation = np.zeros((n_uas, OBSERVATION_SIZE), np.float32)
         self.steps = 0
         # what the kernel is given in every step: the arrays are written in place
-        self._fixed = (
+        self._fixed: tuple[Any, ...] = (
             *self._world.arena,
             *self._world.state,
             self.actions.kind,
@@ -131,6 +131,7 @@ class Episode:
             self.asked,
             self._targets,
             self._candidates,
+            self._company,
             self._commands,
             self._outcome,
             self._report,
@@ -150,11 +151,12 @@ class Episode:
         self._report[:, STATUS] = world.state.status
         self._report[:, COVERED] = (~world.state.uncovered).sum()
         self.observation = np.empty_like(self.observation)
+        count_company(world.state.uncovered, self._neighbours, self._company)
         observe(
             world.arena,
             world.state,
             self._scales,
-            self._neighbours,
+            self._company,
             world.state.status == FLYING,
             self._targets,
             self.max_cycles,
@@ -172,7 +174,8 @@ class Episode:
             ValueError: An action is not finite; names UAS and value, and nothing has changed.
         """
         observation = self.observation.copy()
-        invalid = step_episode(*self._fixed, self.max_cycles, observation)
+        given: tuple[Any, ...] = (*self._fixed, self.max_cycles, observation)
+        invalid = step_episode(*given)
         if invalid != ACCEPTED:
             numbers_asked = self.asked[invalid, : self.actions.size].tolist()
             self.asked[invalid] = 0.0
@@ -251,7 +254,7 @@ class Episode:
 
 def _cut(scenario: Scenario, max_cycles: int) -> Scenario:
     """The scenario with another limit of steps; return mode and the observed time know it."""
-    whole = isinstance(max_cycles, numbers.Integral) and not isinstance(max_cycles, bool)
+    whole = isinstance(max_cycles, int | np.integer) and not isinstance(max_cycles, bool)
     if not whole or not 1 <= max_cycles <= _LONGEST:
         raise ValueError(f"max_cycles is {max_cycles!r}; give a whole number from 1 to {_LONGEST}")
     return scenario.model_copy(update={"max_steps": int(max_cycles)})

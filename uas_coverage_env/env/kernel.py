@@ -3,6 +3,7 @@
 from numba import njit
 
 from uas_coverage_env.env.actions import first_not_finite, write_commands
+from uas_coverage_env.env.nearest import count_company
 from uas_coverage_env.env.observation import observe
 from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.world import FLYING, Arena, WorldState, advance
@@ -21,7 +22,7 @@ ACCEPTED = -1
 @njit(cache=True, error_model="numpy")
 def step_learners(
     arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode, safety_filter,
-    asked, targets, candidates, commands, outcome, report, max_cycles, observation,
+    asked, targets, candidates, company, commands, outcome, report, max_cycles, observation,
 ):  # fmt: skip
     """Fly one step, pay for it and look around.
 
@@ -39,6 +40,7 @@ def step_learners(
         asked: (U, 4) the actions.
         targets: (U,) where each is flying to (waypoint action); written.
         candidates: (U, K_WAYPOINTS) as in the last observation; written.
+        company: (W, 2) see `count_company`; written.
         commands: (U,) of COMMAND_DTYPE; written.
         outcome: (U,) of OUTCOME_DTYPE; written.
         report: (U, REPORT_SIZE) reward terms, then the columns named above; written.
@@ -57,6 +59,7 @@ def step_learners(
     over = state.step[0] >= max_cycles
     pay(arena, state, was_flying, commands, outcome, weights, over, report)
     covered = state.uncovered.shape[0] - state.uncovered.sum()
+    newly_covered = 0
     for i in range(report.shape[0]):
         event = outcome[i]
         report[i, ENERGY] += event.energy_Wh
@@ -66,9 +69,10 @@ def step_learners(
         report[i, FILTERED] = event.filtered
         report[i, RETURNING] = event.returning
         report[i, COVERED] = covered
-    observe(
-        arena, state, scales, neighbours, was_flying, targets, max_cycles, candidates, observation
-    )
+        newly_covered += event.newly_covered
+    if newly_covered > 0:
+        count_company(state.uncovered, neighbours, company)
+    observe(arena, state, scales, company, was_flying, targets, max_cycles, candidates, observation)
     return ACCEPTED
 
 
@@ -78,7 +82,7 @@ def step_episode(
     waypoints, rules, nodes_m, node_distance_m,
     x, reference, status, departed, returning, uncovered, step,
     kind, ranges, scales, neighbours, weights, nonlinear, return_mode, safety_filter,
-    asked, targets, candidates, commands, outcome, report, max_cycles, observation,
+    asked, targets, candidates, company, commands, outcome, report, max_cycles, observation,
 ):  # fmt: skip
     """`step_learners` called from Python: arrays one by one cost less than two named tuples."""
     arena = Arena(
@@ -88,6 +92,6 @@ def step_episode(
     state = WorldState(x, reference, status, departed, returning, uncovered, step)
     return step_learners(
         arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode,
-        safety_filter, asked, targets, candidates, commands, outcome, report, max_cycles,
+        safety_filter, asked, targets, candidates, company, commands, outcome, report, max_cycles,
         observation,
     )  # fmt: skip

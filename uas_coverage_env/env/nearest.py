@@ -44,12 +44,13 @@ def neighbours_of(scenario: Scenario) -> NDArray[np.void]:
     positions_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
     neighbours = np.zeros(len(positions_m), dtype=NEIGHBOURS_DTYPE)
     neighbours["index"], neighbours["distance_m"] = -1, np.inf
-    distances_m, indices = KDTree(positions_m).query(positions_m, k=N_NEIGHBOURS + 1)
-    for w, entry in enumerate(neighbours):
-        others = (indices[w] != w) & (indices[w] < len(positions_m))
-        found = indices[w][others][:N_NEIGHBOURS]
-        entry["index"][: len(found)] = found
-        entry["distance_m"][: len(found)] = distances_m[w][others][:N_NEIGHBOURS]
+    answer = KDTree(positions_m).query(positions_m, k=N_NEIGHBOURS + 1)
+    for w, (away_m, others) in enumerate(zip(*map(np.asarray, answer), strict=True)):
+        # the query finds the waypoint itself, and W where there are no more
+        found = (others != w) & (others < len(positions_m))
+        n = min(int(found.sum()), N_NEIGHBOURS)
+        neighbours["index"][w, :n] = others[found][:n]
+        neighbours["distance_m"][w, :n] = away_m[found][:n]
     return neighbours
 
 
@@ -85,21 +86,30 @@ def nearest_waypoints(arena, state, i, candidates, nearest_m2):
 
 
 @njit(cache=True, error_model="numpy")
-def _company(state, neighbours):
-    """Distance of the next open waypoint [m], and how many are within CROWD_M, at most CROWD."""
-    next_m = math.inf
-    crowd = 0
-    for n in range(N_NEIGHBOURS):
-        other = neighbours.index[n]
-        if other < 0:
-            break
-        if state.uncovered[other]:
-            distance_m = neighbours.distance_m[n]
-            next_m = min(next_m, distance_m)
-            if distance_m > CROWD_M or crowd == CROWD:
+def count_company(uncovered, neighbours, company):
+    """Write what is open around every waypoint; it changes only when a waypoint is covered.
+
+    Args:
+        uncovered: (W,) still to be covered.
+        neighbours: (W,) of NEIGHBOURS_DTYPE.
+        company: (W, 2) closeness of the next open waypoint, and how crowded it is; written.
+    """
+    for w in range(company.shape[0]):
+        index = neighbours[w].index
+        distance_m = neighbours[w].distance_m
+        next_m = math.inf
+        crowd = 0
+        for n in range(N_NEIGHBOURS):
+            other = index[n]
+            if other < 0:
                 break
-            crowd += 1
-    return next_m, crowd
+            if uncovered[other]:
+                next_m = min(next_m, distance_m[n])
+                if distance_m[n] > CROWD_M or crowd == CROWD:
+                    break
+                crowd += 1
+        company[w, 0] = close(next_m)
+        company[w, 1] = crowd / CROWD
 
 
 @njit(cache=True, error_model="numpy")
@@ -118,7 +128,7 @@ def _rival(state, i, position_m, targets, w):
 
 
 @njit(cache=True, error_model="numpy")
-def waypoints(arena, state, scale, neighbours, i, targets, candidates, row, k):
+def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     """Write the open waypoints nearest to UAS i; returns the next column."""
     uas = arena.uas[i]
     x = state.x[i]
@@ -138,7 +148,6 @@ def waypoints(arena, state, scale, neighbours, i, targets, candidates, row, k):
             waypoint.position_m[1] - uas.home_m[1],
             waypoint.position_m[2] - uas.home_m[2],
         )
-        neighbour_m, crowd = _company(state, neighbours[w])
         rival_m, taken = _rival(state, i, waypoint.position_m, targets, w)
         tour_dod = (there_m + home_m) / uas.speed_mps * uas.dod_per_s
         row[k] = 1.0
@@ -146,8 +155,8 @@ def waypoints(arena, state, scale, neighbours, i, targets, candidates, row, k):
         row[k + 3] = close(there_m)
         row[k + 4] = within(dz / HEIGHT_M, -1.0, 1.0)
         row[k + 5] = within(waypoint.weight * scale.per_heaviest, 0.0, 1.0)
-        row[k + 6] = close(neighbour_m)
-        row[k + 7] = within(crowd / CROWD, 0.0, 1.0)
+        row[k + 6] = company[w, 0]
+        row[k + 7] = company[w, 1]
         row[k + 8] = close(rival_m)
         row[k + 9] = 1.0 if taken else 0.0
         row[k + 10] = close(home_m)

@@ -90,14 +90,14 @@ def scales_of(scenario: Scenario) -> NDArray[np.void]:
 
 
 @njit(cache=True, error_model="numpy")
-def observe(arena, state, scales, neighbours, sees, targets, max_cycles, candidates, observation):
+def observe(arena, state, scales, company, sees, targets, max_cycles, candidates, observation):
     """Write the observations of those UAS that are to see.
 
     Args:
         arena: The arena.
         state: The state of the world.
         scales: (U,) of SCALES_DTYPE.
-        neighbours: (W,) of NEIGHBOURS_DTYPE.
+        company: (W, 2) see `count_company`.
         sees: (U,) whose observations are written; those of the others stay.
         targets: (U,) where each is flying to; NO_TARGET where unknown.
         max_cycles: Steps after which the episode is cut.
@@ -115,7 +115,7 @@ def observe(arena, state, scales, neighbours, sees, targets, max_cycles, candida
         k = _own(arena, state, scales[i], i, home_dod, max_cycles, row, 0) + _HOME_SIZE
         k = _remaining(arena, state, i, row, k)
         k = surroundings(arena, state, i, row, k)
-        k = waypoints(arena, state, scales[i], neighbours, i, targets, candidates[i], row, k)
+        k = waypoints(arena, state, scales[i], company, i, targets, candidates[i], row, k)
         k = others(arena, state, scales[i], i, row, k)
         moving_obstacles(arena, state, scales[i], i, row, k)
 

@@ -98,7 +98,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         v0: First version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
         "name": "uas_coverage_v0",
         "render_modes": list(RENDER_MODES),
         "render_fps": RENDER_FPS,
@@ -134,7 +134,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
         low, high = observation_bounds()
         # one object per agent: a learner seeds them one by one
-        self._observation_spaces = {
+        self._observation_spaces: dict[str, Any] = {
             agent: spaces.Box(low, high, dtype=np.float32) for agent in self.possible_agents
         }
         self._action_spaces = {
@@ -157,7 +157,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """The scenario flown."""
         return self._episode.scenario
 
-    def observation_space(self, agent: str) -> spaces.Box:
+    def observation_space(self, agent: str) -> spaces.Space[NDArray[np.float32]]:
         """The space of an agent's observations; always the same object."""
         return self._observation_spaces[agent]
 
@@ -216,6 +216,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         known = type(actions) is dict or isinstance(actions, Mapping)
         if not known or len(actions) != len(agents):
             self._refuse(actions)
+        if not agents:
+            return {}, {}, {}, {}, {}
         accept, asked = episode.actions.accept, episode.asked
         for agent in agents:
             if agent not in actions:

@@ -57,16 +57,17 @@ def _ray_out(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
 @njit(cache=True, error_model="numpy")
 def _out_of_sight(obstacle, x, y, z):
     """Whether the obstacle is surely farther than rays and clearance reach."""
-    # its box holds all that is nearer than near_m: from RAY_M outside of it nothing is seen
+    # its box reaches near_m farther than the hull in every direction
+    beyond_m = max(0.0, RAY_M - obstacle.near_m)
     lower = obstacle.lower_m
     upper = obstacle.upper_m
     return (
-        x < lower[0] - RAY_M
-        or x > upper[0] + RAY_M
-        or y < lower[1] - RAY_M
-        or y > upper[1] + RAY_M
-        or z < lower[2] - RAY_M
-        or z > upper[2] + RAY_M
+        x < lower[0] - beyond_m
+        or x > upper[0] + beyond_m
+        or y < lower[1] - beyond_m
+        or y > upper[1] + beyond_m
+        or z < lower[2] - beyond_m
+        or z > upper[2] + beyond_m
     )
 
 

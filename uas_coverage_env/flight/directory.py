@@ -121,6 +121,8 @@ def _flight_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
 
 def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     rows = _rows(text, FLIGHT_COLUMNS)
+    if not rows:
+        raise ValueError("it holds no sample")
     index = {uas.name: i for i, uas in enumerate(scenario.uas)}
     samples = 1 + _step(rows[-1][0], scenario)
     shape = (samples, len(index))

@@ -41,24 +41,22 @@ def battery_segments(vehicle: VehicleParams) -> tuple[BatterySegment, ...]:
     R0 = battery.resistance_0_ohm
     segments = []
     points = list(zip(battery.ocv_dod, battery.ocv_V, strict=True))
-    for (dod, volt), (dod_end, volt_end), dod_linearised in zip(
-        points, points[1:], battery.ocv_dod_linearised, strict=False
+    for (dod, volt), (dod_end, volt_end), E in zip(
+        points, points[1:], battery.voltages_linearised_V, strict=False
     ):
         slope = (volt - volt_end) / (dod_end - dod)
         ocv = volt + slope * dod
-        drop = slope * dod_linearised + battery.polarisation_linearised_V
-        E = ocv - drop
         current = (E - math.sqrt(E * E - 4.0 * R0 * power.hover_W)) / (2.0 * R0)
         stiffness = E - 2.0 * R0 * current
         segments.append(
             BatterySegment(
-                dod_end,
-                ocv,
-                slope,
-                current,
-                current / stiffness,
-                power.slope_W_per_N / stiffness,
-                drop,
+                dod_end=dod_end,
+                ocv_V=ocv,
+                ocv_slope_V=slope,
+                current_A=current,
+                current_A_per_V=current / stiffness,
+                current_A_per_N=power.slope_W_per_N / stiffness,
+                drop_V=ocv - E,
             )
         )
     return tuple(segments)

@@ -12,6 +12,7 @@ from uas_coverage_env.vehicle.params import VehicleParams
 
 MAX_SEGMENTS = 8
 MAX_GOVERNOR_ROWS = 128
+MAX_MOTORS = 32
 PHYSICAL_SIDES = 8
 """H_P, the sides of the polygons that stand for norms in the thrust correction."""
 
@@ -75,11 +76,13 @@ VEHICLE_DTYPE = np.dtype(
                 ("governor_rows", _f8, (MAX_GOVERNOR_ROWS, 5)),
                 # nonlinear plant
                 ("n_motors", _i8),
+                # motor thrusts from (thrust, torques), and torques from each motor's thrust
+                ("mixer", _f8, (MAX_MOTORS, 4)),
+                ("rotor_map", _f8, (MAX_MOTORS, 3)),
                 ("drag_kgps", _f8),
                 ("drag_vertical_kgps", _f8),
                 ("gravity_mps2", _f8),
                 ("arm_m", _f8),
-                ("first_arm_angle_rad", _f8),
                 ("thrust_N_per_radps2", _f8),
                 ("torque_Nm_per_radps2", _f8),
                 ("propeller_radius_m", _f8),
@@ -168,7 +171,6 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
         "drag_vertical_kgps",
         "gravity_mps2",
         "arm_m",
-        "first_arm_angle_rad",
     ):
         record[name] = getattr(body, name)
     rotor, motor = vehicle.rotor, vehicle.motor
@@ -181,6 +183,9 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
         "air_density_kgpm3",
     ):
         record[name] = getattr(rotor, name)
+    torques = _rotor_map(vehicle)
+    record["rotor_map"][0, : len(torques)] = torques
+    record["mixer"][0, : len(torques)] = _mixer(torques)
     record["motor_speed_max_radps"] = rotor.speed_max_radps
     record["back_emf_Vs_per_rad"] = motor.back_emf_Vs_per_rad
     record["motor_resistance_ohm"] = motor.resistance_ohm
@@ -189,3 +194,23 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     record["esc_efficiency"] = vehicle.esc.efficiency
     record["auxiliary_W"], record["hover_W"] = vehicle.power.auxiliary_W, vehicle.power.hover_W
     return record.reshape(())
+
+
+def _rotor_map(vehicle: VehicleParams) -> NDArray[np.float64]:
+    """(N_M, 3) torques per thrust of each rotor about forward, right and down [m].
+
+    Rotors equally spaced around the centre, neighbours turning against each other.
+    """
+    body, rotor = vehicle.airframe, vehicle.rotor
+    number = np.arange(body.n_motors)
+    angle = body.first_arm_angle_rad + 2.0 * np.pi * number / body.n_motors
+    reaction_m = rotor.torque_Nm_per_radps2 / rotor.thrust_N_per_radps2
+    spin = np.where(number % 2 == 0, 1.0, -1.0) * (body.n_motors > 3)
+    return np.column_stack(
+        [-body.arm_m * np.sin(angle), body.arm_m * np.cos(angle), reaction_m * spin]
+    )
+
+
+def _mixer(rotor_map: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N_M, 4) pseudo-inverse of the map from motor thrusts to thrust and torques."""
+    return np.linalg.pinv(np.column_stack([np.ones(len(rotor_map)), rotor_map]).T)

@@ -7,7 +7,8 @@ admissible, because the tail of the last prediction was (see `governor`): no bou
 exceeded, and no program has to be solved.
 
 The reference (2,) [m/s] is memory of the loop, kept by the caller: zero at the start of a flight.
-After wrenches that the loop did not make, `reseed_reference` lets it take over.
+After wrenches that the loop did not make, `reseed_reference` lets it take over. If such wrenches
+led far beyond the bounds, the UAS is levelled out first, with torques within their limits.
 """
 
 import math
@@ -32,6 +33,8 @@ from uas_coverage_env.vehicle.layout import (
 )
 
 _TINY = 1e-12
+_FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant, say, goes on
+_HALVES = math.sqrt(0.5)  # of a norm for each of two axes
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,16 +136,51 @@ def _speed_towards(distance, speed, per_speed, per_next_speed, brake):
 
 
 @njit(cache=True, error_model="numpy")
+def _far_outside(vehicle, x, reference):
+    """Whether the state breaks a governor row by so much that the feedback would saturate."""
+    for q in range(vehicle.n_governor_rows):
+        row = vehicle.governor_rows[q]
+        n = row[0] * x[VX] - row[1] * x[THETA] - row[2] * x[WY] + row[3] * reference[0]
+        e = row[0] * x[VY] + row[1] * x[PHI] + row[2] * x[WX] + row[3] * reference[1]
+        bound = _FAR_OUTSIDE * row[4]
+        if n * n + e * e > bound * bound:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def _turn_towards(vehicle, angle, rate, wanted, rate_max, alpha_max):
+    """Angular acceleration that brings an angle to a wanted one, within its limits, and stops."""
+    dt = vehicle.dt_s
+    sign = 1.0 if wanted >= angle else -1.0
+    following = _speed_towards(
+        sign * (wanted - angle), sign * rate, 0.5 * dt, 0.5 * dt, dt * alpha_max
+    )
+    following = sign * min(max(following, -rate_max), rate_max)
+    return min(max((following - rate) / dt, -alpha_max), alpha_max)
+
+
+@njit(cache=True, error_model="numpy")
+def _level_out(vehicle, x, u):
+    """Torques to a level attitude; leaning against the velocity while that is beyond its limit."""
+    speed = math.hypot(x[VX], x[VY])
+    lean = 0.0
+    if speed > vehicle.reference_max_mps:
+        lean = -0.5 * vehicle.tilt_max_rad / speed
+    rate = _HALVES * vehicle.rate_max_radps
+    alpha = _HALVES * vehicle.alpha_xy_max_radps2
+    roll = _turn_towards(vehicle, x[PHI], x[WX], lean * x[VY], rate, alpha)
+    pitch = _turn_towards(vehicle, x[THETA], x[WY], -lean * x[VX], rate, alpha)
+    u[TAU_X] = vehicle.inertia_kgm2[0] * roll
+    u[TAU_Y] = vehicle.inertia_kgm2[1] * pitch
+
+
+@njit(cache=True, error_model="numpy")
 def _hold_heading(vehicle, x, u):
     """Yaw torque that brings the heading to 0, at which the model is linearised, and keeps it."""
-    dt = vehicle.dt_s
-    towards = -1.0 if x[PSI] > 0.0 else 1.0
-    brake = vehicle.alpha_z_max_radps2 * dt
-    rate = _speed_towards(abs(x[PSI]), towards * x[WZ], 0.5 * dt, 0.5 * dt, brake)
-    rate = min(max(rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
-    alpha = (towards * rate - x[WZ]) / dt
-    alpha = min(max(alpha, -vehicle.alpha_z_max_radps2), vehicle.alpha_z_max_radps2)
-    u[TAU_Z] = vehicle.inertia_kgm2[2] * alpha
+    u[TAU_Z] = vehicle.inertia_kgm2[2] * _turn_towards(
+        vehicle, x[PSI], x[WZ], 0.0, vehicle.yaw_rate_max_radps, vehicle.alpha_z_max_radps2
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,8 +204,13 @@ def velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down_mps, 
         down_mps: [m/s] positive down, kept within its limits.
         u: (5,) lift and torques are written.
     """
+    if _far_outside(vehicle, x, reference):
+        reseed_reference(x, reference)
     _govern(vehicle, x, reference, north_mps, east_mps)
-    _track(vehicle, x, reference, u)
+    if _far_outside(vehicle, x, reference):
+        _level_out(vehicle, x, u)
+    else:
+        _track(vehicle, x, reference, u)
     _hold_heading(vehicle, x, u)
     _lift_towards(vehicle, x, down_mps, u)
 

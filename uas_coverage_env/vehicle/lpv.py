@@ -56,7 +56,8 @@ def _segment(vehicle, dod):
 
 @njit(cache=True, error_model="numpy")
 def open_circuit_V(vehicle, dod):
-    """Open-circuit voltage at a depth of discharge [V]."""
+    """Open-circuit voltage at a depth of discharge [V]; the curve stays flat beyond its ends."""
+    dod = min(max(dod, 0.0), 1.0)
     j = _segment(vehicle, dod)
     return vehicle.ocv_V[j] - vehicle.ocv_slope_V[j] * dod
 
@@ -79,6 +80,8 @@ def lpv_step(vehicle, x, u, x_next):
     drop = vehicle.ocv_slope_V[j] * x[DOD] + x[U_TH] - vehicle.drop_V[j]
     current = vehicle.current_A[j] + vehicle.current_A_per_V[j] * drop
     current += vehicle.current_A_per_N[j] * u[DELTA_THRUST]
+    # nothing flows back, however little thrust a vehicle's limits allow
+    current = max(current, 0.0)
     open_circuit = vehicle.ocv_V[j] - vehicle.ocv_slope_V[j] * x[DOD]
     voltage = open_circuit - x[U_TH] - vehicle.resistance_0_ohm * current
     decay = vehicle.polarisation_decay

@@ -11,6 +11,8 @@ from pydantic import Field, model_validator
 
 from uas_coverage_env.strict_toml import InputError, StrictModel, read_toml
 
+_FILES = resources.files("uas_coverage_env.vehicle")
+
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Negative = Annotated[float, Field(lt=0.0)]
@@ -20,10 +22,11 @@ Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 class Airframe(StrictModel):
     """Rigid body and rotor arrangement (the paper's Assumption 1: rotors equally spaced).
 
-    Neighbouring rotors turn against each other, so their number is even.
+    Neighbouring rotors turn against each other. Three rotors cannot balance their yaw torque that
+    way: of a tricopter, one rotor is taken to be tilted for it.
     """
 
-    n_motors: Annotated[int, Field(ge=4, le=32, multiple_of=2)]
+    n_motors: Annotated[int, Field(ge=3, le=32)]
     mass_kg: Positive
     gravity_mps2: Positive
     arm_m: Positive
@@ -95,19 +98,44 @@ class Battery(StrictModel):
         if dod[0] != 0.0 or dod[-1] != 1.0:
             raise ValueError(f"ocv_dod runs from {dod[0]} to {dod[-1]}; it must run from 0 to 1")
         if any(b <= a for a, b in pairwise(dod)):
-            raise ValueError("ocv_dod must increase from point to point")
+            raise ValueError(f"ocv_dod is {list(dod)}; it must increase from point to point")
         if any(b >= a for a, b in pairwise(volt)):
-            raise ValueError("ocv_V must fall from point to point")
+            raise ValueError(f"ocv_V is {list(volt)}; it must fall from point to point")
         if len(self.ocv_dod_linearised) != len(dod) - 1:
             raise ValueError(
                 f"ocv_dod_linearised has {len(self.ocv_dod_linearised)} values; "
                 f"give one for each of the {len(dod) - 1} segments"
             )
+        if any(point > 1.0 for point in self.ocv_dod_linearised):
+            raise ValueError(
+                f"ocv_dod_linearised is {list(self.ocv_dod_linearised)}; give values from 0 to 1"
+            )
         if self.dod_max > self.dod_cutoff:
-            raise ValueError(f"dod_max {self.dod_max} exceeds dod_cutoff {self.dod_cutoff}")
+            raise ValueError(
+                f"dod_max {self.dod_max} exceeds dod_cutoff {self.dod_cutoff}; lower it"
+            )
         if self.voltage_min_V >= volt[0]:
-            raise ValueError(f"voltage_min_V {self.voltage_min_V} exceeds the full battery's")
+            raise ValueError(
+                f"voltage_min_V {self.voltage_min_V} exceeds the full battery's {volt[0]} V; "
+                "lower it"
+            )
         return self
+
+    @property
+    def voltages_linearised_V(self) -> tuple[float, ...]:
+        """Voltage behind R_0 at which the current is linearised, for each piece of the curve [V].
+
+        The piece's straight line, extrapolated where need be, less the polarisation.
+        """
+        points = list(zip(self.ocv_dod, self.ocv_V, strict=True))
+        return tuple(
+            volt
+            + (volt - volt_end) / (dod_end - dod) * (dod - dod_linearised)
+            - self.polarisation_linearised_V
+            for (dod, volt), (dod_end, volt_end), dod_linearised in zip(
+                points, points[1:], self.ocv_dod_linearised, strict=False
+            )
+        )
 
 
 class Limits(StrictModel):
@@ -132,7 +160,8 @@ class Limits(StrictModel):
     def _cruise_below_maximum(self) -> Self:
         if self.v_cruise_mps > self.v_xy_max_mps:
             raise ValueError(
-                f"v_cruise_mps {self.v_cruise_mps} exceeds v_xy_max_mps {self.v_xy_max_mps}"
+                f"v_cruise_mps {self.v_cruise_mps} exceeds v_xy_max_mps {self.v_xy_max_mps}; "
+                "lower it"
             )
         return self
 
@@ -169,28 +198,38 @@ class VehicleParams(StrictModel):
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         body, limits = self.airframe, self.limits
-        if -limits.delta_thrust_min_N >= self.weight_N:
-            raise ValueError(
-                f"limits.delta_thrust_min_N {limits.delta_thrust_min_N} takes away more than the "
-                f"weight, {self.weight_N:.4g} N"
-            )
+        for name in ("delta_thrust_min_N", "lift_min_N"):
+            if -getattr(limits, name) >= self.weight_N:
+                raise ValueError(
+                    f"limits.{name} {getattr(limits, name)} takes away more than the weight, "
+                    f"{self.weight_N:.4g} N; raise it"
+                )
         strongest = body.n_motors * self.rotor.thrust_N_per_radps2 * self.rotor.speed_max_radps**2
-        needed = self.weight_N + max(limits.lift_max_N, 0.0)
+        needed = self.weight_N + limits.lift_max_N
         if strongest < needed:
             raise ValueError(
                 f"the rotors lift {strongest:.4g} N at rotor.speed_max_radps; "
-                f"limits.lift_max_N asks for {needed:.4g} N"
+                f"limits.lift_max_N asks for {needed:.4g} N, lower it"
             )
         battery = self.battery
-        if battery.ocv_V[-1] ** 2 <= 4.0 * battery.resistance_0_ohm * self.power.hover_W:
+        # the current of a constant power is real where E² > 4 R_0 P; squares would hide E < 0
+        weakest = 2.0 * math.sqrt(battery.resistance_0_ohm * self.power.hover_W)
+        if battery.ocv_V[-1] <= weakest:
             raise ValueError(
-                f"battery.resistance_0_ohm {battery.resistance_0_ohm} is too high to hover"
+                f"battery.resistance_0_ohm {battery.resistance_0_ohm} is too high to hover on "
+                f"{battery.ocv_V[-1]} V; lower it"
+            )
+        if min(battery.voltages_linearised_V) <= weakest:
+            raise ValueError(
+                f"at battery.ocv_dod_linearised and battery.polarisation_linearised_V "
+                f"{battery.polarisation_linearised_V} there are only "
+                f"{min(battery.voltages_linearised_V):.4g} V, too few to hover; correct them"
             )
         trim = self.trim_tilt_rad_per_mps * limits.v_xy_max_mps
         if trim >= limits.tilt_max_rad:
             raise ValueError(
                 f"limits.tilt_max_rad {limits.tilt_max_rad} does not hold v_xy_max_mps, "
-                f"which needs {trim:.4g} rad"
+                f"which needs {trim:.4g} rad; raise it"
             )
         return self
 
@@ -218,8 +257,7 @@ class VehicleParams(StrictModel):
 
 def vehicle_names() -> tuple[str, ...]:
     """The names of the shipped vehicles."""
-    files = resources.files(__package__).iterdir()
-    return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
+    return tuple(sorted(f.name[:-5] for f in _FILES.iterdir() if f.name.endswith(".toml")))
 
 
 def load_vehicle(name_or_path: str | Path) -> VehicleParams:
@@ -233,7 +271,7 @@ def load_vehicle(name_or_path: str | Path) -> VehicleParams:
     """
     text = str(name_or_path)
     if text in vehicle_names():
-        with resources.as_file(resources.files(__package__) / f"{text}.toml") as path:
+        with resources.as_file(_FILES / f"{text}.toml") as path:
             return read_toml(path, VehicleParams)
     if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text:
         return read_toml(name_or_path, VehicleParams)
@@ -254,5 +292,4 @@ def return_threshold(vehicle: VehicleParams, dod_max: float | None = None) -> fl
     battery = vehicle.battery
     energy_J = 3600.0 * battery.capacity_Ah * battery.voltage_nominal_V
     taken = vehicle.power.hover_W * vehicle.return_rule.distance_over_speed_s / energy_J
-    result = (battery.dod_max if dod_max is None else dod_max) - taken
-    return result if math.isfinite(result) else 0.0
+    return (battery.dod_max if dod_max is None else dod_max) - taken

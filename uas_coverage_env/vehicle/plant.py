@@ -1,8 +1,13 @@
 """The nonlinear plant: rigid body, rotors, power train and Thevenin battery, compiled.
 
-It is flown by the same wrenches as the LPV model. Within a step a fast attitude loop tracks the
-attitude that the step's torques give in the LPV model (a torque held open loop for a whole second
-would drift), and the thrust is turned so that its vertical part stays weight plus lift.
+It is flown by the same wrenches as the LPV model. A torque held open loop for a whole second would
+drift, so a fast attitude loop tracks what the LPV model predicts for the step from its first
+state, theta_lin(t). There, tilt is horizontal acceleration over g, which is the tangent of the
+real one under a thrust whose vertical part is weight plus lift: the loop follows
+theta = atan(theta_lin(t)), and the velocities of the step come out as predicted.
+
+Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, and the
+loss of motor speed with a falling battery voltage.
 """
 
 import math
@@ -14,148 +19,247 @@ from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
     LIFT,
-    N_STATES,
     PHI,
     PSI,
     TAU_X,
+    TAU_Y,
+    TAU_Z,
     THETA,
     U_TH,
     VX,
     VY,
     VZ,
     WX,
+    WY,
     WZ,
     X,
 )
-from uas_coverage_env.vehicle.lpv import open_circuit_V
-from uas_coverage_env.vehicle.powertrain import battery_current_A, electrical_power_W
-from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust
+from uas_coverage_env.vehicle.powertrain import battery_operating_point, electrical_power_W
+from uas_coverage_env.vehicle.thrust_correction import static_thrust
 
 _SUBSTEP_S = 0.02
-_STIFFNESS_PER_S2 = 100.0  # attitude loop: 10 rad/s, critically damped
-_DAMPING_PER_S = 20.0
-_TILT_MAX_RAD = 1.2  # beyond this the Euler angles are held: no flight of ours goes there
+# attitude loop: angle over rate, critically damped at 10 rad/s
+_ANGLE_GAIN_PER_S = 5.0
+_RATE_GAIN_PER_S = 20.0
+# what the flight controller refuses to ask for, whatever the wrench says
+_TILT_ASKED_RAD = 1.0
+_RATE_ASKED_RADPS = 5.0
+# stops of the simulation, far from any flight of ours: Euler angles end at 90 degrees
+_TILT_STOP_RAD = 1.3
+_RATE_STOP_RADPS = 50.0
+_UPRIGHT_MIN = 0.3
+_RIGID = DOD
 
 
 @njit(cache=True, error_model="numpy")
 def mix(vehicle, thrust_N, torque, motor_thrust_N):
     """Thrust and torque (3,) as N_M motor thrusts, each within what a motor can give.
 
-    The pseudo-inverse of the rotor map in closed form: rotors equally spaced, neighbours turning
-    against each other. Returns the total thrust; `torque` becomes what the motors give.
+    Motor thrusts are the pseudo-inverse of the rotor map, clipped. Returns the total thrust;
+    `torque` becomes what the motors give.
     """
-    n, arm = vehicle.n_motors, vehicle.arm_m
-    ratio = vehicle.torque_Nm_per_radps2 / vehicle.thrust_N_per_radps2
+    n = vehicle.n_motors
     strongest = vehicle.thrust_N_per_radps2 * vehicle.motor_speed_max_radps**2
-    total, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
+    total = 0.0
+    roll = 0.0
+    pitch = 0.0
+    yaw = 0.0
     for i in range(n):
-        angle = vehicle.first_arm_angle_rad + 2.0 * math.pi * i / n
-        spin = 1.0 if i % 2 == 0 else -1.0
-        share = thrust_N / n + spin * torque[2] / (n * ratio)
-        share += 2.0 / (n * arm) * (math.cos(angle) * torque[1] - math.sin(angle) * torque[0])
-        share = min(max(share, 0.0), strongest)
+        mixer = vehicle.mixer[i]
+        share = mixer[0] * thrust_N + mixer[1] * torque[0] + mixer[2] * torque[1]
+        share = min(max(share + mixer[3] * torque[2], 0.0), strongest)
         motor_thrust_N[i] = share
+        rotor = vehicle.rotor_map[i]
         total += share
-        roll -= arm * math.sin(angle) * share
-        pitch += arm * math.cos(angle) * share
-        yaw += spin * ratio * share
-    torque[0], torque[1], torque[2] = roll, pitch, yaw
+        roll += rotor[0] * share
+        pitch += rotor[1] * share
+        yaw += rotor[2] * share
+    if n == 3:
+        # a tricopter tilts one rotor, by 30 degrees at most
+        most = 0.5 * vehicle.arm_m * total / n
+        yaw = min(max(torque[2], -most), most)
+    torque[0] = roll
+    torque[1] = pitch
+    torque[2] = yaw
     return total
 
 
 @njit(cache=True, error_model="numpy")
-def _derivative(vehicle, x, thrust_N, torque, power_W, dx):
-    """Dx = f(x) with thrust, torque and battery power held."""
-    phi = min(max(x[PHI], -_TILT_MAX_RAD), _TILT_MAX_RAD)
-    theta = min(max(x[THETA], -_TILT_MAX_RAD), _TILT_MAX_RAD)
-    sp, cp, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
-    ss, cs = math.sin(x[PSI]), math.cos(x[PSI])
-    inertia, mass = vehicle.inertia_kgm2, vehicle.mass_kg
-    push = thrust_N / mass
-    for axis in range(3):
-        dx[X + axis] = x[VX + axis]
-    dx[VX] = -push * (cp * st * cs + sp * ss) - vehicle.drag_kgps / mass * x[VX]
-    dx[VY] = -push * (cp * st * ss - sp * cs) - vehicle.drag_kgps / mass * x[VY]
-    dx[VZ] = vehicle.gravity_mps2 - push * cp * ct - vehicle.drag_vertical_kgps / mass * x[VZ]
-    p, q, r = x[WX], x[WX + 1], x[WZ]
-    dx[PHI] = p + (sp * q + cp * r) * st / ct
-    dx[THETA] = cp * q - sp * r
-    dx[PSI] = (sp * q + cp * r) / ct
-    dx[WX] = (torque[0] - (inertia[2] - inertia[1]) * q * r) / inertia[0]
-    dx[WX + 1] = (torque[1] - (inertia[0] - inertia[2]) * r * p) / inertia[1]
-    dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
-    current = battery_current_A(vehicle, x[DOD], x[U_TH], power_W)
-    dx[DOD] = current / vehicle.capacity_As
-    dx[U_TH] = (vehicle.resistance_th_ohm * current - x[U_TH]) / vehicle.time_constant_th_s
+def _euler_rates(x, rates):
+    """Psi' = W(phi, theta) omega, into rates (3,)."""
+    sp = math.sin(x[PHI])
+    cp = math.cos(x[PHI])
+    around = (sp * x[WY] + cp * x[WZ]) / math.cos(x[THETA])
+    rates[0] = x[WX] + around * math.sin(x[THETA])
+    rates[1] = cp * x[WY] - sp * x[WZ]
+    rates[2] = around
 
 
 @njit(cache=True, error_model="numpy")
-def _attitude_loop(vehicle, x, x0, u, time_s, torque):
-    """Torque that tracks the attitude of the LPV model under the step's torques."""
+def _rigid_body(vehicle, x, thrust_N, torque, dx):
+    """The twelve derivatives of the rigid body with thrust and torque held."""
+    sp = math.sin(x[PHI])
+    cp = math.cos(x[PHI])
+    st = math.sin(x[THETA])
+    ct = math.cos(x[THETA])
+    ss = math.sin(x[PSI])
+    cs = math.cos(x[PSI])
+    push = thrust_N / vehicle.mass_kg
+    drag = vehicle.drag_kgps / vehicle.mass_kg
     for axis in range(3):
-        alpha = u[TAU_X + axis] / vehicle.inertia_kgm2[axis]
-        rate = x0[WX + axis] + alpha * time_s
-        angle = x0[PHI + axis] + x0[WX + axis] * time_s + 0.5 * alpha * time_s * time_s
-        wanted = alpha + _STIFFNESS_PER_S2 * (angle - x[PHI + axis])
-        wanted += _DAMPING_PER_S * (rate - x[WX + axis])
-        torque[axis] = vehicle.inertia_kgm2[axis] * wanted
+        dx[X + axis] = x[VX + axis]
+    dx[VX] = -push * (cp * st * cs + sp * ss) - drag * x[VX]
+    dx[VY] = -push * (cp * st * ss - sp * cs) - drag * x[VY]
+    dx[VZ] = vehicle.gravity_mps2 - push * cp * ct
+    dx[VZ] -= vehicle.drag_vertical_kgps / vehicle.mass_kg * x[VZ]
+    _euler_rates(x, dx[PHI:WX])
+    inertia = vehicle.inertia_kgm2
+    dx[WX] = (torque[0] - (inertia[2] - inertia[1]) * x[WY] * x[WZ]) / inertia[0]
+    dx[WY] = (torque[1] - (inertia[0] - inertia[2]) * x[WZ] * x[WX]) / inertia[1]
+    dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * x[WX] * x[WY]) / inertia[2]
+
+
+@njit(cache=True, error_model="numpy")
+def _asked(tangent, tangent_rate, tangent_acceleration, angle):
+    """Angle, rate and acceleration of atan(tangent), within what is asked for; into angle (3,)."""
+    largest = math.tan(_TILT_ASKED_RAD)
+    if abs(tangent) >= largest:
+        angle[0] = math.copysign(_TILT_ASKED_RAD, tangent)
+        angle[1] = 0.0
+        angle[2] = 0.0
+        return
+    slope = 1.0 / (1.0 + tangent * tangent)
+    angle[0] = math.atan(tangent)
+    angle[1] = min(max(slope * tangent_rate, -_RATE_ASKED_RADPS), _RATE_ASKED_RADPS)
+    angle[2] = slope * tangent_acceleration - 2.0 * tangent * angle[1] * angle[1]
+
+
+@njit(cache=True, error_model="numpy")
+def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
+    """Torque (3,) that tracks the attitude of the LPV model under the step's torques.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state now.
+        first: (6,) Euler angles and body rates at the start of the step.
+        u: (5,) wrench of the step.
+        time_s: [s] since the start of the step.
+        roll: (3,) room for angle, rate, acceleration.
+        pitch: (3,) room for the same.
+        torque: (3,) [N m] written.
+    """
+    inertia = vehicle.inertia_kgm2
+    alpha_roll = u[TAU_X] / inertia[0]
+    alpha_pitch = u[TAU_Y] / inertia[1]
+    alpha_yaw = u[TAU_Z] / inertia[2]
+    half = 0.5 * time_s
+    rate = first[4] + alpha_pitch * time_s
+    _asked(first[1] + (first[4] + rate) * half, rate, alpha_pitch, pitch)
+    # east, the acceleration over g is tan(phi) / cos(theta)
+    rate = first[3] + alpha_roll * time_s
+    linear = first[0] + (first[3] + rate) * half
+    ct = math.cos(pitch[0])
+    turn = math.sin(pitch[0]) * pitch[1]
+    _asked(linear * ct, rate * ct - linear * turn, alpha_roll * ct - 2.0 * rate * turn, roll)
+    yaw_rate = first[5] + alpha_yaw * time_s
+    yaw = first[2] + (first[5] + yaw_rate) * half
+    yaw_rate = min(max(yaw_rate, -_RATE_ASKED_RADPS), _RATE_ASKED_RADPS)
+    yaw_error = min(max(yaw - x[PSI], -1.0), 1.0)
+    # Euler rates wanted, then body rates by the inverse of W
+    phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[PHI])
+    theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[THETA])
+    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * yaw_error
+    sp = math.sin(x[PHI])
+    cp = math.cos(x[PHI])
+    st = math.sin(x[THETA])
+    ct = math.cos(x[THETA])
+    p = phi_rate - st * psi_rate
+    q = cp * theta_rate + sp * ct * psi_rate
+    r = cp * ct * psi_rate - sp * theta_rate
+    ahead_p = roll[2] - st * alpha_yaw
+    ahead_q = cp * pitch[2] + sp * ct * alpha_yaw
+    ahead_r = cp * ct * alpha_yaw - sp * pitch[2]
+    torque[0] = inertia[0] * (ahead_p + _RATE_GAIN_PER_S * (p - x[WX]))
+    torque[1] = inertia[1] * (ahead_q + _RATE_GAIN_PER_S * (q - x[WY]))
+    torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[WZ]))
+
+
+@njit(cache=True, error_model="numpy")
+def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
+    """One Runge-Kutta step of the rigid body in place; k, total, middle (12,) are room."""
+    for s in range(_RIGID):
+        total[s] = 0.0
+        middle[s] = x[s]
+    for stage in range(4):
+        _rigid_body(vehicle, middle, thrust_N, torque, k)
+        weight = 2.0 if stage == 1 or stage == 2 else 1.0
+        ahead = h if stage == 2 else 0.5 * h
+        for s in range(_RIGID):
+            total[s] += weight * k[s]
+            middle[s] = x[s] + ahead * k[s]
+    for s in range(_RIGID):
+        x[s] += h / 6.0 * total[s]
+    for axis in range(3):
+        x[WX + axis] = min(max(x[WX + axis], -_RATE_STOP_RADPS), _RATE_STOP_RADPS)
+    for axis in range(2):
+        x[PHI + axis] = min(max(x[PHI + axis], -_TILT_STOP_RAD), _TILT_STOP_RAD)
 
 
 @njit(cache=True, error_model="numpy")
 def plant_step(vehicle, x, u, x_next):
-    """One step of the nonlinear plant under a held wrench; writes u[DELTA_THRUST] (its mean).
+    """One step of the nonlinear plant under a held wrench.
 
     Args:
         vehicle: record of VEHICLE_DTYPE.
         x: (14,) state.
-        u: (5,) lift and torques held over the step.
+        u: (5,) lift and torques held over the step; u[DELTA_THRUST] is written, its mean.
         x_next: (14,) written; may be x itself.
 
     Returns:
-        voltage_V and current_A: mean current, and the voltage with which voltage · current · dt
-        is the step's energy.
+        voltage_V and current_A: the mean current, which gives the step's charge, and the voltage
+        with which voltage · current · dt is the step's energy (power averaged over the step).
     """
     steps = max(math.ceil(vehicle.dt_s / _SUBSTEP_S - 1e-9), 1)
     h = vehicle.dt_s / steps
-    x0, now = x.copy(), x.copy()
-    torque = np.zeros(3)
-    motors = np.zeros(vehicle.n_motors)
-    k1, k2 = np.empty(N_STATES), np.empty(N_STATES)
-    k3, k4 = np.empty(N_STATES), np.empty(N_STATES)
-    middle = np.empty(N_STATES)
-    correction, energy = 0.0, 0.0
+    left = math.exp(-h / vehicle.time_constant_th_s)
+    room = np.empty((7, _RIGID))
+    first = room[0, :6]
+    torque = room[1, :3]
+    roll = room[2, :3]
+    pitch = room[3, :3]
+    motors = np.empty(vehicle.n_motors)
+    for s in range(x.shape[0]):
+        x_next[s] = x[s]
+    for s in range(6):
+        first[s] = x_next[PHI + s]
+    correction = 0.0
+    charge = 0.0
+    energy = 0.0
     for step in range(steps):
-        upright = max(math.cos(now[PHI]) * math.cos(now[THETA]), 0.3)
-        _attitude_loop(vehicle, now, x0, u, step * h, torque)
-        thrust = mix(vehicle, (vehicle.weight_N + u[LIFT]) / upright, torque, motors)
-        extra = exact_delta_thrust(
-            vehicle, u[LIFT], now[PHI], now[THETA], now[PSI], now[VX], now[VY], now[VZ]
+        _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
+        # upright in the middle of the substep
+        _euler_rates(x_next, roll)
+        upright = math.cos(x_next[PHI] + 0.5 * h * roll[0])
+        upright *= math.cos(x_next[THETA] + 0.5 * h * roll[1])
+        thrust = (vehicle.weight_N + u[LIFT]) / max(upright, _UPRIGHT_MIN)
+        thrust = mix(vehicle, thrust, torque, motors)
+        static = static_thrust(
+            vehicle,
+            thrust,
+            x_next[PHI],
+            x_next[THETA],
+            x_next[PSI],
+            x_next[VX],
+            x_next[VY],
+            x_next[VZ],
         )
-        extra = max(extra, -vehicle.weight_N)
-        power = electrical_power_W(vehicle, vehicle.weight_N + extra)
-        u_th, dod = now[U_TH], now[DOD]
-        _derivative(vehicle, now, thrust, torque, power, k1)
-        middle[:] = now + 0.5 * h * k1
-        _derivative(vehicle, middle, thrust, torque, power, k2)
-        middle[:] = now + 0.5 * h * k2
-        _derivative(vehicle, middle, thrust, torque, power, k3)
-        middle[:] = now + h * k3
-        _derivative(vehicle, middle, thrust, torque, power, k4)
-        now += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        for axis in range(2):
-            now[PHI + axis] = min(max(now[PHI + axis], -_TILT_MAX_RAD), _TILT_MAX_RAD)
-        current = battery_current_A(vehicle, dod, u_th, power)
-        delivered = min(power, current * _terminal_V(vehicle, dod, u_th, current))
-        energy += delivered * h
-        correction += extra / steps
-    u[DELTA_THRUST] = correction
-    charge = (now[DOD] - x0[DOD]) * vehicle.capacity_As
-    x_next[:] = now
-    mean = charge / vehicle.dt_s
-    return energy / max(charge, 1e-12), mean
-
-
-@njit(cache=True, error_model="numpy")
-def _terminal_V(vehicle, dod, u_th_V, current_A):
-    """Voltage under a current [V]."""
-    return open_circuit_V(vehicle, dod) - u_th_V - vehicle.resistance_0_ohm * current_A
+        power = electrical_power_W(vehicle, static)
+        voltage, current = battery_operating_point(vehicle, x_next[DOD], x_next[U_TH], power)
+        x_next[DOD] += current * h / vehicle.capacity_As
+        x_next[U_TH] = left * x_next[U_TH] + (1.0 - left) * vehicle.resistance_th_ohm * current
+        correction += static - vehicle.weight_N
+        charge += current * h
+        energy += voltage * current * h
+        _integrate(vehicle, x_next, h, thrust, torque, room[4], room[5], room[6])
+    u[DELTA_THRUST] = correction / steps
+    return energy / charge, charge / vehicle.dt_s

@@ -24,11 +24,13 @@ def electrical_power_W(vehicle, thrust_N):
 
 
 @njit(cache=True, error_model="numpy")
-def battery_current_A(vehicle, dod, u_th_V, power_W):
-    """Current at which the Thevenin battery delivers a power: u_b i = P, u_b = OCV - u_th - R_0 i.
+def battery_operating_point(vehicle, dod, u_th_V, power_W):
+    """Voltage and current at which the Thevenin battery delivers a power.
 
-    Beyond the battery's maximum power the current of that maximum flows; less is delivered.
+    u_b i = P with u_b = OCV - u_th - R_0 i. More power than the battery has is not delivered: then
+    the current of its largest power flows, and the product of the two is less than was asked for.
     """
-    E = open_circuit_V(vehicle, min(max(dod, 0.0), 1.0)) - u_th_V
+    E = open_circuit_V(vehicle, dod) - u_th_V
     R0 = vehicle.resistance_0_ohm
-    return (E - math.sqrt(max(E * E - 4.0 * R0 * power_W, 0.0))) / (2.0 * R0)
+    current = (E - math.sqrt(max(E * E - 4.0 * R0 * power_W, 0.0))) / (2.0 * R0)
+    return E - R0 * current, current

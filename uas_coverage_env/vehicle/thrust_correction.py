@@ -14,6 +14,7 @@ from uas_coverage_env.vehicle.compiled import compile_vehicle
 from uas_coverage_env.vehicle.params import ThrustCorrection, VehicleParams
 
 _ITERATIONS = 50
+_IDLE = 0.05  # of the weight: rotors never stop
 _COSINE_MIN = 0.3  # beyond a tilt of 70 degrees the vertical thrust no longer grows
 
 
@@ -31,12 +32,12 @@ def _induced_mps(hover_mps, across_mps, climb_mps):
 
 
 @njit(cache=True, error_model="numpy")
-def exact_delta_thrust(vehicle, lift_N, phi, theta, psi, vx, vy, vz):
-    """DT = f_T(L, Psi, v): thrust a hovering rotor set needs for the same power, less the weight.
+def static_thrust(vehicle, thrust_N, phi, theta, psi, vx, vy, vz):
+    """Thrust of a hovering rotor set that needs the same power as this thrust in this flight [N].
 
     Args:
         vehicle: record of VEHICLE_DTYPE.
-        lift_N: [N] vertical thrust in excess of the weight.
+        thrust_N: [N] of all rotors.
         phi: [rad] roll.
         theta: [rad] pitch.
         psi: [rad] heading.
@@ -44,28 +45,41 @@ def exact_delta_thrust(vehicle, lift_N, phi, theta, psi, vx, vy, vz):
         vy: [m/s] east.
         vz: [m/s] down.
     """
-    upright = max(math.cos(phi) * math.cos(theta), _COSINE_MIN)
-    thrust = max(vehicle.weight_N + lift_N, 0.05 * vehicle.weight_N) / upright
+    thrust = max(thrust_N, _IDLE * vehicle.weight_N)
     # the rotor axis, pointing down, in NED
     ax = math.cos(phi) * math.sin(theta) * math.cos(psi) + math.sin(phi) * math.sin(psi)
     ay = math.cos(phi) * math.sin(theta) * math.sin(psi) - math.sin(phi) * math.cos(psi)
     az = math.cos(phi) * math.cos(theta)
     climb = -(ax * vx + ay * vy + az * vz)
     across = math.sqrt(max(vx * vx + vy * vy + vz * vz - climb * climb, 0.0))
-    n, radius = vehicle.n_motors, vehicle.propeller_radius_m
+    n = vehicle.n_motors
+    radius = vehicle.propeller_radius_m
     area = math.pi * radius * radius
     hover = math.sqrt(thrust / (2.0 * vehicle.air_density_kgpm3 * n * area))
     # shaft power of a static rotor set: c T^1.5
-    c = vehicle.torque_Nm_per_radps2 / vehicle.thrust_N_per_radps2**1.5 / math.sqrt(n)
+    k_T = vehicle.thrust_N_per_radps2
+    c = vehicle.torque_Nm_per_radps2 / (k_T * math.sqrt(k_T * n))
+    root = math.sqrt(thrust)
     kappa = vehicle.induced_power_factor
-    profile = c * thrust**1.5 - kappa * thrust * hover
-    advance = across / (math.sqrt(thrust / n / vehicle.thrust_N_per_radps2) * radius)
+    profile = c * thrust * root - kappa * thrust * hover
+    advance = across / (root / math.sqrt(n * k_T) * radius)
     # momentum theory fails in the vortex ring state: a descent is credited with half its power
     axial = climb if climb >= 0.0 else 0.5 * climb
     induced = _induced_mps(hover, across, max(climb, 0.0))
     power = kappa * thrust * induced + thrust * axial
     power += profile * (1.0 + vehicle.profile_power_advance_factor * advance * advance)
-    return (max(power, 0.0) / c) ** (2.0 / 3.0) - vehicle.weight_N
+    return (max(power, 0.0) / c) ** (2.0 / 3.0)
+
+
+@njit(cache=True, error_model="numpy")
+def exact_delta_thrust(vehicle, lift_N, phi, theta, psi, vx, vy, vz):
+    """Delta T = f_T(L, Psi, v): the static thrust of a flight with lift L, less the weight [N].
+
+    The vertical part of the thrust is weight plus lift. Arguments as for `static_thrust`.
+    """
+    upright = max(math.cos(phi) * math.cos(theta), _COSINE_MIN)
+    thrust = (vehicle.weight_N + lift_N) / upright
+    return static_thrust(vehicle, thrust, phi, theta, psi, vx, vy, vz) - vehicle.weight_N
 
 
 def fit_thrust_correction(vehicle: VehicleParams) -> ThrustCorrection:

@@ -16,17 +16,18 @@ from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 
 @njit(cache=True, error_model="numpy")
-def command_wrench(vehicle, x, reference, kind, values, u):
+def command_wrench(vehicle, x, reference, command, u):
     """Write into u the wrench for one step of a command, within the vehicle's limits.
 
     Args:
         vehicle: The compiled vehicle.
         x: (14,) state.
         reference: (2,) [m/s] the inner loop's governed velocity; updated.
-        kind: VELOCITY, ACCELERATION, WRENCH or CLIMB.
-        values: (4,) the numbers of the command.
+        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
         u: (5,) inputs; lift and torques are written.
     """
+    kind = command.kind
+    values = command.values
     if kind == VELOCITY:
         velocity_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
     elif kind == CLIMB:

@@ -7,7 +7,7 @@ from numba import njit
 
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import CLIMB, VELOCITY
-from uas_coverage_env.world.lookahead import fixed_slack, fly_and_brake
+from uas_coverage_env.world.lookahead import ONE_STEP_S, fixed_slack, fly_and_brake
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
 
 LEAD_S = 1.6
@@ -98,7 +98,7 @@ def _altitude(arena, x, altitude1_m, way_m, needed_m):
 
 
 @njit(cache=True, error_model="numpy")
-def guide(arena, i, x, reference, target, stop, command):
+def guide(arena, i, x, reference, target, stop, nonlinear, command):
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
     The wish (fly along the route, in time over low roofs) is flown as far as it leaves room to
@@ -111,6 +111,7 @@ def guide(arena, i, x, reference, target, stop, command):
         reference: (2,) [m/s] of its inner loop.
         target: Index of a waypoint; home if negative.
         stop: Come to rest at the target instead of flying by.
+        nonlinear: Whether the world flies the 6-DOF plant.
         command: A record of COMMAND_DTYPE; kind and values are written.
     """
     row, x1, y1, z1 = target_position(arena, i, target)
@@ -142,8 +143,10 @@ def guide(arena, i, x, reference, target, stop, command):
                 if level_m <= altitude_m:
                     break
                 values[2] = level_m
-            n_flown, slack_m = fly_and_brake(arena, i, x, reference, VELOCITY, values, 1, path_m)
-            slack_m = fixed_slack(arena, i, path_m, n_flown, 0.0, 0.0, slack_m)
+            n_flown, slack_m = fly_and_brake(
+                arena, i, x, reference, command, ONE_STEP_S, nonlinear, path_m
+            )
+            slack_m = fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m)
             if slack_m >= 0.0:
                 return
     command.kind = CLIMB

@@ -18,9 +18,10 @@ from uas_coverage_env.vehicle import (
     Y,
     Z,
     fly_kinematics,
+    plant_step,
     reseed_reference,
 )
-from uas_coverage_env.world.commands import CLIMB, WRENCH
+from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE, WRENCH
 from uas_coverage_env.world.contacts import face_between, moving_clearance
 from uas_coverage_env.world.control import command_wrench
 from uas_coverage_env.world.routes import box_apart
@@ -33,6 +34,18 @@ PLENTY_M = 2.0
 """More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
 
 _STILL = 0.02
+
+
+ONE_STEP_S = 0.0
+"""As long as a command is flown before the next decision: less than any step counts as one."""
+
+
+@njit(cache=True, error_model="numpy")
+def braking():
+    """(1,) of COMMAND_DTYPE: stop and hold still."""
+    command = np.zeros(1, dtype=COMMAND_DTYPE)
+    command[0].kind = CLIMB
+    return command
 
 
 @njit(cache=True, error_model="numpy")
@@ -55,10 +68,10 @@ def _kept_m(required_m, now_m):
 
 
 @njit(cache=True, error_model="numpy")
-def fly_and_brake(arena, i, start, reference, kind, values, hold_steps, path_m):
+def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m):
     """Simulate a command, then braking until the UAS stands.
 
-    The simulation is the inner loop and the model that the world flies. So where a command was
+    The simulation is the inner loop and the dynamics that the world flies. So where a command was
     found safe, its braking flight is still there to be flown in the next step: from a safe state
     there is always a safe command (against what stands still).
 
@@ -67,9 +80,9 @@ def fly_and_brake(arena, i, start, reference, kind, values, hold_steps, path_m):
         i: Index of the UAS.
         start: (14,) its state.
         reference: (2,) [m/s] of its inner loop; neither is changed.
-        kind: Kind of command; GO_TO has to be resolved before.
-        values: (4,) numbers of the command.
-        hold_steps: Number of steps for which the command is flown.
+        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
+        hold_s: How long the command is flown, one step at least [s].
+        nonlinear: Whether the world flies the 6-DOF plant, and this too.
         path_m: (N+1, 3) [m] positions, written; after a stop the position stays.
 
     Returns:
@@ -81,17 +94,21 @@ def fly_and_brake(arena, i, start, reference, kind, values, hold_steps, path_m):
     x = start.copy()
     governed = reference.copy()
     u = np.zeros(5)
-    brake = np.zeros(4)
+    brake = braking()[0]
+    hold_steps = max(1, int(hold_s / arena.rules[0].dt_s))
     path_m[0, 0] = x[X]
     path_m[0, 1] = x[Y]
     path_m[0, 2] = x[Z]
     for k in range(n_steps):
         if k < hold_steps:
-            command_wrench(vehicle, x, governed, kind, values, u)
+            command_wrench(vehicle, x, governed, command, u)
         else:
-            command_wrench(vehicle, x, governed, CLIMB, brake, u)
-        fly_kinematics(vehicle, x, u)
-        if k < hold_steps and kind == WRENCH:
+            command_wrench(vehicle, x, governed, brake, u)
+        if nonlinear:
+            plant_step(vehicle, x, u, x)
+        else:
+            fly_kinematics(vehicle, x, u)
+        if k < hold_steps and command.kind == WRENCH:
             reseed_reference(x, governed)
         path_m[k + 1, 0] = x[X]
         path_m[k + 1, 1] = x[Y]
@@ -118,12 +135,12 @@ def _box_of(path_m, n_flown, low, high):
 
 
 @njit(cache=True, error_model="numpy")
-def _fence_slack(arena, path_m, n_flown, low, high, margin_m, slack_m):
+def _fence_slack(arena, path_m, n_flown, low, high, slack_m):
     """The smaller of slack_m and the distance to spare from the geofence along a path."""
     rules = arena.rules[0]
     normals = arena.normals
     offsets_m = arena.offsets_m
-    required_m = rules.fence_margin_m + margin_m
+    required_m = rules.fence_margin_m
     for h in range(rules.fence_first, rules.fence_last):
         outermost = offsets_m[h]
         for axis in range(3):
@@ -144,7 +161,7 @@ def _fence_slack(arena, path_m, n_flown, low, high, margin_m, slack_m):
 
 
 @njit(cache=True, error_model="numpy")
-def fixed_slack(arena, i, path_m, n_flown, margin_m, enough_m, slack_m):
+def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     """Least distance to spare from the geofence and fixed obstacles along a path.
 
     Args:
@@ -152,7 +169,6 @@ def fixed_slack(arena, i, path_m, n_flown, margin_m, enough_m, slack_m):
         i: Index of the UAS.
         path_m: (N+1, 3) [m] its path.
         n_flown: Number of segments in which it moves.
-        margin_m: Distance to keep in addition to what would be a breach [m].
         enough_m: Stop looking when the slack is below this [m].
         slack_m: Slack known so far [m].
 
@@ -162,7 +178,7 @@ def fixed_slack(arena, i, path_m, n_flown, margin_m, enough_m, slack_m):
     low = np.empty(3)
     high = np.empty(3)
     _box_of(path_m, n_flown, low, high)
-    slack_m = _fence_slack(arena, path_m, n_flown, low, high, margin_m, slack_m)
+    slack_m = _fence_slack(arena, path_m, n_flown, low, high, slack_m)
     normals = arena.normals
     offsets_m = arena.offsets_m
     for o in range(arena.obstacles.shape[0]):
@@ -171,7 +187,7 @@ def fixed_slack(arena, i, path_m, n_flown, margin_m, enough_m, slack_m):
             continue
         first = obstacle.first_face
         last = obstacle.last_face
-        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m + margin_m
+        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
         for k in range(n_flown):
             x0 = path_m[k, 0]
             y0 = path_m[k, 1]
@@ -194,7 +210,7 @@ def fixed_slack(arena, i, path_m, n_flown, margin_m, enough_m, slack_m):
 
 
 @njit(cache=True, error_model="numpy")
-def moving_slack(arena, step, i, path_m, margin_m, enough_m, slack_m):
+def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     """Least distance to spare from moving obstacles that keep their present velocities.
 
     Args:
@@ -202,7 +218,6 @@ def moving_slack(arena, step, i, path_m, margin_m, enough_m, slack_m):
         step: Number of the sample at which the path begins.
         i: Index of the UAS.
         path_m: (N+1, 3) [m] its path.
-        margin_m: As in `fixed_slack`.
         enough_m: As in `fixed_slack`.
         slack_m: Slack known so far [m].
 
@@ -215,7 +230,7 @@ def moving_slack(arena, step, i, path_m, margin_m, enough_m, slack_m):
     velocity_mps = arena.moving_velocity_mps[step]
     for m in range(arena.moving.shape[0]):
         obstacle = arena.moving[m]
-        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m + margin_m
+        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
         now_m = moving_clearance(
             arena.moving, centre_m, centre_m, m,
             path_m[0, 0], path_m[0, 1], path_m[0, 2], path_m[0, 0], path_m[0, 1], path_m[0, 2],
@@ -255,7 +270,7 @@ def _paths_apart(path_m, other_m, k, keep_m):
 
 
 @njit(cache=True, error_model="numpy")
-def peer_slack(arena, status, i, path_m, committed_m, margin_m, enough_m, slack_m):
+def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
     """Least distance to spare from the paths to which the other UAS are committed.
 
     Args:
@@ -264,7 +279,6 @@ def peer_slack(arena, status, i, path_m, committed_m, margin_m, enough_m, slack_
         i: Index of the UAS.
         path_m: (N+1, 3) [m] its path.
         committed_m: (U, N+1, 3) [m] the paths of all UAS.
-        margin_m: As in `fixed_slack`.
         enough_m: As in `fixed_slack`.
         slack_m: Slack known so far [m].
 
@@ -276,10 +290,7 @@ def peer_slack(arena, status, i, path_m, committed_m, margin_m, enough_m, slack_
             continue
         other_m = committed_m[j]
         required_m = (
-            arena.uas[i].radius_m
-            + arena.uas[j].radius_m
-            + arena.rules[0].uas_safe_distance_m
-            + margin_m
+            arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
         )
         now_m = max(
             math.hypot(path_m[0, 0] - other_m[0, 0], path_m[0, 1] - other_m[0, 1]),

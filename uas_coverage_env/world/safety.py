@@ -15,7 +15,9 @@ from numba import njit
 from uas_coverage_env.vehicle import VX, VY, Z
 from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.world.lookahead import (
+    ONE_STEP_S,
     TOLERANCE_M,
+    braking,
     fixed_slack,
     fly_and_brake,
     moving_slack,
@@ -46,137 +48,126 @@ _DEFLECTIONS = _deflections()
 
 
 @njit(cache=True, error_model="numpy")
-def _slack(arena, state, i, kind, values, hold_steps, margin_m, enough_m, path_m, committed_m):
+def _slack(arena, state, i, command, hold_s, nonlinear, enough_m, path_m, committed_m):
     """Least distance to spare from everything when a command is flown and then braked [m]."""
     n_flown, slack_m = fly_and_brake(
-        arena, i, state.x[i], state.reference[i], kind, values, hold_steps, path_m
+        arena, i, state.x[i], state.reference[i], command, hold_s, nonlinear, path_m
     )
     if slack_m >= enough_m:
-        slack_m = fixed_slack(arena, i, path_m, n_flown, margin_m, enough_m, slack_m)
+        slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
     if slack_m >= enough_m:
-        slack_m = moving_slack(arena, state.step[0], i, path_m, margin_m, enough_m, slack_m)
+        slack_m = moving_slack(arena, state.step[0], i, path_m, enough_m, slack_m)
     if slack_m >= enough_m:
-        slack_m = peer_slack(
-            arena, state.status, i, path_m, committed_m, margin_m, enough_m, slack_m
-        )
+        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, enough_m, slack_m)
     return slack_m
 
 
 @njit(cache=True, error_model="numpy")
-def _wish(arena, state, i, kind, values, wish):
-    """The velocity (north, east, down) that a command is after."""
+def _wish(arena, state, i, command):
+    """The velocity (north, east, down) [m/s] that a command is after."""
     uas = arena.uas[i]
     x = state.x[i]
-    wish[2] = 0.0
+    kind = command.kind
+    values = command.values
     if kind == VELOCITY:
-        wish[0] = values[0]
-        wish[1] = values[1]
-        climb_mps = min(max(values[2] + x[Z], -uas.descent_mps), uas.climb_mps)
-        wish[2] = -climb_mps
-    elif kind == CLIMB:
-        wish[0] = values[0]
-        wish[1] = values[1]
-        wish[2] = values[2]
-    elif kind == ACCELERATION:
-        wish[0] = state.reference[i, 0] + values[0] * arena.rules[0].dt_s
-        wish[1] = state.reference[i, 1] + values[1] * arena.rules[0].dt_s
-    else:
-        wish[0] = x[VX]
-        wish[1] = x[VY]
+        down_mps = -values[2] - x[Z]
+        return values[0], values[1], min(max(down_mps, -uas.climb_mps), uas.descent_mps)
+    if kind == CLIMB:
+        return values[0], values[1], values[2]
+    if kind == ACCELERATION:
+        dt_s = arena.rules[0].dt_s
+        north_mps = state.reference[i, 0] + values[0] * dt_s
+        east_mps = state.reference[i, 1] + values[1] * dt_s
+        return north_mps, east_mps, 0.0
+    return x[VX], x[VY], 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def _deflect(arena, i, wish, d, values):
-    """Write the d-th nearest alternative to a velocity."""
+def _deflect(arena, i, wish_mps, d, command):
+    """Write the d-th nearest alternative to a velocity (north, east, down)."""
     uas = arena.uas[i]
-    speed_mps = math.hypot(wish[0], wish[1])
-    heading = math.atan2(wish[1], wish[0]) + _DEFLECTIONS[d, 0]
+    speed_mps = math.hypot(wish_mps[0], wish_mps[1])
+    heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, 0]
     share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, 1]
-    values[0] = share_mps * math.cos(heading)
-    values[1] = share_mps * math.sin(heading)
+    command.kind = CLIMB
+    command.values[0] = share_mps * math.cos(heading)
+    command.values[1] = share_mps * math.sin(heading)
+    command.values[2] = wish_mps[2]
+    command.values[3] = 0.0
     if _DEFLECTIONS[d, 2] > 0.0:
-        values[2] = -uas.climb_mps
+        command.values[2] = -uas.climb_mps
     elif _DEFLECTIONS[d, 2] < 0.0:
-        values[2] = uas.descent_mps
-    else:
-        values[2] = wish[2]
-    values[3] = 0.0
+        command.values[2] = uas.descent_mps
 
 
 @njit(cache=True, error_model="numpy")
-def _replace(arena, state, i, command, margin_m, path_m, committed_m):
+def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     """Put the nearest safe command in the place of an unsafe one, or else the least harmful.
 
-    The order is: the deflections, held for a step; braking; where there are moving obstacles,
-    the deflections held for longer; at last whatever keeps the largest distances.
+    The order is: the deflections, for one step; braking; where even braking is not safe, because
+    something moving comes near, the deflections for longer; at last what keeps most distance.
+    `path_m` is left as the path to which the UAS is then committed.
     """
     n_deflections = _DEFLECTIONS.shape[0]
-    wish = np.empty(3)
-    _wish(arena, state, i, command.kind, command.values, wish)
-    values = np.zeros(4)
-    command.kind = CLIMB
+    wish_mps = _wish(arena, state, i, command)
     for d in range(n_deflections):
-        _deflect(arena, i, wish, d, values)
-        slack_m = _slack(arena, state, i, CLIMB, values, 1, margin_m, 0.0, path_m, committed_m)
+        _deflect(arena, i, wish_mps, d, command)
+        slack_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, 0.0, path_m, committed_m)
         if slack_m >= 0.0:
-            command.values[:] = values
             return
-    values[:] = 0.0
-    slack_m = _slack(arena, state, i, CLIMB, values, 1, margin_m, -TOLERANCE_M, path_m, committed_m)
-    command.values[:] = values
-    if slack_m >= -TOLERANCE_M:
+    command.kind = CLIMB
+    command.values[:] = 0.0
+    best_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, -math.inf, path_m, committed_m)
+    if best_m >= -TOLERANCE_M:
         return
-    evade_steps = max(1, int(EVADE_S / arena.rules[0].dt_s))
-    best_m = _slack(arena, state, i, CLIMB, values, 1, margin_m, -math.inf, path_m, committed_m)
-    best_steps = 1
-    for hold_steps in (evade_steps, 1):
+    best = -1
+    best_s = ONE_STEP_S
+    for hold_s in (EVADE_S, ONE_STEP_S):
         for d in range(n_deflections):
-            _deflect(arena, i, wish, d, values)
+            _deflect(arena, i, wish_mps, d, command)
             slack_m = _slack(
-                arena, state, i, CLIMB, values, hold_steps, margin_m, best_m, path_m, committed_m
+                arena, state, i, command, hold_s, nonlinear, best_m, path_m, committed_m
             )
             if slack_m > best_m:
                 best_m = slack_m
-                best_steps = hold_steps
-                command.values[:] = values
-                if best_m >= 0.0:
-                    break
-        if best_m >= 0.0:
-            break
-    # once more, for the path to which this UAS is now committed
-    _slack(
-        arena, state, i, CLIMB, command.values, best_steps, margin_m, -math.inf, path_m,
-        committed_m,
-    )  # fmt: skip
+                best = d
+                best_s = hold_s
+            if best_m >= 0.0:
+                return
+    if best < 0:
+        command.values[:] = 0.0
+    else:
+        _deflect(arena, i, wish_mps, best, command)
+    _slack(arena, state, i, command, best_s, nonlinear, -math.inf, path_m, committed_m)
 
 
 @njit(cache=True, error_model="numpy")
-def filter_commands(arena, state, margin_m, outcome):
+def filter_commands(arena, state, nonlinear, outcome):
     """Replace the unsafe ones among the commands in `outcome` and mark them as filtered.
 
     Args:
         arena: The arena.
         state: The state from which the commands are flown.
-        margin_m: Distance to keep in addition to what would be a breach [m].
+        nonlinear: Whether the world flies the 6-DOF plant.
         outcome: (U,) of OUTCOME_DTYPE; applied_command and filtered are written.
     """
     n_uas = state.status.shape[0]
     n_steps = arena.rules[0].lookahead_steps
     committed_m = np.empty((n_uas, n_steps + 1, 3))
     path_m = np.empty((n_steps + 1, 3))
-    brake = np.zeros(4)
+    brake = braking()[0]
     # the first UAS decides before anybody asks where it would brake
     for i in range(1, n_uas):
         if state.status[i] == FLYING:
-            fly_and_brake(arena, i, state.x[i], state.reference[i], CLIMB, brake, 1, committed_m[i])
+            x = state.x[i]
+            reference = state.reference[i]
+            fly_and_brake(arena, i, x, reference, brake, ONE_STEP_S, nonlinear, committed_m[i])
     for i in range(n_uas):
         if state.status[i] != FLYING:
             continue
         command = outcome[i].applied_command
-        slack_m = _slack(
-            arena, state, i, command.kind, command.values, 1, margin_m, 0.0, path_m, committed_m
-        )
+        slack_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, 0.0, path_m, committed_m)
         if slack_m < 0.0:
             outcome[i].filtered = True
-            _replace(arena, state, i, command, margin_m, path_m, committed_m)
+            _replace(arena, state, i, command, nonlinear, path_m, committed_m)
         committed_m[i] = path_m

@@ -16,6 +16,8 @@ from uas_coverage_env.world.step import ACCEPTED, begin_mission, step_world
 
 Dynamics = Literal["lpv", "nonlinear"]
 
+_OUTCOMES_IN_BLOCK = 256
+
 
 def initial_state(scenario: Scenario) -> WorldState:
     """All UAS at rest at their starts, batteries rested, nothing covered."""
@@ -66,6 +68,8 @@ class World:
         self._start = initial_state(scenario)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self.state = self._start.copy()
+        self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
+        self._next_outcome = 0
         self._switches = (dynamics == "nonlinear", self.return_mode, self.safety_filter)
 
     def reset(self) -> None:
@@ -93,11 +97,20 @@ class World:
                 f"commands have dtype {commands.dtype} and shape {commands.shape}; "
                 f"give COMMAND_DTYPE and ({len(self.names)},)"
             )
-        outcome = np.empty(len(self.names), dtype=OUTCOME_DTYPE)
+        outcome = self._fresh_outcome()
         invalid = step_world(*self.arena, *self.state, commands, *self._switches, outcome)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
         return outcome
+
+    def _fresh_outcome(self) -> NDArray[np.void]:
+        """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""
+        if self._next_outcome == len(self._outcomes):
+            rows = max(1, _OUTCOMES_IN_BLOCK // len(self.names))
+            self._outcomes = np.zeros((rows, len(self.names)), dtype=OUTCOME_DTYPE)
+            self._next_outcome = 0
+        self._next_outcome += 1
+        return self._outcomes[self._next_outcome - 1]
 
     def _what_is_wrong(self, i: int, command: np.void) -> str:
         kind = int(command["kind"])

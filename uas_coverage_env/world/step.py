@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from uas_coverage_env.vehicle import X, Y, Z, lpv_step, plant_step, reseed_reference
+from uas_coverage_env.vehicle import N_INPUTS, X, Y, Z, lpv_step, plant_step, reseed_reference
 from uas_coverage_env.world.arena import Arena
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
@@ -21,9 +21,6 @@ from uas_coverage_env.world.outcome import NONE
 from uas_coverage_env.world.return_mode import has_to_return
 from uas_coverage_env.world.safety import filter_commands
 from uas_coverage_env.world.state import FLYING, LOST, WorldState
-
-PLANT_MARGIN_M = 0.5
-"""The nonlinear plant departs by about this from the model that the filter flies ahead [m]."""
 
 ACCEPTED = -1
 
@@ -74,7 +71,7 @@ def _begin(commands, outcome):
 
 
 @njit(cache=True, error_model="numpy")
-def _steer(arena, state, commands, return_mode, outcome):
+def _steer(arena, state, nonlinear, return_mode, outcome):
     """Turn home who has to, and resolve commands that name a place into velocities."""
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
@@ -90,13 +87,14 @@ def _steer(arena, state, commands, return_mode, outcome):
         if command.kind == GO_TO:
             target = int(command.values[0])
             stop = target < 0 or not state.uncovered[target]
-            guide(arena, i, state.x[i], state.reference[i], target, stop, command)
+            guide(arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command)
 
 
 @njit(cache=True, error_model="numpy")
 def _fly(arena, state, nonlinear, before_m, outcome):
     """Fly the commands for one step, and note where each UAS comes from in before_m (U, 3)."""
     dt_h = arena.rules[0].dt_s / 3600.0
+    u = np.zeros(N_INPUTS)
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
             continue
@@ -107,11 +105,12 @@ def _fly(arena, state, nonlinear, before_m, outcome):
         event = outcome[i]
         command = event.applied_command
         vehicle = arena.vehicles[i]
-        command_wrench(vehicle, x, state.reference[i], command.kind, command.values, event.u)
+        command_wrench(vehicle, x, state.reference[i], command, u)
         if nonlinear:
-            voltage_V, current_A = plant_step(vehicle, x, event.u, x)
+            voltage_V, current_A = plant_step(vehicle, x, u, x)
         else:
-            voltage_V, current_A = lpv_step(vehicle, x, event.u, x)
+            voltage_V, current_A = lpv_step(vehicle, x, u, x)
+        event.u[:] = u
         event.voltage_V = voltage_V
         event.current_A = current_A
         event.energy_Wh = voltage_V * current_A * dt_h
@@ -143,9 +142,9 @@ def advance(arena, state, commands, nonlinear, return_mode, safety_filter, outco
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     _begin(commands, outcome)
-    _steer(arena, state, commands, return_mode, outcome)
+    _steer(arena, state, nonlinear, return_mode, outcome)
     if safety_filter:
-        filter_commands(arena, state, PLANT_MARGIN_M if nonlinear else 0.0, outcome)
+        filter_commands(arena, state, nonlinear, outcome)
     before_m = np.empty((state.status.shape[0], 3))
     _fly(arena, state, nonlinear, before_m, outcome)
     judge_obstacles(arena, state, before_m, outcome)

@@ -84,7 +84,7 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
             lead_s,
             problem.horizon,
         )
-        costs = _target_costs(problem, uas, positions, visits)
+        costs = target_cost(problem, uas, positions, visits)
         values = _rewards(problem, visits).sum(axis=1) - costs - depth
         for row in np.argsort(-values, kind="stable")[: 4 * keep]:
             key = (visits[row] < NEVER).tobytes()
@@ -140,9 +140,10 @@ def _rewards(problem: PlanningProblem, visits: NDArray[np.int64]) -> FloatArray:
     return problem.waypoint_weight * np.maximum(problem.horizon - visits, 0)
 
 
-def _target_costs(
+def target_cost(
     problem: PlanningProblem, uas: int, positions: FloatArray, visits: NDArray[np.int64]
 ) -> FloatArray:
+    """(S,) part II of the objective along S flights of one UAS."""
     target = problem.targets[uas]
     if target is None:
         return np.zeros(len(positions))

@@ -1,9 +1,10 @@
 """One decision: from the problem to a verified plan within the time limit.
 
-The order of work: write the OCP; solve it restricted around what is left of the previous plan
-and around the best constructed flights (small programs, each some hundredths of a second); then
-the whole OCP from the best of these with the time that is left, for the bound and what it still
-finds.
+UAS couple only where they may cover the same waypoint or come close. So each UAS's own OCP is
+solved first, restricted to what lies near a flight: what is left of its previous plan, and the
+constructed flights that make the best teams (programs of some hundredths of a second, solved side
+by side). The best team of the plans found is checked as a whole; then the whole OCP starts from
+it with the time that is left, for the bound and what it still finds.
 """
 
 from __future__ import annotations
@@ -12,23 +13,14 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.blocks.separation import (
-    Separation,
-    binary_columns,
-    from_each_other,
-    from_moving_obstacles,
-    from_obstacles,
-)
-from uas_coverage_baselines.milp_mpc.construction import NEVER, Flight, flights, teams
-from uas_coverage_baselines.milp_mpc.highs import Solution, SolverLimits, solve
-from uas_coverage_baselines.milp_mpc.milp import ABSENT, BuiltMilp, Milp
-from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem, Variables
+from uas_coverage_baselines.milp_mpc.construction import Flight, flights, target_cost, teams
+from uas_coverage_baselines.milp_mpc.highs import SolverLimits, solve
+from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
+from uas_coverage_baselines.milp_mpc.program import NEVER, Program
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 FloatArray = NDArray[np.float64]
@@ -43,23 +35,18 @@ class Effort:
         threads: how many restricted programs are solved side by side.
         deterministic: limits by nodes instead of the clock, so that the same state gives the
             same plan on any machine.
-        teams: how many constructed combinations are refined.
-        earlier: steps by which a restricted MILP may cover earlier than the flight it refines.
-        later: steps by which it may cover later.
-        face_slack_m: faces that the flight misses by no more than this stay free.
+        teams: how many constructed teams are refined.
     """
 
     time_limit_s: float = 1.0
     threads: int = 2
     deterministic: bool = False
-    teams: int = 3
-    earlier: int = 4
-    later: int = 2
-    face_slack_m: float = 4.0
+    teams: int = 6
 
 
+_RESERVE = 0.06  # share of the time limit kept for verification and whatever is late
 _RESTRICTED_SHARE = 0.5  # of the time limit, for one restricted program at most
-_WORTHWHILE_S = 0.1  # less time than this is not worth starting a solve
+_WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
 _RESTRICTED_NODES = 60
 _JOINT_NODES = 1
 
@@ -75,30 +62,44 @@ def decide(
         dt_s: sampling time.
         effort: how much work it may take.
     """
-    search = _Search(problem, dt_s, effort)
-    tried = [] if previous is None else [left_over_flights(problem, previous, dt_s)]
+    search = _Search(problem, effort)
     with ThreadPoolExecutor(effort.threads) as side_by_side:  # the solver frees the interpreter
         pools = list(side_by_side.map(lambda u: flights(problem, u, dt_s), range(problem.n_uas)))
-        tried += teams(problem, pools, effort.teams)
-        for solution in side_by_side.map(search.refined, tried):
-            search.offer(solution)
+        tasks = _unique_tasks(problem, previous, teams(problem, pools, effort.teams), dt_s)
+        search.collect(tasks, list(side_by_side.map(lambda task: search.refined(*task), tasks)))
+    search.combine()
     search.improve()
     return search.plan
 
 
-class _Search:
-    """The OCP of one decision, the best verified solution so far and the time left."""
+def _unique_tasks(
+    problem: PlanningProblem,
+    previous: Plan | None,
+    constructed: Sequence[Sequence[Flight]],
+    dt_s: float,
+) -> list[tuple[int, Flight]]:
+    """(UAS, flight) pairs to refine, the most promising first, none twice."""
+    candidates = [] if previous is None else [left_over_flights(problem, previous, dt_s)]
+    candidates += [list(team) for team in constructed]
+    tasks, seen = [], set()
+    for team in candidates:
+        for uas, flight in enumerate(team):
+            key = (uas, flight.visit.tobytes(), flight.positions_m.tobytes())
+            if key not in seen:
+                seen.add(key)
+                tasks.append((uas, flight))
+    return tasks
 
-    def __init__(self, problem: PlanningProblem, dt_s: float, effort: Effort) -> None:
-        self.problem, self.dt_s, self.effort = problem, dt_s, effort
+
+class _Search:
+    """The programs of one decision, the best verified plan so far and the time left."""
+
+    def __init__(self, problem: PlanningProblem, effort: Effort) -> None:
+        self.problem, self.effort = problem, effort
         self._began = time.perf_counter()
-        self.milp, self.variables = formulate(problem)
-        self.built = self.milp.build()
-        self._separations = list(
-            chain(from_obstacles(problem), from_moving_obstacles(problem), from_each_other(problem))
-        )
+        self._own = [Program(problem.only(uas)) for uas in range(problem.n_uas)]
+        self._plans: list[list[Plan]] = [[] for _ in range(problem.n_uas)]
         self._best: Plan | None = None
-        self._best_values: FloatArray | None = None
         self._bound = -np.inf
 
     @property
@@ -108,57 +109,79 @@ class _Search:
             return None
         return replace(self._best, bound=min(self._bound, self._best.objective))
 
-    def _time_left_s(self) -> float:
-        return self.effort.time_limit_s - (time.perf_counter() - self._began)
-
-    def refined(self, team: Sequence[Flight]) -> Solution | None:
-        """Solve the OCP restricted to what the team's flights cover, and when."""
+    def refined(self, uas: int, flight: Flight) -> Plan | None:
+        """Solve a UAS's own OCP restricted to what its flight covers, and when."""
         left = self._time_left_s()
         if not self.effort.deterministic and left < _WORTHWHILE_S:
             return None
-        lower, upper = restricted_bounds(
-            self.problem, self.milp, self.variables, self.built, self._separations, team,
-            self.effort,
-        )  # fmt: skip
-        share = min(_RESTRICTED_SHARE * self.effort.time_limit_s, left)
+        program = self._own[uas]
+        lower, upper = program.near(flight.positions_m[None], flight.visit[None])
         limits = SolverLimits(
-            time_s=None if self.effort.deterministic else share,
-            nodes=_RESTRICTED_NODES if self.effort.deterministic else None,
+            time_s=min(_RESTRICTED_SHARE * self.effort.time_limit_s, left),
+            nodes=None,
             relative_gap=0.01,
             absolute_gap=0.05,
             heuristics=False,
         )
-        return solve(self.built, limits, lower=lower, upper=upper)
+        if self.effort.deterministic:
+            limits = replace(limits, time_s=None, nodes=_RESTRICTED_NODES)
+        solution = solve(program.built, limits, lower=lower, upper=upper)
+        return None if solution.values is None else program.plan(solution)
+
+    def collect(self, tasks: Sequence[tuple[int, Flight]], plans: Sequence[Plan | None]) -> None:
+        """Keep the plans found for each UAS."""
+        for (uas, _), plan in zip(tasks, plans, strict=True):
+            if plan is not None and first_trouble(self._own[uas].problem, plan) is None:
+                self._plans[uas].append(plan)
+
+    def combine(self) -> None:
+        """The best team of the plans found that holds as a whole."""
+        if not all(self._plans):
+            return
+        pools = [
+            [_as_flight(self.problem, uas, plan) for plan in plans]
+            for uas, plans in enumerate(self._plans)
+        ]
+        of_flight = {
+            id(flight): plan
+            for pool, plans in zip(pools, self._plans, strict=True)
+            for flight, plan in zip(pool, plans, strict=True)
+        }
+        for team in teams(self.problem, pools, keep=6):
+            self._offer(_joined(self.problem, [of_flight[id(flight)] for flight in team]))
+            if self._best is not None:
+                return
 
     def improve(self) -> None:
         """The whole OCP from the best plan so far."""
         left = self._time_left_s()
         if not self.effort.deterministic and left < _WORTHWHILE_S:
             return
-        start = None
-        if self._best_values is not None:
-            columns = np.flatnonzero(self.built.integer)
-            start = (columns, self._best_values[columns])
-        limits = SolverLimits(
-            time_s=None if self.effort.deterministic else 0.95 * left,
-            nodes=_JOINT_NODES if self.effort.deterministic else None,
-        )
-        solution = solve(self.built, limits, start=start)
+        alone = self.problem.n_uas == 1
+        program = self._own[0] if alone else Program(self.problem)
+        limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
+        if self.effort.deterministic:
+            limits = replace(limits, time_s=None, nodes=_JOINT_NODES)
+        start = None if self._best is None else program.start(self._best)
+        solution = solve(program.built, limits, start=start)
         self._bound = solution.bound
-        self.offer(solution)
+        if solution.values is not None:
+            self._offer(program.plan(solution))
 
-    def offer(self, solution: Solution | None) -> None:
-        """Keep a solution that is better than the best and whose geometry holds."""
-        best = np.inf if self._best is None else self._best.objective
-        if solution is None or solution.values is None or solution.objective >= best - 1e-6:
+    def _offer(self, plan: Plan) -> None:
+        """Keep a plan that is better than the best and whose geometry holds."""
+        if self._best is not None and plan.objective >= self._best.objective - 1e-6:
             return
-        plan = read_plan(self.problem, self.variables, solution.values, solution.objective)
         if first_trouble(self.problem, plan) is None:
-            self._best, self._best_values = plan, solution.values
+            self._best = plan
+
+    def _time_left_s(self) -> float:
+        limit = (1.0 - _RESERVE) * self.effort.time_limit_s
+        return limit - (time.perf_counter() - self._began)
 
 
 def left_over_flights(problem: PlanningProblem, left: Plan, dt_s: float) -> list[Flight]:
-    """What is left of the previous plan as flights; beyond its end at constant velocity."""
+    """What is left of the previous plan as flights; beyond its end at falling velocity."""
     result = []
     for row, name in enumerate(problem.names):
         path = problem.x0[row, None, :3]
@@ -166,75 +189,43 @@ def left_over_flights(problem: PlanningProblem, left: Plan, dt_s: float) -> list
         visit = np.full(problem.n_waypoints, NEVER, np.int64)
         if name in left.names:
             old = left.of(name)
-            path, velocity = left.x[old, :, 0:3], left.x[old, -1, 3:6]
+            path, velocity = left.x[old, : problem.horizon + 1, 0:3], left.x[old, -1, 3:6]
             for w, index in enumerate(problem.waypoint_index):
                 steps = np.flatnonzero(left.covers[old, :, index])
                 if len(steps):
                     visit[w] = steps[0]
         beyond = np.arange(1, problem.horizon + 2 - len(path))[:, None]
-        result.append(
-            Flight(np.vstack([path, path[-1] + 0.5 * dt_s * velocity * beyond]), visit, 0.0, 0.0)
-        )
+        path = np.vstack([path, path[-1] + 0.5 * dt_s * velocity * beyond])
+        cost = float(target_cost(problem, row, path[None], visit[None])[0])
+        result.append(Flight(path, visit, cost, 0.0))
     return result
 
 
-def restricted_bounds(
-    problem: PlanningProblem,
-    milp: Milp,
-    v: Variables,
-    built: BuiltMilp,
-    separations: Sequence[Separation],
-    team: Sequence[Flight],
-    effort: Effort,
-) -> tuple[FloatArray, FloatArray]:
-    """Column bounds that leave free only what lies near the team's flights.
-
-    Each waypoint may be covered by the UAS whose flight covers it first, within a window around
-    that step; each shape may be passed along the faces that the flight passes, or nearly passes.
-    """
-    lower, upper = built.lower.copy(), built.upper.copy()
-    visits = np.array([flight.visit for flight in team])
-    if problem.n_waypoints:
-        steps = np.arange(problem.horizon)
-        own = (visits == visits.min(axis=0)) & (visits < NEVER)
-        own &= np.cumsum(own, axis=0) == 1
-        early = steps[None, :, None] >= visits[:, None, :] - effort.earlier
-        late = steps[None, :, None] <= visits[:, None, :] + effort.later
-        allowed = own[:, None, :] & early & late
-        shut = v.covers[~allowed]
-        upper[shut[shut != ABSENT]] = 0.0
-    paths = np.array([flight.positions_m for flight in team])
-    for separation in separations:
-        columns = binary_columns(milp, separation)
-        if columns is None:
-            continue
-        relaxed, crossed = columns
-        position = paths[separation.mover]
-        if separation.partner is not None:
-            position = position - paths[separation.partner]
-        spare = position @ separation.normals.T + separation.offset_m
-        spare = spare - separation.clearance_m[:, None, :]
-        spare[:, 0] = np.where(separation.always[:, 0], np.inf, -np.inf)
-        over_interval = np.minimum(spare[:, :-1], spare[:, 1:])
-        over_interval[separation.never[:, :-1] | separation.never[:, 1:]] = -np.inf
-        best = over_interval.max(axis=2, keepdims=True)
-        ample = best >= effort.face_slack_m
-        near = np.where(ample, over_interval == best, over_interval >= best - effort.face_slack_m)
-        near &= over_interval > -np.inf
-        some = near.any(axis=2, keepdims=True)
-        shut = crossed[~near & some]
-        lower[shut[shut != ABSENT]] = 1.0
-        used = np.zeros(spare.shape, bool)
-        used[:, :-1] |= near | ~some
-        used[:, 1:] |= near | ~some
-        shut = relaxed[~used]
-        lower[shut[shut != ABSENT]] = 1.0
-    return lower, upper
+def _as_flight(problem: PlanningProblem, uas: int, plan: Plan) -> Flight:
+    """A UAS's own plan as a flight: what it covers when, and what it costs besides."""
+    covers = plan.covers[0][:, problem.waypoint_index]
+    visit = np.where(covers.any(axis=0), covers.argmax(axis=0), NEVER)
+    gained = problem.waypoint_weight * np.maximum(problem.horizon - visit, 0)
+    return Flight(plan.x[0, :, 0:3], visit, plan.objective + float(gained.sum()), 0.0)
 
 
-def read_plan(problem: PlanningProblem, v: Variables, values: FloatArray, objective: float) -> Plan:
-    """Column values back into trajectories."""
-    covers = np.zeros((problem.n_uas, problem.horizon, problem.n_scenario_waypoints), bool)
-    chosen = np.where(v.covers != ABSENT, values[v.covers], 0.0) > 0.5
-    covers[:, :, problem.waypoint_index] = chosen
-    return Plan(problem.names, values[v.x], values[v.u], covers, objective, -np.inf)
+def _joined(problem: PlanningProblem, plans: Sequence[Plan]) -> Plan:
+    """One plan of all; a waypoint that several cover counts for who is there first."""
+    covers = np.concatenate([plan.covers for plan in plans])
+    first = np.where(covers.any(axis=1), covers.argmax(axis=1), NEVER)
+    owner = first.argmin(axis=0)
+    objective = sum(plan.objective for plan in plans)
+    weight = np.zeros(problem.n_scenario_waypoints)
+    weight[problem.waypoint_index] = problem.waypoint_weight
+    for uas in range(len(plans)):
+        surplus = (first[uas] < NEVER) & (owner != uas)
+        objective += float((weight * np.maximum(problem.horizon - first[uas], 0))[surplus].sum())
+        covers[uas][:, surplus] = False
+    return Plan(
+        problem.names,
+        np.concatenate([plan.x for plan in plans]),
+        np.concatenate([plan.u for plan in plans]),
+        covers,
+        objective,
+        -np.inf,
+    )

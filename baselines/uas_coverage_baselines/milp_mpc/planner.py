@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from uas_coverage_baselines.milp_mpc.braking import way_out
 from uas_coverage_baselines.milp_mpc.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.modes import (
     Memory,
@@ -18,7 +19,6 @@ from uas_coverage_baselines.milp_mpc.modes import (
 )
 from uas_coverage_baselines.milp_mpc.problem import Plan, Target, Weights
 from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
 from uas_coverage_env.flight import Decision, PlannerOptions
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, LIFT, TAU_X, TAU_Y, TAU_Z
@@ -44,7 +44,7 @@ class Options(PlannerOptions):
     moving_margin_m: float = Field(
         3.0, ge=0.0, le=50.0, description="added for a moving obstacle's next change of velocity"
     )
-    teams: int = Field(3, ge=1, le=20, description="constructed combinations that are refined")
+    teams: int = Field(6, ge=1, le=20, description="constructed teams whose flights are refined")
 
 
 class MilpMpc:
@@ -61,7 +61,7 @@ class MilpMpc:
         """Compile what a decision compiles, on the scenario's first one."""
         world = World(scenario)
         world.reset()
-        rehearsal = MilpMpc(self.options)
+        rehearsal = MilpMpc(self.options.model_copy(update={"time_limit_s": 10.0}))
         rehearsal.reset(scenario, 0)
         rehearsal.act(world.swarm_state())
 
@@ -70,6 +70,7 @@ class MilpMpc:
         self._around = Surroundings(scenario, self.options)
         self._memories = {uas.name: Memory() for uas in scenario.uas}
         self._plan: Plan | None = None  # what is left of the last plan, beginning now
+        self._way_out: Plan | None = None  # likewise, ending in a hover
         self.last_decision = None
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
@@ -85,12 +86,14 @@ class MilpMpc:
         )
         self._memories.update(zip(swarm.active, memories, strict=True))
         problem = self._around.problem(swarm, self._targets(swarm, situations), self._weights)
-        plan, fallback = decide(problem, self._plan, self._around.dt_s, self._effort()), False
-        if plan is None and self._plan is not None and first_trouble(problem, self._plan) is None:
-            plan, fallback = self._plan, True
-        if plan is None:
-            return self._brake(swarm, situations)
-        self._plan = plan.advanced()
+        dt_s = self._around.dt_s
+        plan, fallback = decide(problem, self._plan, dt_s, self._effort()), False
+        out = None if plan is None else way_out(problem, plan, dt_s)
+        if plan is None or out is None:
+            plan, out, fallback = self._way_out, self._way_out, True
+        if plan is None or out is None or any(name not in plan.names for name in swarm.active):
+            return self._hover(swarm, situations)
+        self._plan, self._way_out = plan.advanced(), out.advanced()
         self.last_decision = Decision(
             plan.positions(), fallback, None if fallback else plan.relative_gap()
         )
@@ -151,9 +154,9 @@ class MilpMpc:
             mode=self._memories[name].mode.label,
         )
 
-    def _brake(self, swarm: SwarmState, situations: Sequence[Situation]) -> dict[str, Command]:
-        """Brake to a hover with the vehicle's inner loop: no plan is left that holds."""
-        self._plan = None
+    def _hover(self, swarm: SwarmState, situations: Sequence[Situation]) -> dict[str, Command]:
+        """Hold the position with the vehicle's inner loop: braking has ended, no plan has come."""
+        self._plan = self._way_out = None
         here = {n: s.position_m for n, s in zip(swarm.active, situations, strict=True)}
         self.last_decision = Decision({n: p[None] for n, p in here.items()}, fallback=True)
         return {

@@ -145,6 +145,21 @@ class PlanningProblem:
         """(U,) one of the vehicles' limits by its field name."""
         return np.array([getattr(v.limits, name) for v in self.vehicles], float)
 
+    def only(self, uas: int) -> PlanningProblem:
+        """The same decision for one UAS, as if it were alone."""
+        row = [uas]
+        return replace(
+            self,
+            names=(self.names[uas],),
+            vehicles=(self.vehicles[uas],),
+            models=(self.models[uas],),
+            x0=self.x0[row],
+            obstacle_clearance_m=self.obstacle_clearance_m[row],
+            moving_clearance_m=self.moving_clearance_m[row],
+            separation_m=self.separation_m[np.ix_(row, row)],
+            targets=(self.targets[uas],),
+        )
+
     def torque_max_Nm(self, axis: int) -> FloatArray:
         """(U,) largest torque about a body axis."""
         return np.array([v.torque_max_Nm[axis] for v in self.vehicles], float)

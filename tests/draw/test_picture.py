@@ -1,0 +1,169 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from uas_coverage_env.draw import Picture, picture
+from uas_coverage_env.draw.colours import of_charge
+from uas_coverage_env.draw.frame import Frame
+from uas_coverage_env.scenario import generate_scenario, load_scenario, scenario_names
+from uas_coverage_env.vehicle import DOD, PSI
+from uas_coverage_env.world import LANDED, LOST, World
+
+
+@pytest.fixture(scope="module")
+def village():
+    return load_scenario("village")
+
+
+@pytest.fixture
+def swarm(village):
+    return World(village).swarm_state()
+
+
+def differs(one, other):
+    """The box (top, bottom, left, right) in which two pictures differ; None where they do not."""
+    rows, columns = np.nonzero((one != other).any(axis=2))
+    return (rows.min(), rows.max(), columns.min(), columns.max()) if len(rows) else None
+
+
+def pixel(scenario, position_m, size_px=512):
+    """Row and column of a place in the picture."""
+    x, y = Frame.around(scenario.fence.vertices_m, size_px).pixels(np.array(position_m)) / 2
+    return round(float(y)), round(float(x))
+
+
+def test_a_picture_is_an_array_of_bytes(village, swarm):
+    image = picture(village, swarm)
+    assert image.shape == (512, 512, 3)
+    assert image.dtype == np.uint8
+    assert image.flags.writeable
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+
+
+@pytest.mark.parametrize("size_px", [128, 300, 777])
+def test_a_picture_has_the_size_asked_for(village, swarm, size_px):
+    assert picture(village, swarm, size_px=size_px).shape == (size_px, size_px, 3)
+
+
+@pytest.mark.parametrize("size_px", [0, 127, 5000, 512.0, "512", True, None])
+def test_a_size_that_makes_no_sense_is_refused(village, size_px):
+    with pytest.raises(ValueError, match="128 to 4096"):
+        Picture(village, size_px=size_px)
+
+
+def test_the_same_state_makes_the_same_picture_and_an_array_of_its_own(village, swarm):
+    painter = Picture(village)
+    one = painter.draw(swarm)
+    one_copy = one.copy()
+    other = painter.draw(swarm)
+    np.testing.assert_array_equal(one, other)
+    other[:] = 0
+    np.testing.assert_array_equal(one, one_copy)
+    np.testing.assert_array_equal(one, picture(village, swarm))
+
+
+def test_north_is_up_and_east_to_the_right(village, swarm):
+    before = picture(village, swarm)
+    swarm.x[0, :3] = [450.0, 450.0, -20.0]
+    top, _, _, right = differs(before, picture(village, swarm))
+    assert top < 100
+    assert right > 380
+
+
+def test_a_covered_waypoint_is_filled_where_it_lies(village, swarm):
+    before = picture(village, swarm)
+    swarm.uncovered[24] = False
+    after = picture(village, swarm)
+    row, column = pixel(village, village.waypoints[24].position_m)
+    assert not (before[row - 5, column] == after[row - 5, column]).all()
+    assert after[row - 5, column, 1] > after[row - 5, column, 0]
+
+
+def test_the_ring_of_an_open_waypoint_has_its_radius(village, swarm):
+    image = picture(village, swarm).astype(int)
+    row, column = pixel(village, village.waypoints[24].position_m)
+    radius_px = 15.0 * Frame.around(village.fence.vertices_m, 512).scale / 2
+    dark = [image[row, column + offset].sum() < 450 for offset in range(4, 22)]
+    assert abs(4 + dark.index(True) - radius_px) <= 1.5
+
+
+def test_heavier_waypoints_look_different(village, swarm):
+    weights = [waypoint.weight for waypoint in village.waypoints]
+    assert set(weights) == {1.0, 2.0}
+    same = village.model_copy(
+        update={"waypoints": tuple(w.model_copy(update={"weight": 1.0}) for w in village.waypoints)}
+    )
+    assert differs(picture(village, swarm), picture(same, swarm)) is not None
+
+
+@pytest.mark.parametrize("change", ["charge", "heading", "altitude", "landed", "lost", "moving"])
+def test_what_changes_in_the_state_changes_in_the_picture(village, swarm, change):
+    before = picture(village, swarm)
+    if change == "charge":
+        swarm.x[0, DOD] = 0.5
+    elif change == "heading":
+        swarm.x[0, PSI] = 0.3
+    elif change == "altitude":
+        swarm.x[0, 2] = -40.0
+    elif change == "moving":
+        swarm.moving_position_m[0] += [-60.0, 0.0, 0.0]
+    else:
+        swarm.status[0] = LANDED if change == "landed" else LOST
+    assert differs(before, picture(village, swarm)) is not None
+
+
+def test_paths_and_plans_are_drawn(village, swarm):
+    plain = picture(village, swarm)
+    paths_m = np.linspace([[250.0, 10.0, -1.0]] * 2, [[400.0, 250.0, -9.0], [50.0, 250.0, -9.0]], 9)
+    assert differs(plain, picture(village, swarm, paths_m=paths_m)) is not None
+    planned_m = {"uas_2": np.array([[200.0, 100.0, -10.0], [200.0, 120.0, -10.0]])}
+    top, bottom, left, right = differs(plain, picture(village, swarm, planned_m=planned_m))
+    row, column = pixel(village, (200.0, 110.0, -10.0))
+    assert abs((top + bottom) / 2 - row) <= 2
+    assert abs((left + right) / 2 - column) <= 2
+
+
+def test_one_sample_of_a_path_is_no_line_yet(village, swarm):
+    paths_m = swarm.x[None, :, :3]
+    assert differs(picture(village, swarm), picture(village, swarm, paths_m=paths_m)) is None
+
+
+def test_what_has_left_the_map_is_not_drawn_over_the_writing(village, swarm):
+    swarm.moving_position_m[0] = [250.0, 5000.0, -90.0]
+    gone = picture(village, swarm)
+    swarm.moving_position_m[0] = [250.0, 520.0, -90.0]
+    top, bottom, _, right = differs(gone, picture(village, swarm))
+    assert right < 466
+    assert top > 30
+    assert bottom < 484
+
+
+def test_red_yellow_and_green_stand_for_the_charge():
+    green, yellow, red = of_charge(0.9), of_charge(0.5), of_charge(0.2)
+    assert green[1] > green[0]
+    assert min(yellow[0], yellow[1]) > yellow[2]
+    assert red[0] > red[1]
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_shipped_scenario_can_be_drawn(name):
+    scenario = load_scenario(name)
+    image = picture(scenario, World(scenario).swarm_state())
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 30
+
+
+def test_a_large_swarm_is_summed_up():
+    scenario = generate_scenario(2, n_uas=20, n_waypoints=40, n_obstacles=8)
+    swarm = World(scenario).swarm_state()
+    before = picture(scenario, swarm)
+    swarm.status[3] = LOST
+    top, bottom, *_ = differs(before, picture(scenario, swarm))
+    assert bottom > 484
+    assert top < 484
+
+
+def test_importing_the_room_does_not_import_pillow():
+    code = "import sys, uas_coverage_env.draw; sys.exit('PIL' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
