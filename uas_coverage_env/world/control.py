@@ -16,6 +16,22 @@ from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 
 @njit(cache=True, error_model="numpy")
+def write_command(command, kind, first, second, third):
+    """Write kind and numbers of a record of COMMAND_DTYPE."""
+    command.kind = kind
+    command.values[0] = first
+    command.values[1] = second
+    command.values[2] = third
+    command.values[3] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def write_brake(command):
+    """Write the command to stop and to hold still."""
+    write_command(command, CLIMB, 0.0, 0.0, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
 def command_wrench(vehicle, x, reference, command, u):
     """Write into u the wrench for one step of a command, within the vehicle's limits.
 

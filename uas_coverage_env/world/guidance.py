@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.commands import CLIMB, VELOCITY
+from uas_coverage_env.world.commands import VELOCITY
+from uas_coverage_env.world.control import write_brake
 from uas_coverage_env.world.lookahead import ONE_STEP_S, fixed_slack, fly_and_brake
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
 
@@ -149,5 +150,4 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
             slack_m = fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m)
             if slack_m >= 0.0:
                 return
-    command.kind = CLIMB
-    values[:] = 0.0
+    write_brake(command)

@@ -21,9 +21,9 @@ from uas_coverage_env.vehicle import (
     plant_step,
     reseed_reference,
 )
-from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE, WRENCH
+from uas_coverage_env.world.commands import COMMAND_DTYPE, WRENCH
 from uas_coverage_env.world.contacts import face_between, moving_clearance
-from uas_coverage_env.world.control import command_wrench
+from uas_coverage_env.world.control import command_wrench, write_brake
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
 
@@ -38,14 +38,6 @@ _STILL = 0.02
 
 ONE_STEP_S = 0.0
 """As long as a command is flown before the next decision: less than any step counts as one."""
-
-
-@njit(cache=True, error_model="numpy")
-def braking():
-    """(1,) of COMMAND_DTYPE: stop and hold still."""
-    command = np.zeros(1, dtype=COMMAND_DTYPE)
-    command[0].kind = CLIMB
-    return command
 
 
 @njit(cache=True, error_model="numpy")
@@ -94,7 +86,8 @@ def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m
     x = start.copy()
     governed = reference.copy()
     u = np.zeros(5)
-    brake = braking()[0]
+    brake = np.zeros(1, dtype=COMMAND_DTYPE)[0]
+    write_brake(brake)
     hold_steps = max(1, int(hold_s / arena.rules[0].dt_s))
     path_m[0, 0] = x[X]
     path_m[0, 1] = x[Y]

@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 
 from uas_coverage_env.vehicle import VX, VY, Z
-from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
+from uas_coverage_env.world.commands import ACCELERATION, CLIMB, COMMAND_DTYPE, VELOCITY
+from uas_coverage_env.world.control import write_brake, write_command
 from uas_coverage_env.world.lookahead import (
     ONE_STEP_S,
     TOLERANCE_M,
-    braking,
     fixed_slack,
     fly_and_brake,
     moving_slack,
@@ -89,15 +89,14 @@ def _deflect(arena, i, wish_mps, d, command):
     speed_mps = math.hypot(wish_mps[0], wish_mps[1])
     heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, 0]
     share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, 1]
-    command.kind = CLIMB
-    command.values[0] = share_mps * math.cos(heading)
-    command.values[1] = share_mps * math.sin(heading)
-    command.values[2] = wish_mps[2]
-    command.values[3] = 0.0
+    down_mps = wish_mps[2]
     if _DEFLECTIONS[d, 2] > 0.0:
-        command.values[2] = -uas.climb_mps
+        down_mps = -uas.climb_mps
     elif _DEFLECTIONS[d, 2] < 0.0:
-        command.values[2] = uas.descent_mps
+        down_mps = uas.descent_mps
+    write_command(
+        command, CLIMB, share_mps * math.cos(heading), share_mps * math.sin(heading), down_mps
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -115,8 +114,7 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
         slack_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, 0.0, path_m, committed_m)
         if slack_m >= 0.0:
             return
-    command.kind = CLIMB
-    command.values[:] = 0.0
+    write_brake(command)
     best_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, -math.inf, path_m, committed_m)
     if best_m >= -TOLERANCE_M:
         return
@@ -135,7 +133,7 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
             if best_m >= 0.0:
                 return
     if best < 0:
-        command.values[:] = 0.0
+        write_brake(command)
     else:
         _deflect(arena, i, wish_mps, best, command)
     _slack(arena, state, i, command, best_s, nonlinear, -math.inf, path_m, committed_m)
@@ -154,8 +152,8 @@ def filter_commands(arena, state, nonlinear, outcome):
     n_uas = state.status.shape[0]
     n_steps = arena.rules[0].lookahead_steps
     committed_m = np.empty((n_uas, n_steps + 1, 3))
-    path_m = np.empty((n_steps + 1, 3))
-    brake = braking()[0]
+    brake = np.zeros(1, dtype=COMMAND_DTYPE)[0]
+    write_brake(brake)
     # the first UAS decides before anybody asks where it would brake
     for i in range(1, n_uas):
         if state.status[i] == FLYING:
@@ -166,8 +164,8 @@ def filter_commands(arena, state, nonlinear, outcome):
         if state.status[i] != FLYING:
             continue
         command = outcome[i].applied_command
+        path_m = committed_m[i]
         slack_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, 0.0, path_m, committed_m)
         if slack_m < 0.0:
             outcome[i].filtered = True
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)
-        committed_m[i] = path_m

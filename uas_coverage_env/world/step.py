@@ -51,7 +51,8 @@ def _begin(commands, outcome):
     """An outcome in which nothing has happened yet, with the commands as they were given."""
     for i in range(commands.shape[0]):
         event = outcome[i]
-        event.u[:] = 0.0
+        for k in range(N_INPUTS):
+            event.u[k] = 0.0
         event.voltage_V = 0.0
         event.current_A = 0.0
         event.energy_Wh = 0.0
@@ -66,7 +67,8 @@ def _begin(commands, outcome):
         event.filtered = False
         event.returning = False
         event.applied_command.kind = commands[i].kind
-        event.applied_command.values[:] = commands[i].values
+        for k in range(4):
+            event.applied_command.values[k] = commands[i].values[k]
         event.applied_command.returning = commands[i].returning
 
 
@@ -110,7 +112,8 @@ def _fly(arena, state, nonlinear, before_m, outcome):
             voltage_V, current_A = plant_step(vehicle, x, u, x)
         else:
             voltage_V, current_A = lpv_step(vehicle, x, u, x)
-        event.u[:] = u
+        for k in range(N_INPUTS):
+            event.u[k] = u[k]
         event.voltage_V = voltage_V
         event.current_A = current_A
         event.energy_Wh = voltage_V * current_A * dt_h

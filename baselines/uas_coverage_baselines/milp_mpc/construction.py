@@ -89,7 +89,7 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
         for row in np.argsort(-values, kind="stable")[: 4 * keep]:
             key = (visits[row] < NEVER).tobytes()
             if key not in best or best[key][0] < values[row]:
-                flight = Flight(positions[row], visits[row], costs[row], depth[row])
+                flight = Flight(positions[row], visits[row], float(costs[row]), float(depth[row]))
                 best[key] = (float(values[row]), flight)
     ranked = sorted(best.values(), key=lambda pair: -pair[0])
     return [flight for _, flight in ranked[:keep]]

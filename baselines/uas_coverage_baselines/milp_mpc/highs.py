@@ -153,14 +153,14 @@ def _options(limits: SolverLimits) -> dict[str, bool | int | float | str]:
 
 def _model(milp: BuiltMilp, lower, upper, free_integers) -> highspy.HighsLp:
     model = highspy.HighsLp()
-    model.num_row_, model.num_col_ = milp.matrix.shape
+    model.num_row_, model.num_col_ = len(milp.row_lower), len(milp.cost)
     model.col_cost_, model.offset_ = milp.cost, milp.constant
     model.col_lower_, model.col_upper_ = lower, upper
     model.row_lower_, model.row_upper_ = milp.row_lower, milp.row_upper
     model.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
-    model.a_matrix_.start_ = milp.matrix.indptr
-    model.a_matrix_.index_ = milp.matrix.indices
-    model.a_matrix_.value_ = milp.matrix.data
+    model.a_matrix_.start_ = milp.row_start
+    model.a_matrix_.index_ = milp.column
+    model.a_matrix_.value_ = milp.coefficient
     if free_integers.any():
         kinds = np.array([highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger])
         model.integrality_ = kinds[free_integers.astype(int)].tolist()

@@ -23,7 +23,9 @@ Term = tuple[ArrayLike, Columns]
 
 @dataclass(frozen=True)
 class BuiltMilp:
-    """min cost·x + constant  subject to  row_lower <= matrix x <= row_upper, bounds, integrality.
+    """min cost·x + constant  subject to  row_lower <= A x <= row_upper, bounds, integrality.
+
+    A is compressed by row.
 
     Attributes:
         cost: (C,) objective coefficients.
@@ -31,7 +33,9 @@ class BuiltMilp:
         lower: (C,) column bounds.
         upper: (C,) column bounds.
         integer: (C,) True where the column takes whole numbers.
-        matrix: (R, C) rows, compressed by row.
+        row_start: (R+1,) where each row's entries begin in `column` and `coefficient`.
+        column: (K,) column of each entry.
+        coefficient: (K,) value of each entry.
         row_lower: (R,) row bounds.
         row_upper: (R,) row bounds.
     """
@@ -41,7 +45,9 @@ class BuiltMilp:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     integer: NDArray[np.bool_]
-    matrix: sparse.csr_matrix
+    row_start: NDArray[np.int32]
+    column: NDArray[np.int32]
+    coefficient: NDArray[np.float64]
     row_lower: NDArray[np.float64]
     row_upper: NDArray[np.float64]
 
@@ -50,11 +56,7 @@ class BuiltMilp:
         return float(self.cost @ values) + self.constant
 
     def violation(self, values: NDArray[np.float64]) -> float:
-        """Largest violation of any bound, row or integrality at `values` (C,), by our arithmetic.
-
-        Rows are scaled by their largest coefficient where that exceeds one, so that the figure is
-        in the unit of the row's variables rather than of its big M.
-        """
+        """Largest violation of a bound, row or integrality at `values` (C,), by our arithmetic."""
         if not np.isfinite(values).all():
             return INFINITY
         worst = [0.0]
@@ -64,8 +66,10 @@ class BuiltMilp:
         if self.integer.any():
             whole = values[self.integer]
             worst.append(float(np.max(np.abs(whole - np.round(whole)))))
-        if self.matrix.shape[0]:
-            activity = self.matrix @ values
+        if len(self.row_lower):
+            shape = (len(self.row_lower), len(values))
+            rows = sparse.csr_matrix((self.coefficient, self.column, self.row_start), shape=shape)
+            activity = np.asarray(rows @ values)
             excess = np.maximum(self.row_lower - activity, activity - self.row_upper)
             worst.append(float(np.max(excess)))
         return max(worst)
@@ -204,13 +208,16 @@ class Milp:
             integer[columns] = False
         shape = (self._n_rows, self._n_columns)
         matrix = sparse.csr_matrix((values, (rows, picked)), shape=shape)
+        matrix.sort_indices()
         return BuiltMilp(
             cost=cost,
             constant=self._constant,
             lower=_joined(self._lower),
             upper=_joined(self._upper),
             integer=integer,
-            matrix=matrix,
+            row_start=np.asarray(matrix.indptr, np.int32),
+            column=np.asarray(matrix.indices, np.int32),
+            coefficient=np.asarray(matrix.data, np.float64),
             row_lower=_joined(self._row_lower),
             row_upper=_joined(self._row_upper),
         )
@@ -237,10 +244,8 @@ class Milp:
         lines = ["minimize", f" cost: {_expression(built.cost, range(len(names)), names)}"]
         lines.append("subject to")
         for row, name in enumerate(self.row_names()):
-            span = slice(built.matrix.indptr[row], built.matrix.indptr[row + 1])
-            order = np.argsort(built.matrix.indices[span], kind="stable")
-            columns = built.matrix.indices[span][order]
-            left = _expression(built.matrix.data[span][order], columns, names)
+            span = slice(built.row_start[row], built.row_start[row + 1])
+            left = _expression(built.coefficient[span], built.column[span], names)
             low, high = built.row_lower[row], built.row_upper[row]
             if low == high:
                 lines.append(f" {name}: {left} = {_number(low)}")

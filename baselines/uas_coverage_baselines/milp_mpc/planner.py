@@ -28,23 +28,33 @@ from uas_coverage_env.world import Command, SwarmState, Velocity, World, Wrench
 class Options(PlannerOptions):
     """Options of `milp-mpc`; the defaults are the paper's table and our tuning."""
 
-    time_limit_s: float = Field(1.0, gt=0.0, le=3600.0, description="wall clock per decision")
-    threads: int = Field(2, ge=1, le=64, description="programs solved side by side")
-    horizon: int = Field(18, ge=8, le=60, description="N, steps of the prediction")
-    solver: Literal["highs"] = Field("highs", description="MILP solver")
-    deterministic: bool = Field(
-        False, description="limit work by nodes, not by the clock: the same seed flies the same"
+    time_limit_s: float = Field(
+        default=1.0, gt=0.0, le=3600.0, description="wall clock per decision"
     )
-    physical_sides: Literal[8] = Field(8, description="H_P; the world computes with 8 as well")
-    obstacle_sides: int = Field(8, ge=4, le=32, multiple_of=2, description="H_O")
-    waypoint_sides: int = Field(4, ge=4, le=16, multiple_of=4, description="H_WP")
+    threads: int = Field(default=2, ge=1, le=64, description="programs solved side by side")
+    horizon: int = Field(default=18, ge=8, le=60, description="N, steps of the prediction")
+    solver: Literal["highs"] = Field(default="highs", description="MILP solver")
+    deterministic: bool = Field(
+        default=False,
+        description="limit work by nodes, not by the clock: the same seed flies the same",
+    )
+    obstacle_sides: int = Field(default=8, ge=4, le=32, multiple_of=2, description="H_O")
+    waypoint_sides: int = Field(default=4, ge=4, le=16, multiple_of=4, description="H_WP")
     margin_m: float = Field(
-        0.3, ge=0.0, le=10.0, description="added to every clearance, for the path between samples"
+        default=0.3,
+        ge=0.0,
+        le=10.0,
+        description="added to every clearance, for the path between samples",
     )
     moving_margin_m: float = Field(
-        3.0, ge=0.0, le=50.0, description="added for a moving obstacle's next change of velocity"
+        default=3.0,
+        ge=0.0,
+        le=50.0,
+        description="added for a moving obstacle's next change of velocity",
     )
-    teams: int = Field(6, ge=1, le=20, description="constructed teams whose flights are refined")
+    teams: int = Field(
+        default=6, ge=1, le=20, description="constructed teams whose flights are refined"
+    )
 
 
 class MilpMpc:

@@ -23,12 +23,30 @@ _LANDING_S = 12.0  # settling above the landing site, generously
 class Formulation(Protocol):
     """The planner options that shape a problem."""
 
-    horizon: int
-    physical_sides: int
-    obstacle_sides: int
-    waypoint_sides: int
-    margin_m: float
-    moving_margin_m: float
+    @property
+    def horizon(self) -> int:
+        """N."""
+        ...
+
+    @property
+    def obstacle_sides(self) -> int:
+        """H_O."""
+        ...
+
+    @property
+    def waypoint_sides(self) -> int:
+        """H_WP."""
+        ...
+
+    @property
+    def margin_m(self) -> float:
+        """Added to every clearance."""
+        ...
+
+    @property
+    def moving_margin_m(self) -> float:
+        """Added to the clearance of moving obstacles."""
+        ...
 
 
 class Surroundings:
@@ -121,7 +139,6 @@ class Surroundings:
             n_scenario_waypoints=len(self.waypoints_m),
             targets=(),
             weights=weights,
-            physical_sides=options.physical_sides,
             obstacle_sides=options.obstacle_sides,
             waypoint_sides=options.waypoint_sides,
         )

@@ -16,7 +16,8 @@ def coverable(problem: PlanningProblem) -> NDArray[np.bool_]:
         return np.zeros((problem.n_uas, problem.horizon, 0), bool)
     faces = sphere_faces(problem.waypoint_sides)
     nearest = problem.waypoints_m @ faces.T - problem.waypoint_reach_m[:, None]
-    result = (problem.reach.support(faces)[:, :-1, None, :] >= nearest).all(axis=-1)
+    reach = problem.reach.support(faces)[:, :-1, None, :]
+    result = np.asarray((reach >= nearest).all(axis=-1))
     if problem.waypoint_sides == 4:
         # the inner polyhedron is a box here: its support along the diagonals is known as well
         between = cylinder_faces(16)

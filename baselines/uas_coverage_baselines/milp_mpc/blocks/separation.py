@@ -60,7 +60,7 @@ class Separation:
         spare = self.lowest_m - self.clearance_m[:, None, :]
         needed = np.zeros(spare.shape)
         needed[:, 0] = np.minimum(0.0, spare[:, 0].max(axis=1, keepdims=True))
-        result = spare >= needed
+        result = np.asarray(spare >= needed)
         result[:, 0] |= spare[:, 0] >= needed[:, 0] - _ON_FACE_M
         if not self.prune:
             result[:, 1:] = False
