@@ -28,8 +28,10 @@ from uas_coverage_env.vehicle import (
     TAU_X,
     TAU_Y,
     TAU_Z,
+    THETA,
     U_TH,
     VX,
+    VY,
     VZ,
     WX,
     X,
@@ -40,6 +42,7 @@ from uas_coverage_env.vehicle import (
     exact_delta_thrust,
     lpv_step,
     plant_step,
+    velocity_wrench,
 )
 from uas_coverage_env.vehicle.plant import mix
 from uas_coverage_env.vehicle.powertrain import electrical_power_W
@@ -99,26 +102,85 @@ def test_plant_and_lpv_model_stay_together_in_gentle_flight(name, dt_s):
 @pytest.mark.parametrize("dt_s", STEPS_S)
 @pytest.mark.parametrize("name", NAMES)
 def test_plant_and_lpv_model_stay_in_touch_in_brisk_flight(name, dt_s):
-    """The same at 10 m/s: 3.6 m, 0.9 m/s, 0.03 rad at most; 6 % more energy."""
+    """The same at 10 m/s: 4.5 m, 0.8 m/s, 0.038 rad at most; 6 % more energy.
+
+    Nothing holds the position in either flight, so small differences in speed add up.
+    """
     commands = tour(10.0, dt_s)
     linear, _, *electrical = fly(record_of(name, dt_s), lpv_step, commands, at(10.0))
     plant, _, *electrical_plant = fly(record_of(name, dt_s), plant_step, commands, at(10.0))
     apart = np.abs(plant - linear).max(axis=0)
-    assert apart[X : Y + 1].max() < 4.0
+    assert apart[X : Y + 1].max() < 5.0
     assert apart[Z] < 0.05
     assert apart[VX : VZ + 1].max() < 1.0
-    assert apart[PHI:WX].max() < 0.03
+    assert apart[PHI:WX].max() < 0.045
     assert 1.04 < np.dot(*electrical) / np.dot(*electrical_plant) < 1.08
 
 
 @pytest.mark.parametrize(
-    ("alpha_radps2", "apart_m", "apart_mps"), [(0.1, 0.25, 0.055), (0.4, 2.0, 0.56)]
+    ("speed_mps", "dt_s", "apart_m", "apart_mps", "apart_rad"),
+    [
+        (2.0, 0.5, 0.004, 0.007, 0.004),
+        (2.0, 1.0, 0.010, 0.008, 0.005),
+        (2.0, 2.0, 0.130, 0.040, 0.002),
+        (18.0, 0.5, 0.020, 0.060, 0.025),
+        (18.0, 1.0, 0.070, 0.130, 0.026),
+        (18.0, 2.0, 0.500, 0.600, 0.026),
+    ],
 )
 @pytest.mark.parametrize("name", NAMES)
-def test_open_loop_the_plant_drifts_from_the_lpv_model_as_the_model_note_says(
-    name, alpha_radps2, apart_m, apart_mps
+def test_at_constant_altitude_the_lpv_model_foretells_the_plants_next_state(
+    name, speed_mps, dt_s, apart_m, apart_mps, apart_rad
 ):
-    """18 s under the same wrenches, up to 2 m/s and 8 m/s: tan(tilt) against tilt."""
+    """Largest error of one prediction on random flights, gentle ones and at the limits.
+
+    The attitude loop follows atan(theta_lin), so velocities come out as predicted; angles by
+    theta - atan(theta) less. What is left is the loop's lag, and at 2 s the series of order 4.
+    """
+    record = record_of(name, dt_s)
+    rng = np.random.default_rng(5)
+    x, u, reference, foretold = at(20.0), np.zeros(N_INPUTS), np.zeros(2), np.zeros(N_STATES)
+    worst = np.zeros(N_STATES)
+    for k in range(400):
+        if k % 5 == 0:
+            north_mps, east_mps = rng.uniform(-speed_mps, speed_mps, 2)
+        velocity_wrench(record, x, reference, north_mps, east_mps, 20.0, u)
+        lpv_step(record, x, u, foretold)
+        plant_step(record, x, u, x)
+        worst = np.maximum(worst, np.abs(x - foretold))
+        x[DOD] = 0.1
+    assert worst[X : Y + 1].max() < apart_m
+    assert worst[VX : VY + 1].max() < apart_mps
+    assert worst[[Z, VZ]].max() < 1e-3
+    assert worst[PHI:WX].max() < apart_rad
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lift_tilts_with_the_rotors_in_the_plant_as_the_lpv_model_leaves_out(name):
+    """Lift and horizontal motion are coupled by (g + L / m) tan(tilt); the LPV model has g tilt."""
+    vehicle, record = load(name), record_of(name)
+    x, u = at(20.0), np.zeros(N_INPUTS)
+    x[THETA] = -0.1
+    u[LIFT] = 0.2 * vehicle.weight_N
+    foretold = np.zeros(N_STATES)
+    lpv_step(record, x, u, foretold)
+    plant_step(record, x, u, x)
+    assert x[VX] / foretold[VX] == pytest.approx(1.2, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("alpha_radps2", "apart_m", "apart_mps", "apart_rad"),
+    [(0.1, 0.14, 0.035, 0.002), (0.4, 10.0, 2.7, 0.1)],
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_open_loop_the_plant_stays_near_the_lpv_model_in_gentle_flight_only(
+    name, alpha_radps2, apart_m, apart_mps, apart_rad
+):
+    """18 s under the same wrenches, up to 2 m/s and 8 m/s: 0.13 m, 0.03 m/s; 9.4 m, 2.5 m/s.
+
+    Each step starts from the angle reached, which lies below the linear one: where nobody looks at
+    the state any more, a tilt held for long decays, by 6 % a step at the limit.
+    """
     record = record_of(name)
     signs = [-1, 1, 0, 1, -1, 1, -1, 0, -1, 1] + [0] * 8
     linear, plant = at(20.0), at(20.0)
@@ -135,7 +197,7 @@ def test_open_loop_the_plant_drifts_from_the_lpv_model_as_the_model_note_says(
     assert worst[X] < apart_m
     assert worst[VX] < apart_mps
     assert worst[Z] < 0.05
-    assert worst[PHI:DOD].max() < 1e-3
+    assert worst[PHI:DOD].max() < apart_rad
     assert worst[DOD] < 1e-3
 
 
@@ -212,7 +274,7 @@ def test_the_plant_is_alike_in_north_and_east_and_wherever_it_begins(
 @pytest.mark.parametrize("dt_s", STEPS_S)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_long_random_flight_of_the_plant_keeps_its_bounds_but_for_a_little(name, dt_s):
-    """Tilt and rates stay within 5 %; wind or rotors may take the speed 8 % beyond its limit."""
+    """Tilt and rates stay within 5 %; the speed, which the loop only foretells, within 8 %."""
     rng = np.random.default_rng(5)
     limits = load(name).limits
     commands = [
@@ -287,7 +349,7 @@ def rotors(name, n_motors):
     )
 
 
-@pytest.mark.parametrize("n_motors", [4, 6, 8])
+@pytest.mark.parametrize("n_motors", [4, 5, 6, 7, 8, 12])
 def test_motors_give_the_thrust_and_torques_asked_for(n_motors):
     vehicle = rotors("s500_v2", n_motors)
     record = compile_vehicle(vehicle, 1.0)[()]
@@ -310,7 +372,7 @@ def test_motors_give_the_thrust_and_torques_asked_for(n_motors):
 
 @settings(max_examples=80, deadline=None, derandomize=True)
 @given(
-    st.sampled_from([4, 6, 8]),
+    st.sampled_from([3, 4, 5, 6, 8]),
     st.floats(-1e3, 1e3),
     st.lists(st.floats(-100.0, 100.0), min_size=3, max_size=3),
 )
@@ -325,7 +387,19 @@ def test_a_saturated_motor_stays_within_what_it_can_give(n_motors, thrust_N, tor
     assert np.abs(torque[:2]).max() <= record.arm_m * strongest * n_motors
 
 
-MIXERS = {n: compile_vehicle(rotors("s500_v2", n), 1.0)[()] for n in (4, 6, 8)}
+def test_a_tricopter_balances_its_yaw_torque_by_tilting_a_rotor():
+    vehicle = rotors("s500_v2", 3)
+    record = compile_vehicle(vehicle, 1.0)[()]
+    torque, motors = np.array([0.1, -0.05, 0.02]), np.zeros(3)
+    assert mix(record, vehicle.weight_N, torque, motors) == pytest.approx(vehicle.weight_N)
+    np.testing.assert_allclose(torque, [0.1, -0.05, 0.02], rtol=0, atol=1e-12)
+    x, u = at(20.0), np.zeros(N_INPUTS)
+    for _ in range(20):
+        plant_step(record, x, u, x)
+    np.testing.assert_allclose(x[RIGID], at(20.0)[RIGID], rtol=0, atol=1e-9)
+
+
+MIXERS = {n: compile_vehicle(rotors("s500_v2", n), 1.0)[()] for n in (3, 4, 5, 6, 8)}
 
 
 def test_torques_act_on_the_plant_as_on_the_lpv_model():

@@ -78,8 +78,8 @@ class Actions(Protocol):
         """A new space of the whole swarm."""
         ...
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
-        """Write an action into `asked` (4,), not yet known to be finite.
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
+        """Write an action into row i of `asked` (U, size), not yet known to be finite.
 
         Raises:
             ValueError: It has a wrong type or shape; names UAS and value.
@@ -111,7 +111,7 @@ class Continuous:
         """The boxes of all UAS, one after the other."""
         return spaces.Box(-1.0, 1.0, (n_uas * self.size,), np.float32)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
         """Write the numbers; any real numbers in the right shape will do."""
         if type(action) is not np.ndarray:
             action = _as_array(name, action)
@@ -124,7 +124,7 @@ class Continuous:
                 f"action of {name} has shape {action.shape}: {_shown(action)}; "
                 f"give {self.size} numbers, shape ({self.size},)"
             )
-        asked[: self.size] = action
+        asked[i] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One row of numbers for each UAS."""
@@ -153,7 +153,7 @@ class Choice:
         """One choice for each UAS."""
         return spaces.MultiDiscrete([HOME_CHOICE + 1] * n_uas)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
         """Write the choice; any whole number in range will do, also as an array without axes."""
         if isinstance(action, np.ndarray) and action.shape == ():
             action = action[()]
@@ -163,7 +163,7 @@ class Choice:
                 f"action of {name} is {_shown(action)} of type {type(action).__name__}; "
                 f"give a whole number from 0 to {HOME_CHOICE} (home)"
             )
-        asked[0] = action
+        asked[i] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One choice for each UAS."""
@@ -255,7 +255,7 @@ def write_commands(state, kind, ranges, asked, candidates, targets, commands):
         state: The state of the world.
         kind: Kind of command.
         ranges: (U,) of RANGES_DTYPE.
-        asked: (U, 4) the actions, finite.
+        asked: (U, size) the actions, finite.
         candidates: (U, K_WAYPOINTS) waypoints to choose from; -1 where there is none.
         targets: (U,) where each is flying to; updated by the waypoint action.
         commands: (U,) of COMMAND_DTYPE; written.
@@ -264,8 +264,9 @@ def write_commands(state, kind, ranges, asked, candidates, targets, commands):
         command = commands[i]
         command.kind = kind
         command.returning = False
+        command.values[:] = 0.0
         if kind != GO_TO:
-            for k in range(4):
+            for k in range(asked.shape[1]):
                 share = min(max(asked[i, k], -1.0), 1.0)
                 middle = ranges[i].middle[k]
                 if share < 0.0:
@@ -278,7 +279,6 @@ def write_commands(state, kind, ranges, asked, candidates, targets, commands):
             targets[i] = HOME
         elif candidates[i, choice] >= 0:
             targets[i] = candidates[i, choice]
-        command.values[:] = 0.0
         command.values[0] = targets[i]
         command.returning = targets[i] == HOME
         if targets[i] == NO_TARGET:

@@ -20,7 +20,7 @@ from uas_coverage_env.env.kernel import (
     REPORT_SIZE,
     RETURNING,
     STATUS,
-    step_episode,
+    compiled_step,
 )
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
@@ -38,7 +38,6 @@ from uas_coverage_env.world import (
     World,
 )
 
-_N_TERMS = len(REWARD_TERMS)
 _LONGEST = 100_000
 
 
@@ -61,7 +60,7 @@ class Episode:
         max_cycles: As given; may be changed.
         chooses: Whether the action is a choice of waypoints.
         steps: Flown since t = 0.
-        asked: (U, 4) the actions of the coming step, to be written before it.
+        asked: (U, size) the actions of the coming step, to be written before it.
         observation: (U, OBSERVATION_SIZE) the latest; a new array in every step.
 
     Raises:
@@ -107,7 +106,7 @@ class Episode:
         n_uas = len(self.names)
         self._scales = scales_of(scenario)
         self._neighbours = neighbours_of(scenario)
-        self.asked = np.zeros((n_uas, 4))
+        self.asked = np.zeros((n_uas, self.actions.size))
         self._targets = np.full(n_uas, NO_TARGET)
         self._candidates = np.full((n_uas, K_WAYPOINTS), -1)
         self._company = np.zeros((len(scenario.waypoints), 2))
@@ -136,6 +135,15 @@ class Episode:
             self._outcome,
             self._report,
         )
+        self._step = compiled_step((*self._fixed, self.max_cycles, self.observation))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # machine code does not travel
+        return {key: value for key, value in self.__dict__.items() if key != "_step"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._step = compiled_step((*self._fixed, self.max_cycles, self.observation))
 
     def reset(self) -> None:
         """Begin a new mission."""
@@ -174,10 +182,9 @@ class Episode:
             ValueError: An action is not finite; names UAS and value, and nothing has changed.
         """
         observation = self.observation.copy()
-        given: tuple[Any, ...] = (*self._fixed, self.max_cycles, observation)
-        invalid = step_episode(*given)
+        invalid = self._step(*self._fixed, self.max_cycles, observation)
         if invalid != ACCEPTED:
-            numbers_asked = self.asked[invalid, : self.actions.size].tolist()
+            numbers_asked = self.asked[invalid].tolist()
             self.asked[invalid] = 0.0
             raise ValueError(
                 f"action of {self.names[invalid]} is {numbers_asked}; give finite numbers"

@@ -123,7 +123,7 @@ def _rival(state, i, position_m, targets, w):
             dy = position_m[1] - state.x[j, Y]
             dz = position_m[2] - state.x[j, Z]
             nearest_m = min(nearest_m, apart_m(dx, dy, dz))
-            taken = taken or targets[j] == w
+            taken = taken or (targets[j] == w and not state.returning[j])
     return nearest_m, taken
 
 

@@ -1,5 +1,6 @@
 """The multi-agent environment: one agent per UAS, all act at once (PettingZoo)."""
 
+import operator
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
@@ -150,7 +151,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     @max_cycles.setter
     def max_cycles(self, steps: int) -> None:
-        self._episode.max_cycles = steps
+        self._episode.max_cycles = operator.index(steps)
 
     @property
     def scenario(self) -> Scenario:
@@ -222,7 +223,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         for agent in agents:
             if agent not in actions:
                 self._refuse(actions)
-            accept(agent, actions[agent], asked[index[agent]])
+            accept(agent, actions[agent], asked, index[agent])
         report = episode.step()
 
         observation = episode.observation
@@ -258,8 +259,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Raises:
             ValueError: It could not; names agent and value.
         """
-        asked = np.zeros(4)
-        self._episode.actions.accept(agent, action, asked)
+        asked = np.zeros((1, self._episode.actions.size))
+        self._episode.actions.accept(agent, action, asked, 0)
         if not np.isfinite(asked).all():
             raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
 

@@ -140,7 +140,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         episode = self._episode
         rows = episode.actions.joint_rows(action, len(episode.names))
         for i, (name, row) in enumerate(zip(episode.names, rows, strict=True)):
-            episode.actions.accept(name, row, episode.asked[i])
+            episode.actions.accept(name, row, episode.asked, i)
         report = episode.step()
         info = self._info(report)
         flies = any(row[STATUS] == FLYING for row in report)

@@ -25,6 +25,19 @@ _RAYS = (
 
 
 @njit(cache=True, error_model="numpy")
+def _farthest_face(normals, offsets_m, first, last, x, y, z):
+    """The face plane that a point is farthest out of, and how far [m]."""
+    farthest = first
+    largest = -math.inf
+    for h in range(first, last):
+        d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+        if d > largest:
+            largest = d
+            farthest = h
+    return farthest, largest
+
+
+@njit(cache=True, error_model="numpy")
 def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
     """How far a ray goes before it enters a hull, at most free_m."""
     enters_m = 0.0
@@ -92,11 +105,13 @@ def surroundings(arena, state, i, row, k):
             continue
         first = obstacle.first_face
         last = obstacle.last_face
-        away_m = signed_distance(normals, offsets_m, first, last, x, y, z)
+        face, away_m = _farthest_face(normals, offsets_m, first, last, x, y, z)
         clearance_m = min(clearance_m, away_m)
-        if away_m < RAY_M:
-            for ray in range(N_RAYS):
-                dx, dy, dz = _RAYS[ray]
+        for ray in range(N_RAYS):
+            dx, dy, dz = _RAYS[ray]
+            slope = normals[face, 0] * dx + normals[face, 1] * dy + normals[face, 2] * dz
+            # most rays do not even reach the plane of this face
+            if away_m <= -slope * row[k + ray]:
                 row[k + ray] = _ray_to_hull(
                     normals, offsets_m, first, last, x, y, z, dx, dy, dz, row[k + ray]
                 )

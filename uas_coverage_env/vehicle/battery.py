@@ -79,7 +79,7 @@ def open_circuit_voltage(vehicle: VehicleParams, dod: ArrayLike) -> NDArray[np.f
         (...) [V].
     """
     battery = vehicle.battery
-    return np.asarray(np.interp(dod, battery.ocv_dod, battery.ocv_V), float)
+    return np.asarray(np.interp(np.asarray(dod, float), battery.ocv_dod, battery.ocv_V))
 
 
 def polarisation_decay(vehicle: VehicleParams, dt_s: float, order: int = 4) -> float:

@@ -213,4 +213,5 @@ def _rotor_map(vehicle: VehicleParams) -> NDArray[np.float64]:
 
 def _mixer(rotor_map: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N_M, 4) pseudo-inverse of the map from motor thrusts to thrust and torques."""
-    return np.linalg.pinv(np.column_stack([np.ones(len(rotor_map)), rotor_map]).T)
+    whole = np.column_stack([np.ones(len(rotor_map)), rotor_map])
+    return np.asarray(np.linalg.pinv(whole.T), np.float64)

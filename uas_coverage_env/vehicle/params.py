@@ -195,6 +195,10 @@ class VehicleParams(StrictModel):
     thrust_correction: ThrustCorrection
     return_rule: ReturnRule
 
+    def __hash__(self) -> int:
+        # models of a vehicle are cached by it
+        return hash(tuple(self.__dict__[name] for name in type(self).model_fields))
+
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         body, limits = self.airframe, self.limits

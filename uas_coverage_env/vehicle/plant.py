@@ -43,7 +43,7 @@ _ANGLE_GAIN_PER_S = 5.0
 _RATE_GAIN_PER_S = 20.0
 # what the flight controller refuses to ask for, whatever the wrench says
 _TILT_ASKED_RAD = 1.0
-_RATE_ASKED_RADPS = 5.0
+_RATE_ASKED_RADPS = 3.0
 # stops of the simulation, far from any flight of ours: Euler angles end at 90 degrees
 _TILT_STOP_RAD = 1.3
 _RATE_STOP_RADPS = 50.0
@@ -163,12 +163,11 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     _asked(linear * ct, rate * ct - linear * turn, alpha_roll * ct - 2.0 * rate * turn, roll)
     yaw_rate = first[5] + alpha_yaw * time_s
     yaw = first[2] + (first[5] + yaw_rate) * half
-    yaw_rate = min(max(yaw_rate, -_RATE_ASKED_RADPS), _RATE_ASKED_RADPS)
-    yaw_error = min(max(yaw - x[PSI], -1.0), 1.0)
     # Euler rates wanted, then body rates by the inverse of W
     phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[PHI])
     theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[THETA])
-    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * yaw_error
+    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * (yaw - x[PSI])
+    psi_rate = min(max(psi_rate, -_RATE_ASKED_RADPS), _RATE_ASKED_RADPS)
     sp = math.sin(x[PHI])
     cp = math.cos(x[PHI])
     st = math.sin(x[THETA])

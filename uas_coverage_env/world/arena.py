@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
+from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.world.routes import node_distances
 
 NEAR_M = 20.0
@@ -89,6 +90,8 @@ RULES_DTYPE = _record(
         ("ceiling_m", "f8"),
         # how far guidance and safety filter look ahead: time to brake from any speed
         ("lookahead_steps", "i8"),
+        # the command to stop and hold still
+        ("brake", COMMAND_DTYPE),
     ]
 )
 
@@ -214,6 +217,7 @@ def _rules(scenario: Scenario) -> NDArray[np.void]:
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
     rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - ROUTE_MARGIN_M
+    rules["brake"]["kind"] = CLIMB
     rules["lookahead_steps"] = np.ceil(LOOKAHEAD_S / scenario.dt_s)
     return rules
 

@@ -76,12 +76,12 @@ def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
     """Speed towards the end of a leg [m/s]: slower for turns, a stop, and a climb or descent."""
     uas = arena.uas[i]
     if leg == ROUND_CORNER:
-        return min(uas.speed_mps, 0.42 * uas.speed_mps + 0.2 * distance_m)
+        return min(uas.speed_mps, 0.65 * uas.speed_mps + 0.25 * distance_m)
     if stop:
         return min(uas.speed_mps, 0.28 * distance_m)
     # flying by: fast, but not past the sphere before the altitude is reached
     missing_m = abs(altitude1_m + x[Z]) - 0.6 * arena.waypoints[target].radius_m
-    speed_mps = min(uas.speed_mps, 0.58 * uas.speed_mps + 0.16 * max(0.0, distance_m - 8.0))
+    speed_mps = min(uas.speed_mps, 0.75 * uas.speed_mps + 0.2 * max(0.0, distance_m - 8.0))
     if missing_m > 0.0:
         rate_mps = uas.climb_mps if altitude1_m > -x[Z] else uas.descent_mps
         speed_mps = min(speed_mps, 0.5 + distance_m / (missing_m / rate_mps + LEAD_S))
@@ -117,8 +117,13 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
     """
     row, x1, y1, z1 = target_position(arena, i, target)
     end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
-    ahead_x = end_x - x[X] - LEAD_S * x[VX]
-    ahead_y = end_y - x[Y] - LEAD_S * x[VY]
+    lead_s = LEAD_S
+    if not stop or leg == ROUND_CORNER:
+        # to look beyond what is flown by would turn the UAS round before it gets there
+        left_m = math.hypot(end_x - x[X], end_y - x[Y])
+        lead_s = min(LEAD_S, 0.5 * left_m / (math.hypot(x[VX], x[VY]) + 1e-9))
+    ahead_x = end_x - x[X] - lead_s * x[VX]
+    ahead_y = end_y - x[Y] - lead_s * x[VY]
     distance_m = math.hypot(ahead_x, ahead_y)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
     approach_mps = _approach_speed(arena, i, x, target, stop, distance_m, leg, -z1)

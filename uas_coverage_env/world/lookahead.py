@@ -21,9 +21,9 @@ from uas_coverage_env.vehicle import (
     plant_step,
     reseed_reference,
 )
-from uas_coverage_env.world.commands import COMMAND_DTYPE, WRENCH
+from uas_coverage_env.world.commands import WRENCH
 from uas_coverage_env.world.contacts import face_between, moving_clearance
-from uas_coverage_env.world.control import command_wrench, write_brake
+from uas_coverage_env.world.control import command_wrench
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
 
@@ -86,8 +86,6 @@ def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m
     x = start.copy()
     governed = reference.copy()
     u = np.zeros(5)
-    brake = np.zeros(1, dtype=COMMAND_DTYPE)[0]
-    write_brake(brake)
     hold_steps = max(1, int(hold_s / arena.rules[0].dt_s))
     path_m[0, 0] = x[X]
     path_m[0, 1] = x[Y]
@@ -96,7 +94,7 @@ def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m
         if k < hold_steps:
             command_wrench(vehicle, x, governed, command, u)
         else:
-            command_wrench(vehicle, x, governed, brake, u)
+            command_wrench(vehicle, x, governed, arena.rules[0].brake, u)
         if nonlinear:
             plant_step(vehicle, x, u, x)
         else:

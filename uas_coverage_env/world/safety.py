@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from uas_coverage_env.vehicle import VX, VY, Z
-from uas_coverage_env.world.commands import ACCELERATION, CLIMB, COMMAND_DTYPE, VELOCITY
+from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.world.control import write_brake, write_command
 from uas_coverage_env.world.lookahead import (
     ONE_STEP_S,
@@ -152,8 +152,7 @@ def filter_commands(arena, state, nonlinear, outcome):
     n_uas = state.status.shape[0]
     n_steps = arena.rules[0].lookahead_steps
     committed_m = np.empty((n_uas, n_steps + 1, 3))
-    brake = np.zeros(1, dtype=COMMAND_DTYPE)[0]
-    write_brake(brake)
+    brake = arena.rules[0].brake
     # the first UAS decides before anybody asks where it would brake
     for i in range(1, n_uas):
         if state.status[i] == FLYING:

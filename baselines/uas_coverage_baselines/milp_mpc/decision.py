@@ -45,7 +45,7 @@ class Effort:
 
 
 _RESERVE = 0.06  # share of the time limit kept for verification and whatever is late
-_RESTRICTED_SHARE = 0.5  # of the time limit, for one restricted program at most
+_RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
 _WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
 _RESTRICTED_NODES = 60
 _JOINT_NODES = 1
@@ -115,7 +115,8 @@ class _Search:
         if not self.effort.deterministic and left < _WORTHWHILE_S:
             return None
         program = self._own[uas]
-        lower, upper = program.near(flight.positions_m[None], flight.visit[None])
+        path, visits = flight.positions_m[None], flight.visit[None]
+        lower, upper = program.near(path, visits)
         limits = SolverLimits(
             time_s=min(_RESTRICTED_SHARE * self.effort.time_limit_s, left),
             nodes=None,
@@ -125,7 +126,8 @@ class _Search:
         )
         if self.effort.deterministic:
             limits = replace(limits, time_s=None, nodes=_RESTRICTED_NODES)
-        solution = solve(program.built, limits, lower=lower, upper=upper)
+        start = program.start(path, visits)
+        solution = solve(program.built, limits, start=start, lower=lower, upper=upper)
         return None if solution.values is None else program.plan(solution)
 
     def collect(self, tasks: Sequence[tuple[int, Flight]], plans: Sequence[Plan | None]) -> None:
@@ -162,7 +164,9 @@ class _Search:
         limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
         if self.effort.deterministic:
             limits = replace(limits, time_s=None, nodes=_JOINT_NODES)
-        start = None if self._best is None else program.start(self._best)
+        start = None
+        if self._best is not None:
+            start = program.start(self._best.x[:, :, 0:3], _visits(self.problem, self._best))
         solution = solve(program.built, limits, start=start)
         self._bound = solution.bound
         if solution.values is not None:
@@ -203,10 +207,15 @@ def left_over_flights(problem: PlanningProblem, left: Plan, dt_s: float) -> list
 
 def _as_flight(problem: PlanningProblem, uas: int, plan: Plan) -> Flight:
     """A UAS's own plan as a flight: what it covers when, and what it costs besides."""
-    covers = plan.covers[0][:, problem.waypoint_index]
-    visit = np.where(covers.any(axis=0), covers.argmax(axis=0), NEVER)
+    visit = _visits(problem, plan)[0]
     gained = problem.waypoint_weight * np.maximum(problem.horizon - visit, 0)
     return Flight(plan.x[0, :, 0:3], visit, plan.objective + float(gained.sum()), 0.0)
+
+
+def _visits(problem: PlanningProblem, plan: Plan) -> NDArray[np.int64]:
+    """(U, W) step at which the plan covers each of the problem's waypoints, `NEVER` if not."""
+    covers = plan.covers[:, :, problem.waypoint_index]
+    return np.where(covers.any(axis=1), covers.argmax(axis=1), NEVER)
 
 
 def _joined(problem: PlanningProblem, plans: Sequence[Plan]) -> Plan:

@@ -183,8 +183,9 @@ def target_of(
     The target's waypoint is the scenario's index.
 
     The weights are normalised by the distance now, so that they do not outweigh coverage far
-    out. The return weight grows as the time the battery still gives shrinks towards the time
-    the way home takes; with nothing left to cover it is large at once.
+    out. The return weight grows from little, while the way home takes a small part of the time the
+    battery still gives, beyond all else, once it takes most of it; with nothing left to cover it
+    is large at once.
 
     Args:
         memory: mode and transit target.
@@ -202,6 +203,6 @@ def target_of(
     if memory.mode is Mode.RETURN:
         distance = max(float(np.linalg.norm(home_m - now.position_m)), _NEAR_M)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
-        growth = 1.0 / (1.0 - urgency) if now.uncovered.any() else 4.0
+        growth = urgency / (1.0 - urgency) if now.uncovered.any() else 4.0
         return Target(home_m, weights.homing * growth / distance)
     return None

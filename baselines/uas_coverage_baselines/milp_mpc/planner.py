@@ -52,6 +52,12 @@ class Options(PlannerOptions):
         le=50.0,
         description="added for a moving obstacle's next change of velocity",
     )
+    priority_per_s: float = Field(
+        default=0.15,
+        ge=0.0,
+        le=10.0,
+        description="added to a waypoint's weight per second its coverage takes off the way left",
+    )
     teams: int = Field(
         default=6, ge=1, le=20, description="constructed teams whose flights are refined"
     )

@@ -76,16 +76,24 @@ class Program:
             lower[_made(relaxed[~used])] = 1.0
         return lower, upper
 
-    def start(self, plan: Plan) -> tuple[NDArray[np.int64], FloatArray]:
-        """A plan's whole-number columns and their values, for the solver to start from."""
-        covers = plan.covers[:, :, self.problem.waypoint_index]
+    def start(
+        self, positions_m: FloatArray, visits: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], FloatArray]:
+        """Whole-number columns and their values along flights, for the solver to start from.
+
+        Args:
+            positions_m: (U, N+1, 3) the flights.
+            visits: (U, W) first step at which each covers a waypoint, `NEVER` if not.
+        """
+        steps = np.arange(self.problem.horizon)[None, :, None]
+        covers = steps == visits[:, None, :]
         columns, values = [self.variables.covers.ravel()], [covers.astype(float).ravel()]
         for separation in self._separations:
             binaries = binary_columns(self.milp, separation)
             if binaries is None:
                 continue
             crossed = binaries[1]
-            spare = _spare_over_intervals(separation, plan.x[:, :, 0:3])
+            spare = _spare_over_intervals(separation, positions_m)
             best = spare.argmax(axis=2)[..., None]
             chosen = np.arange(spare.shape[2]) != best
             columns.append(crossed.ravel())

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks import coverable
+from uas_coverage_baselines.milp_mpc.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem, Target, Weights
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.scenario import Scenario
@@ -41,6 +42,11 @@ class Formulation(Protocol):
     @property
     def margin_m(self) -> float:
         """Added to every clearance."""
+        ...
+
+    @property
+    def priority_per_s(self) -> float:
+        """Added to W_Phi per second that covering a waypoint saves, see `priority`."""
         ...
 
     @property
@@ -113,6 +119,11 @@ class Surroundings:
         fixed = np.array([o.safe_distance_m for o in self.scenario.obstacles])
         moving = np.array([o.safe_distance_m for o in self.scenario.moving_obstacles])
         open_now = np.flatnonzero(swarm.uncovered)
+        weight = self._waypoint_weight.copy()
+        if options.priority_per_s > 0.0 and len(open_now):
+            speed = min(self._vehicles[name].limits.v_xy_max_mps for name in names)
+            saved = seconds_saved(self.waypoints_m[open_now], speed)
+            weight[open_now] += options.priority_per_s * saved
         vehicles = tuple(self._vehicles[name] for name in names)
         problem = PlanningProblem(
             names=names,
@@ -134,7 +145,7 @@ class Surroundings:
             ),
             waypoints_m=self.waypoints_m[open_now],
             waypoint_reach_m=self._waypoint_reach_m[open_now],
-            waypoint_weight=self._waypoint_weight[open_now],
+            waypoint_weight=weight[open_now],
             waypoint_index=open_now,
             n_scenario_waypoints=len(self.waypoints_m),
             targets=(),
@@ -148,7 +159,7 @@ class Surroundings:
             problem,
             waypoints_m=self.waypoints_m[index],
             waypoint_reach_m=self._waypoint_reach_m[index],
-            waypoint_weight=self._waypoint_weight[index],
+            waypoint_weight=weight[index],
             waypoint_index=index,
             targets=tuple(_in_rows(targets[name], index) for name in names),
         )
