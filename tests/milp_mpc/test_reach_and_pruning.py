@@ -18,7 +18,7 @@ OPEN_SKY = box((-1000.0, -1000.0, -1000.0), (1000.0, 1000.0, 1000.0))
 DIRECTIONS = np.vstack(
     [closed_cylinder_faces(8), sphere_faces(8), [[0.3, -0.9, 0.1], [2.0, 1.0, -3.0]]]
 )
-LOST_TO_THE_BOUND_M = 25.0  # after 18 steps, of more than 150 m; nothing is lost vertically
+LOST_TO_THE_BOUND_M = 30.0  # after 18 steps, of some 200 m; nothing is lost vertically
 
 speeds = st.floats(-14.0, 14.0).map(lambda value: round(value, 1))
 commands = st.lists(
@@ -65,10 +65,11 @@ def farthest(problem, steps):
 def test_reachable_sets_hold_the_farthest_flights_and_are_not_silly(vehicle, seed, dt_s):
     start = already_flying(vehicle, seed, dt_s)
     problem = toy(start, horizon=18, vehicles=[vehicle], fence=OPEN_SKY, dt_s=dt_s)
-    steps = [1, 4, 18]
+    steps = [1, 18]
     reach, true = problem.reach.support(DIRECTIONS)[0][steps], farthest(problem, steps)
     assert (true <= reach + 1e-6).all()
-    assert (reach <= true + LOST_TO_THE_BOUND_M).all()
+    length = np.linalg.norm(DIRECTIONS, axis=1)
+    assert (reach - true <= LOST_TO_THE_BOUND_M * length).all()
     vertical = [8, 9]
     assert reach[:, vertical] == pytest.approx(true[:, vertical], abs=2e-3)
 
@@ -138,7 +139,7 @@ def small_but_complete(seed, prune):
         hull = box(middle - half, middle + half)
         if all(hull.signed_distance(x[:3]) > 1.2 for x in states):
             obstacles.append(hull)
-    N = 6 - seed % 2
+    N = 6 - n_uas + (seed < 4)
     path = centre + (9.0, -6.0, 2.0) + np.outer(np.arange(N + 1), (0.0, 1.5, 0.0))
     return toy(
         *states,
@@ -164,7 +165,7 @@ def test_pruning_changes_no_optimum(seed):
         formulate(small_but_complete(seed, prune))[0].build() for prune in (False, True)
     )
     assert pruned.integer.sum() < whole.integer.sum()
-    assert pruned.matrix.shape[0] < whole.matrix.shape[0]
+    assert len(pruned.row_lower) < len(whole.row_lower)
     best, best_pruned = solve(whole, limits), solve(pruned, limits)
     assert best.status is SolveStatus.OPTIMAL
     assert best_pruned.status is SolveStatus.OPTIMAL

@@ -42,7 +42,7 @@ def clearance_of_segment(hull, start, end):
 
 
 def clearance_of_cylinder(radius_m, half_height_m, start, end):
-    """Smallest distance of a relative segment from an upright cylinder: search on a convex curve."""
+    """Smallest distance of a relative segment from an upright cylinder, searched in thirds."""
 
     def distance(fraction):
         x, y, z = start + fraction * (end - start)

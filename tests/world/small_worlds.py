@@ -1,12 +1,14 @@
 """Small missions for the tests of the world."""
 
+import itertools
+
 from uas_coverage_env.scenario import Scenario
 
 
 def box(name, low, high, safe_distance_m=2.0):
     """A box-shaped obstacle between two corners."""
-    corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-    return {"name": name, "safe_distance_m": safe_distance_m, "vertices_m": tuple(corners)}
+    corners = tuple(itertools.product(*zip(low, high, strict=True)))
+    return {"name": name, "safe_distance_m": safe_distance_m, "vertices_m": corners}
 
 
 def mover(start_m, *schedule, radius_m=4.0, height_m=6.0, safe_distance_m=3.0, name="mover"):

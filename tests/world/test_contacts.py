@@ -49,9 +49,7 @@ def test_two_uas_that_swap_places_collide():
     for i, speed in enumerate((8.0, -8.0)):
         world.state.x[i, VX] = speed
         world.state.reference[i] = speed, 0.0
-    outcome = world.step(
-        {"uas_1": Velocity(8.0, 0.0, 10.0), "uas_2": Velocity(-8.0, 0.0, 10.0)}
-    )
+    outcome = world.step({"uas_1": Velocity(8.0, 0.0, 10.0), "uas_2": Velocity(-8.0, 0.0, 10.0)})
     assert world.state.x[0, X] > world.state.x[1, X] + 5.0
     assert contacts(outcome) == ["uas", "uas"]
     assert outcome["contact_with"].tolist() == [1, 0]

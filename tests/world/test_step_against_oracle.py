@@ -18,7 +18,7 @@ from uas_coverage_env.world import (
     World,
 )
 
-VELOCITY, ACCELERATION, WRENCH = (KIND_NAMES.index(n) for n in ("velocity", "acceleration", "wrench"))
+VELOCITY, ACCELERATION, WRENCH = map(KIND_NAMES.index, ("velocity", "acceleration", "wrench"))
 
 
 def crowded():

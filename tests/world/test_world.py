@@ -141,7 +141,8 @@ def test_after_a_wrench_the_inner_loop_goes_on_from_the_velocity_reached():
 
 
 def test_a_mission_can_be_flown_beyond_its_last_step():
-    world = World(meadow(max_steps=2, moving_obstacles=[mover((20.0, 20.0, -9.0), (0.0, (0.1, 0.0, 0.0)))]))
+    slow = mover((20.0, 20.0, -9.0), (0.0, (0.1, 0.0, 0.0)))
+    world = World(meadow(max_steps=2, moving_obstacles=[slow]))
     for _ in range(80):
         world.step({"uas_1": Velocity(0.0, 0.0, 1.0)})
     assert world.state.step[0] == 80

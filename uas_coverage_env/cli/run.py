@@ -16,6 +16,7 @@ from uas_coverage_env.flight import (
     Flight,
     accomplished,
     check_directory,
+    draw_flight,
     energy_Wh,
     load_planner,
     rollout,
@@ -81,6 +82,7 @@ def run(
                 on_step=on_step,
             )
         flight.save(directory, overwrite=overwrite)
+        draw_flight(flight, directory / "map.png")
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()

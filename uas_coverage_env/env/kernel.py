@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numba import config, njit, typeof
+from numba import njit, typeof
 
 from uas_coverage_env.env.actions import first_not_finite, write_commands
 from uas_coverage_env.env.nearest import count_company
@@ -106,6 +106,6 @@ def compiled_step(arguments: Sequence[Any]) -> Callable[..., int]:
     Called directly, it spares numba's look at the type of each of its 35 arguments, a tenth of a
     step. The caller has to keep to the types.
     """
-    if config.DISABLE_JIT:
-        return step_episode
+    if not hasattr(step_episode, "compile"):
+        return step_episode  # NUMBA_DISABLE_JIT=1: a function like any other
     return step_episode.compile(tuple(typeof(argument) for argument in arguments))

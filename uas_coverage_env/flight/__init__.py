@@ -2,6 +2,7 @@
 
 from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home, summary
+from uas_coverage_env.flight.picture import draw_flight, flight_picture
 from uas_coverage_env.flight.planner import (
     Assistants,
     AssistedOptions,
@@ -38,7 +39,9 @@ __all__ = [
     "check_directory",
     "coverage",
     "describe_planners",
+    "draw_flight",
     "energy_Wh",
+    "flight_picture",
     "home",
     "load_planner",
     "planner_names",

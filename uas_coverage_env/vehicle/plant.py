@@ -141,7 +141,7 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     Args:
         vehicle: record of VEHICLE_DTYPE.
         x: (14,) state now.
-        first: (6,) Euler angles and body rates at the start of the step.
+        first: (6,) Euler angles and their rates in the LPV model at the start of the step.
         u: (5,) wrench of the step.
         time_s: [s] since the start of the step.
         roll: (3,) room for angle, rate, acceleration.
@@ -167,7 +167,7 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[PHI])
     theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[THETA])
     psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * (yaw - x[PSI])
-    psi_rate = min(max(psi_rate, -_RATE_ASKED_RADPS), _RATE_ASKED_RADPS)
+    psi_rate = min(max(psi_rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
     sp = math.sin(x[PHI])
     cp = math.cos(x[PHI])
     st = math.sin(x[THETA])
@@ -231,6 +231,11 @@ def plant_step(vehicle, x, u, x_next):
         x_next[s] = x[s]
     for s in range(6):
         first[s] = x_next[PHI + s]
+    # the LPV model reads body rates as rates of the angles; of a body that spins, the part of the
+    # spin in them changes no tilt and would be taken for more and more of it
+    _euler_rates(x_next, roll)
+    first[3] += math.sin(x_next[THETA]) * roll[2]
+    first[4] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
     correction = 0.0
     charge = 0.0
     energy = 0.0

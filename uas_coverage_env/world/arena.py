@@ -22,7 +22,7 @@ ROUTE_MARGIN_M = 1.0
 NODE_MARGIN_M = 1.0
 """Corners of routes lie this much outside of what routes avoid, so that they see past it [m]."""
 
-LOOKAHEAD_S = 12.0
+LOOKAHEAD_S = 14.0
 """A braking flight takes less than this from the highest speed [s]."""
 
 SAMPLES_AFTER_END = 64
@@ -145,12 +145,9 @@ def build_arena(scenario: Scenario) -> Arena:
     normals = np.concatenate([rows[0] for rows in planes])
     offsets_m = np.concatenate([rows[1] for rows in planes])
     nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
-    times_s = scenario.dt_s * np.arange(scenario.max_steps + SAMPLES_AFTER_END + 1)
-    shape = (len(times_s), len(scenario.moving_obstacles), 3)
-    path_m = [scenario.moving_positions(float(time_s)) for time_s in times_s]
-    velocity_mps = [scenario.moving_velocities(float(time_s)) for time_s in times_s]
+    moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
-        vehicles=np.stack([compile_vehicle(v, scenario.dt_s) for v in scenario.vehicles]),
+        vehicles=_vehicles(scenario),
         uas=uas,
         obstacles=obstacles,
         normals=np.ascontiguousarray(normals),
@@ -159,8 +156,8 @@ def build_arena(scenario: Scenario) -> Arena:
             [(m.radius_m, m.height_m / 2, m.safe_distance_m) for m in scenario.moving_obstacles],
             dtype=MOVING_DTYPE,
         ),
-        moving_path_m=np.array(path_m).reshape(shape),
-        moving_velocity_mps=np.array(velocity_mps).reshape(shape),
+        moving_path_m=moving_path_m,
+        moving_velocity_mps=moving_velocity_mps,
         waypoints=waypoints,
         rules=rules,
         nodes_m=nodes_m,
@@ -168,6 +165,24 @@ def build_arena(scenario: Scenario) -> Arena:
             obstacles, normals, offsets_m, nodes_m, np.ascontiguousarray(targets_m[:, :2])
         ),
     )
+
+
+def _vehicles(scenario: Scenario) -> NDArray[np.void]:
+    kinds = {uas.vehicle: v for uas, v in zip(scenario.uas, scenario.vehicles, strict=True)}
+    compiled = {name: compile_vehicle(v, scenario.dt_s) for name, v in kinds.items()}
+    return np.stack([compiled[uas.vehicle] for uas in scenario.uas])
+
+
+def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions [m] and velocities [m/s] of the moving obstacles at every sample, (T+1, M, 3)."""
+    n_samples = scenario.max_steps + SAMPLES_AFTER_END + 1
+    path_m = np.zeros((n_samples, len(scenario.moving_obstacles), 3))
+    velocity_mps = np.zeros_like(path_m)
+    if scenario.moving_obstacles:
+        for k in range(n_samples):
+            path_m[k] = scenario.moving_positions(k * scenario.dt_s)
+            velocity_mps[k] = scenario.moving_velocities(k * scenario.dt_s)
+    return path_m, velocity_mps
 
 
 def _waypoints(scenario: Scenario) -> NDArray[np.void]:
@@ -243,9 +258,9 @@ def _widened(hull: ConvexPolytope, distance_m: float) -> NDArray[np.float64]:
     return corners.intersections + inside
 
 
-def _footprint(hull: ConvexPolytope, distance_m: float) -> ConvexHull:
-    corners = np.unique(_widened(hull, distance_m)[:, :2].round(6), axis=0)
-    return ConvexHull(corners)
+def _footprint(corners_m: NDArray[np.float64]) -> ConvexHull:
+    # to the micrometre: corners that differ by rounding only would make sides of no length
+    return ConvexHull(np.unique(corners_m[:, :2].round(6), axis=0))
 
 
 def _obstacles(
@@ -263,7 +278,8 @@ def _obstacles(
     for record, obstacle, hull in zip(records, scenario.obstacles, scenario.hulls, strict=True):
         wall_m = radius_m + obstacle.safe_distance_m + ROUTE_MARGIN_M
         near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M)
-        footprint = _footprint(hull, wall_m)
+        widened_m = _widened(hull, wall_m)
+        footprint = _footprint(widened_m)
         sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
         planes.append((hull.normals, hull.offsets_m))
         planes.append((sides, footprint.equations[:, 2]))
@@ -278,10 +294,10 @@ def _obstacles(
         record["lower_m"] = near.min(axis=0) - 1e-6
         record["upper_m"] = near.max(axis=0) + 1e-6
         record["wall_m"] = wall_m
-        record["roof_m"] = -_widened(hull, wall_m)[:, 2].min()
+        record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m
         if record["tall"]:
-            outline = _footprint(hull, wall_m + NODE_MARGIN_M)
+            outline = _footprint(_widened(hull, wall_m + NODE_MARGIN_M))
             corners.append(outline.points[outline.vertices])
     return records, planes, corners
 

@@ -196,8 +196,8 @@ def _number(name: str, field: str, value: Any) -> float:
 def _target(name: str, waypoint: Any, n_waypoints: int) -> float:
     if waypoint is None:
         return float(HOME)
-    whole = isinstance(waypoint, numbers.Integral) and not isinstance(waypoint, bool)
-    if whole and 0 <= waypoint < n_waypoints:
+    whole = isinstance(waypoint, int | np.integer) and not isinstance(waypoint, bool)
+    if whole and 0 <= int(waypoint) < n_waypoints:
         return float(waypoint)
     raise ValueError(
         f"command of {name}: waypoint is {waypoint!r}; "

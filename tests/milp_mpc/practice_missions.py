@@ -1,0 +1,89 @@
+"""Small missions for the planner, and ways to fly them."""
+
+import numpy as np
+from uas_coverage_baselines.milp_mpc.decision import Effort
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, Options
+
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.strict_toml import parse
+from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
+from uas_coverage_env.world import OUTCOME_DTYPE, Wrench
+
+LITTLE = Effort(deterministic=True, teams=1)
+
+
+def corners(low, high):
+    """The eight corners of a box."""
+    return [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]  # fmt: skip
+
+
+def mission(waypoints, starts, **fields):
+    """A field of 200 m with a ceiling at 50 m; waypoints are (position, radius)."""
+    uas = [
+        {
+            "name": f"uas_{row + 1}",
+            "vehicle": "s500_v2",
+            "start_m": start,
+            "soc_0": 1.0,
+            "radius_m": 0.36,
+            "dod_max": 0.75,
+        }
+        for row, start in enumerate(starts)
+    ]
+    data = {
+        "schema": 1,
+        "name": "practice",
+        "dt_s": 1.0,
+        "max_steps": 300,
+        "landing_distance_m": 2.0,
+        "landing_speed_mps": 0.5,
+        "uas_safe_distance_m": 5.0,
+        "geofence": {
+            "margin_m": 0.5,
+            "vertices_m": corners((0.0, 0.0, -50.0), (200.0, 200.0, 0.0)),
+        },
+        "waypoints": [
+            {"position_m": position, "radius_m": radius, "weight": 1.0}
+            for position, radius in waypoints
+        ],
+        "uas": uas,
+    }
+    return parse(data | fields, Scenario, "practice")
+
+
+def obstacle(low, high, name="shed"):
+    """A box-shaped obstacle."""
+    return {"name": name, "safe_distance_m": 2.0, "vertices_m": corners(low, high)}
+
+
+def with_uas(scenario, row, **fields):
+    """The scenario with one UAS changed."""
+    data = scenario.model_dump(by_alias=True)
+    uas = [dict(entry) for entry in data["uas"]]
+    uas[row] |= fields
+    return parse(data | {"uas": uas}, Scenario, "practice")
+
+
+def planner(scenario, **options):
+    """A planner that works by nodes, on a short horizon, ready for the mission."""
+    made = MilpMpc(Options(**({"deterministic": True, "horizon": 8, "teams": 1} | options)))
+    made.reset(scenario, 0)
+    return made
+
+
+def wrenches(plan, step):
+    """The plan's inputs of a step as commands."""
+    return {
+        name: Wrench(*(float(plan.u[row, step, k]) for k in (LIFT, TAU_X, TAU_Y, TAU_Z)))
+        for row, name in enumerate(plan.names)
+    }
+
+
+def fly(world, made, steps):
+    """Outcomes (T, U) of flying the planner, until nobody flies."""
+    outcomes = []
+    for _ in range(steps):
+        if world.done:
+            break
+        outcomes.append(world.step(made.act(world.swarm_state())))
+    return np.array(outcomes, OUTCOME_DTYPE)
