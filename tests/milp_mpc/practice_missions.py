@@ -1,5 +1,7 @@
 """Small missions for the planner, and ways to fly them."""
 
+from itertools import product
+
 import numpy as np
 from uas_coverage_baselines.milp_mpc.decision import Effort
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, Options
@@ -14,7 +16,7 @@ LITTLE = Effort(deterministic=True, teams=1)
 
 def corners(low, high):
     """The eight corners of a box."""
-    return [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]  # fmt: skip
+    return list(product(*zip(low, high, strict=True)))
 
 
 def mission(waypoints, starts, **fields):

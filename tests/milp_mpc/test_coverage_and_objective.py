@@ -74,9 +74,12 @@ command_lists = st.lists(points(14.0, 3.0), min_size=5, max_size=5)
 def test_each_waypoint_counts_once_for_who_is_there_first_and_stays_covered(
     prune, places, one, other
 ):
-    starts = [state(MIDDLE, (6.0, 0.0, 0.0)), state(MIDDLE + (30.0, 5.0, 4.0))]
+    starts = [state(MIDDLE, (6.0, 0.0, 0.0)), state(MIDDLE + np.array([30.0, 5.0, 4.0]))]
     paths = np.array(
-        [flight(S500, x0, commands)[:, :3] for x0, commands in zip(starts, (one, other), strict=True)]
+        [
+            flight(S500, x0, commands)[:, :3]
+            for x0, commands in zip(starts, (one, other), strict=True)
+        ]
     )
     waypoints = [(MIDDLE + away, radius_m, weight) for away, radius_m, weight in places]
     problem = toy(*starts, horizon=5, waypoints=waypoints, prune=prune)
@@ -85,9 +88,7 @@ def test_each_waypoint_counts_once_for_who_is_there_first_and_stays_covered(
     inside = (away < problem.waypoint_reach_m).any(axis=0)
     first = np.where(inside.any(axis=0), inside.argmax(axis=0), 5)
     by_hand = -float((problem.waypoint_weight * (5 - first)).sum())
-    solution, v = optimum(
-        problem, Coverage(), fixed=lambda v: [(v.position[:, 1:], paths[:, 1:])]
-    )
+    solution, v = optimum(problem, Coverage(), fixed=lambda v: [(v.position[:, 1:], paths[:, 1:])])
     assert solution.objective == pytest.approx(by_hand, abs=1e-6)
     uncovered = solution.values[v.uncovered]
     assert (np.diff(uncovered, axis=0) <= 1e-9).all()
@@ -97,7 +98,7 @@ def test_each_waypoint_counts_once_for_who_is_there_first_and_stays_covered(
 
 
 def test_a_waypoint_that_both_uas_are_in_is_counted_once():
-    starts = [state(MIDDLE), state(MIDDLE + (2.0, 0.0, 0.0))]
+    starts = [state(MIDDLE), state(MIDDLE + np.array([2.0, 0.0, 0.0]))]
     problem = toy(*starts, horizon=2, waypoints=[(MIDDLE, 20.0)])
     milp, v = written(problem, Coverage())
     assert feasible(milp, [(v.covers[:, :, 0], [[0, 1], [0, 0]])])
@@ -147,14 +148,17 @@ def test_the_objective_of_a_flight_is_the_sum_that_the_paper_writes(waypoint):
 
 def test_covering_the_target_waypoint_makes_the_distance_to_it_free():
     start = state(MIDDLE)
-    target = Target(MIDDLE + (40.0, 0.0, 0.0), 0.01, waypoint=0)
+    target = Target(MIDDLE + np.array([40.0, 0.0, 0.0]), 0.01, waypoint=0)
     problem = toy(start, horizon=3, waypoints=[(MIDDLE, 20.0)], targets=[target], prune=False)
 
     def distances(phi):
         solution, _ = optimum(
             problem,
             TargetDistance(),
-            fixed=lambda v: [(v.position[:, 1:], np.tile(MIDDLE, (1, 3, 1))), (v.uncovered[1:, 0], phi)],
+            fixed=lambda v: [
+                (v.position[:, 1:], np.tile(MIDDLE, (1, 3, 1))),
+                (v.uncovered[1:, 0], phi),
+            ],
         )
         return solution.objective / 0.01
 

@@ -1,5 +1,6 @@
 """Each block alone, frozen as text: a change of the mathematics is a change of tests/golden/."""
 
+import numpy as np
 import pytest
 from golden_lp import GOLDEN, compare, readable
 from toy_problems import box, moving, state, toy, written
@@ -20,6 +21,7 @@ from uas_coverage_baselines.milp_mpc.problem import Target
 CALM = state((50.0, 50.0, -10.0))
 NORTHBOUND = state((50.0, 50.0, -10.0), (6.0, 0.0, 0.0))
 SOUTHBOUND = state((74.0, 50.0, -10.0), (-6.0, 0.0, 0.0))
+TARGET_M = np.array([80.0, 50.0, -5.0])
 TOWER = box((60.0, 48.0, -12.0), (70.0, 58.0, 0.0))
 
 
@@ -112,7 +114,9 @@ def test_obstacles(request, name, prune, remark):
 
 def test_moving_obstacles(request):
     mover = moving([(70.0, 50.0, -10.0), (69.0, 50.0, -10.0), (68.0, 50.0, -10.0)])
-    milp, _ = written(toy(NORTHBOUND, moving_obstacles=[mover], obstacle_sides=4), MovingObstacles())
+    milp, _ = written(
+        toy(NORTHBOUND, moving_obstacles=[mover], obstacle_sides=4), MovingObstacles()
+    )
     heading = """
         Moving obstacle, eq. (OCP_6) by eq. (const_Vec_lb): outside a closed cylinder of radius 4
         and half height 3, by 1, around p_o(n) = (70 - n, 50, -10); H_O = 4: faces east, south,
@@ -151,12 +155,12 @@ def test_coverage(request):
     [
         (
             "target_distance_return",
-            Target(CALM[:3] + (30.0, 0.0, 5.0), 0.02),
+            Target(TARGET_M, 0.02),
             "Return mode: c_target = 0, the target is the initial position.",
         ),
         (
             "target_distance_transit",
-            Target(CALM[:3] + (30.0, 0.0, 5.0), 0.02, waypoint=0),
+            Target(TARGET_M, 0.02, waypoint=0),
             "Transit mode: c_target = M (1 - Phi_w(n)); uncovered(n, 0) is Phi_w.",
         ),
     ],

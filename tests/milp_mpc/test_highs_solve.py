@@ -38,7 +38,7 @@ def decision(horizon=6):
     problem = toy(
         start,
         horizon=horizon,
-        obstacles=[box(place + (16.0, -4.0, -20.0), place + (22.0, 5.0, 15.0))],
+        obstacles=[box(place + np.array([16.0, -4.0, -20.0]), place + np.array([22.0, 5.0, 15.0]))],
         waypoints=[(place + away, 9.0) for away in ((22.0, 3.0, 0.0), (12.0, 14.0, -3.0))],
     )
     return formulate(problem)[0].build()
@@ -86,7 +86,12 @@ def test_an_unbounded_program_is_never_called_solved():
 
 @pytest.mark.parametrize(
     "limits",
-    [SolverLimits(time_s=0.0), SolverLimits(time_s=0.01), SolverLimits(nodes=0), SolverLimits(nodes=1)],
+    [
+        SolverLimits(time_s=0.0),
+        SolverLimits(time_s=0.01),
+        SolverLimits(nodes=0),
+        SolverLimits(nodes=1),
+    ],
 )
 def test_limits_end_a_solve_with_a_status_and_no_exception(limits):
     program = split_evenly()

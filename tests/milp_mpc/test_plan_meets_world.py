@@ -45,7 +45,7 @@ def planned(request):
 @pytest.fixture
 def world(planned):
     """The world back at the plan's beginning, whatever another test flew."""
-    original, _, plan = planned
+    original = planned[0]
     state = original.state.copy()
     yield original
     for array, before in zip(original.state, state, strict=True):

@@ -140,7 +140,7 @@ def small_but_complete(seed, prune):
         if all(hull.signed_distance(x[:3]) > 1.2 for x in states):
             obstacles.append(hull)
     N = 6 - n_uas + (seed < 4)
-    path = centre + (9.0, -6.0, 2.0) + np.outer(np.arange(N + 1), (0.0, 1.5, 0.0))
+    path = centre + np.array([9.0, -6.0, 2.0]) + np.outer(np.arange(N + 1), (0.0, 1.5, 0.0))
     return toy(
         *states,
         horizon=N,

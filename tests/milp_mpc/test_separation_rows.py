@@ -232,7 +232,7 @@ def test_two_uas_do_not_pass_through_each_other_between_samples(one, other, drif
 def test_two_uas_that_swap_places_in_one_step_are_refused_though_both_samples_are_clear():
     problem = toy(FAR, ELSEWHERE, horizon=2, separation_m=6.0, prune=False)
     milp, v = written(problem, Collision(), CornerCutting())
-    left, right = MIDDLE, MIDDLE + (8.0, 0.0, 0.0)
+    left, right = MIDDLE, MIDDLE + np.array([8.0, 0.0, 0.0])
     stays = [(v.position[0, 1:], [left, left]), (v.position[1, 1:], [right, right])]
     swaps = [(v.position[0, 1:], [left, right]), (v.position[1, 1:], [right, left])]
     assert feasible(milp, stays)

@@ -1,5 +1,7 @@
 """Planning problems small enough to be followed by hand, and ways to solve parts of them."""
 
+from itertools import product
+
 import numpy as np
 from uas_coverage_baselines.milp_mpc.highs import SolverLimits, solve
 from uas_coverage_baselines.milp_mpc.milp import Milp
@@ -26,8 +28,7 @@ TO_OPTIMALITY = SolverLimits(relative_gap=1e-9, absolute_gap=1e-7)
 
 def box(low, high):
     """The box between two corners."""
-    corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]  # fmt: skip
-    return ConvexPolytope.from_points(corners)
+    return ConvexPolytope.from_points(list(product(*zip(low, high, strict=True))))
 
 
 FIELD = box((0.0, 0.0, -50.0), (200.0, 200.0, 0.0))

@@ -64,7 +64,7 @@ def test_a_missing_file_is_named(tmp_path):
         ("schema = 1\n", "", "schema: is missing"),
         ("schema = 1", "schema = 2", "schema: should be less than or equal to 1, not 2"),
         ("schema = 1", "schema_version = 1", "schema_version: unknown key"),
-        ("dt_s = 1.0", "dt_s = 0", "dt_s: should be greater than 0, not 0"),
+        ("dt_s = 1.0", "dt_s = 0", "dt_s: should be greater than or equal to 0.1, not 0"),
         ("dt_s = 1.0", "dt_s = 2.5", "dt_s: should be less than or equal to 2, not 2.5"),
         ("dt_s = 1.0", "dt_s = nan", "dt_s: should be a finite number, not nan"),
         ("dt_s = 1.0", 'dt_s = "1"', 'dt_s: should be a number, not "1"'),

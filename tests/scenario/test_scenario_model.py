@@ -75,7 +75,7 @@ def test_a_written_scenario_reads_back_equal(name, tmp_path):
 
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
-    st.floats(0.01, 2.0),
+    st.floats(0.1, 2.0),
     st.floats(1e-5, 1e6, allow_subnormal=False),
     st.text(min_size=1, max_size=20).filter(lambda text: text.isprintable()),
     st.floats(-100, 100),

@@ -99,6 +99,21 @@ def test_a_reference_beyond_the_speed_limit_is_brought_back_to_it(name):
     assert np.hypot(*reference) <= load(name).limits.v_xy_max_mps
 
 
+@pytest.mark.parametrize("dt_s", STEPS_S)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_reference_far_from_the_velocity_is_dropped_for_the_velocity(name, dt_s):
+    """Somebody forgot to reseed it: in steady flight nothing happens."""
+    vehicle, record = load(name), record_of(name, dt_s)
+    x, reference, u = np.zeros(N_STATES), np.array([-11.9, 0.0]), np.zeros(N_INPUTS)
+    x[VX] = 11.0
+    x[THETA] = -vehicle.trim_tilt_rad_per_mps * x[VX]
+    for _ in range(20):
+        velocity_wrench(record, x, reference, 11.0, 0.0, 0.0, u)
+        fly_kinematics(record, x, u)
+        assert x[VX] == pytest.approx(11.0, abs=0.01)
+    np.testing.assert_allclose(reference, [11.0, 0.0], rtol=0, atol=0.01)
+
+
 @njit(error_model="numpy")
 def rest_after_wild_wrenches(vehicle, wishes, rest_steps):
     """Fly wrenches (K, 4), each clipped, then brake.

@@ -1,3 +1,4 @@
+import copy
 import os
 import pickle
 import subprocess
@@ -8,7 +9,15 @@ import pytest
 from small_worlds import meadow, mover
 
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.world import FLYING, GoTo, SwarmState, Velocity, World, Wrench
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    FLYING,
+    GoTo,
+    SwarmState,
+    Velocity,
+    World,
+    Wrench,
+)
 
 SHORT_FLIGHT = """
 import sys
@@ -81,6 +90,39 @@ def test_a_copy_of_the_state_is_its_own():
     world.step({"uas_1": Velocity(5.0, 0.0, 5.0)})
     assert copied.step[0] == 0
     assert world.state.step[0] == 1
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda w: pickle.loads(pickle.dumps(w))])
+def test_a_copy_of_a_world_flies_on_by_itself(duplicate):
+    world = World(load_scenario("village"), return_mode=True, safety_filter=True)
+    go = {name: GoTo(21) for name in world.names}
+    for _ in range(3):
+        world.step(go)
+    copied = duplicate(world)
+    outcomes = [w.step(go) for w in (copied, world)]
+    assert outcomes[0].tobytes() == outcomes[1].tobytes()
+    copied.step(go)
+    assert copied.state.step[0] == world.state.step[0] + 1 == 5
+
+
+def test_the_state_of_a_world_is_written_and_not_replaced():
+    world = World(meadow())
+    with pytest.raises(AttributeError):
+        world.state = world.state.copy()  # type: ignore[misc]
+
+
+def test_packed_commands_may_lie_anywhere_in_memory():
+    commands = np.zeros(2, dtype=COMMAND_DTYPE)
+    commands["values"] = (3.0, 1.0, 10.0, 0.0), (-2.0, 4.0, 12.0, 0.0)
+    apart = [commands, np.repeat(commands, 3)[::3], commands[::-1].copy()[::-1]]
+    assert [packed.flags.c_contiguous for packed in apart] == [True, False, False]
+    flown = []
+    for packed in apart:
+        world = World(meadow([(60.0, 60.0, -10.0), (90.0, 90.0, -10.0)]))
+        world.step(packed)
+        flown.append(world.state.x.copy())
+    np.testing.assert_array_equal(flown[1], flown[0])
+    np.testing.assert_array_equal(flown[2], flown[0])
 
 
 def test_players_see_the_present_velocity_of_moving_obstacles_and_nothing_else():

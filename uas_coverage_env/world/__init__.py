@@ -2,9 +2,14 @@
 
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.commands import (
+    ACCELERATION,
+    CLIMB,
     COMMAND_DTYPE,
+    GO_TO,
     HOME,
     KIND_NAMES,
+    VELOCITY,
+    WRENCH,
     Acceleration,
     Command,
     GoTo,
@@ -30,15 +35,20 @@ from uas_coverage_env.world.state import (
 from uas_coverage_env.world.step import advance, begin_mission, first_invalid
 
 __all__ = [
+    "ACCELERATION",
+    "CLIMB",
     "COMMAND_DTYPE",
     "CONTACT_NAMES",
     "FLYING",
+    "GO_TO",
     "HOME",
     "KIND_NAMES",
     "LANDED",
     "LOST",
     "OUTCOME_DTYPE",
     "STATUS_NAMES",
+    "VELOCITY",
+    "WRENCH",
     "Acceleration",
     "Arena",
     "Command",

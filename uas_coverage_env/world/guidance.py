@@ -8,7 +8,7 @@ from numba import njit
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.control import write_brake
-from uas_coverage_env.world.lookahead import ONE_STEP_S, fixed_slack, fly_and_brake
+from uas_coverage_env.world.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
 
 LEAD_S = 1.6
@@ -149,9 +149,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
                 if level_m <= altitude_m:
                     break
                 values[2] = level_m
-            n_flown, slack_m = fly_and_brake(
-                arena, i, x, reference, command, ONE_STEP_S, nonlinear, path_m
-            )
+            n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m)
             slack_m = fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m)
             if slack_m >= 0.0:
                 return

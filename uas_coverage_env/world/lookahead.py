@@ -1,4 +1,4 @@
-"""What would happen if a command were flown for some steps, and then the brakes were put on."""
+"""What would happen if a command were flown for a step, and then the brakes were put on."""
 
 import math
 
@@ -36,10 +36,6 @@ PLENTY_M = 2.0
 _STILL = 0.02
 
 
-ONE_STEP_S = 0.0
-"""As long as a command is flown before the next decision: less than any step counts as one."""
-
-
 @njit(cache=True, error_model="numpy")
 def _is_still(x):
     """Slow and level enough that what is left of the motion is centimetres."""
@@ -60,8 +56,8 @@ def _kept_m(required_m, now_m):
 
 
 @njit(cache=True, error_model="numpy")
-def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m):
-    """Simulate a command, then braking until the UAS stands.
+def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
+    """Simulate a command for one step, then braking until the UAS stands.
 
     The simulation is the inner loop and the dynamics that the world flies. So where a command was
     found safe, its braking flight is still there to be flown in the next step: from a safe state
@@ -73,7 +69,6 @@ def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m
         start: (14,) its state.
         reference: (2,) [m/s] of its inner loop; neither is changed.
         command: A record of COMMAND_DTYPE, of any kind but GO_TO.
-        hold_s: How long the command is flown, one step at least [s].
         nonlinear: Whether the world flies the 6-DOF plant, and this too.
         path_m: (N+1, 3) [m] positions, written; after a stop the position stays.
 
@@ -86,12 +81,11 @@ def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m
     x = start.copy()
     governed = reference.copy()
     u = np.zeros(5)
-    hold_steps = max(1, int(hold_s / arena.rules[0].dt_s))
     path_m[0, 0] = x[X]
     path_m[0, 1] = x[Y]
     path_m[0, 2] = x[Z]
     for k in range(n_steps):
-        if k < hold_steps:
+        if k == 0:
             command_wrench(vehicle, x, governed, command, u)
         else:
             command_wrench(vehicle, x, governed, arena.rules[0].brake, u)
@@ -99,12 +93,12 @@ def fly_and_brake(arena, i, start, reference, command, hold_s, nonlinear, path_m
             plant_step(vehicle, x, u, x)
         else:
             fly_kinematics(vehicle, x, u)
-        if k < hold_steps and command.kind == WRENCH:
+        if k == 0 and command.kind == WRENCH:
             reseed_reference(x, governed)
         path_m[k + 1, 0] = x[X]
         path_m[k + 1, 1] = x[Y]
         path_m[k + 1, 2] = x[Z]
-        if k + 1 >= hold_steps and _is_still(x):
+        if _is_still(x):
             for later in range(k + 2, n_steps + 1):
                 path_m[later, 0] = x[X]
                 path_m[later, 1] = x[Y]

@@ -16,7 +16,6 @@ from uas_coverage_env.vehicle import VX, VY, Z
 from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.world.control import write_brake, write_command
 from uas_coverage_env.world.lookahead import (
-    ONE_STEP_S,
     TOLERANCE_M,
     fixed_slack,
     fly_and_brake,
@@ -24,9 +23,6 @@ from uas_coverage_env.world.lookahead import (
     peer_slack,
 )
 from uas_coverage_env.world.state import FLYING
-
-EVADE_S = 4.0
-"""Out of the way of a moving obstacle, a deflected command may be held this long [s]."""
 
 _LEAST_SPEED_MPS = 3.0
 
@@ -48,10 +44,10 @@ _DEFLECTIONS = _deflections()
 
 
 @njit(cache=True, error_model="numpy")
-def _slack(arena, state, i, command, hold_s, nonlinear, enough_m, path_m, committed_m):
+def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
     """Least distance to spare from everything when a command is flown and then braked [m]."""
     n_flown, slack_m = fly_and_brake(
-        arena, i, state.x[i], state.reference[i], command, hold_s, nonlinear, path_m
+        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m
     )
     if slack_m >= enough_m:
         slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
@@ -103,40 +99,33 @@ def _deflect(arena, i, wish_mps, d, command):
 def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     """Put the nearest safe command in the place of an unsafe one, or else the least harmful.
 
-    The order is: the deflections, for one step; braking; where even braking is not safe, because
-    something moving comes near, the deflections for longer; at last what keeps most distance.
-    `path_m` is left as the path to which the UAS is then committed.
+    The order is: the deflections; braking; where even braking is not safe, because something
+    moving comes near, whatever keeps most distance. `path_m` is left as the path to which the UAS
+    is then committed.
     """
     n_deflections = _DEFLECTIONS.shape[0]
     wish_mps = _wish(arena, state, i, command)
     for d in range(n_deflections):
         _deflect(arena, i, wish_mps, d, command)
-        slack_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, 0.0, path_m, committed_m)
+        slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
         if slack_m >= 0.0:
             return
     write_brake(command)
-    best_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, -math.inf, path_m, committed_m)
+    best_m = _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
     if best_m >= -TOLERANCE_M:
         return
     best = -1
-    best_s = ONE_STEP_S
-    for hold_s in (EVADE_S, ONE_STEP_S):
-        for d in range(n_deflections):
-            _deflect(arena, i, wish_mps, d, command)
-            slack_m = _slack(
-                arena, state, i, command, hold_s, nonlinear, best_m, path_m, committed_m
-            )
-            if slack_m > best_m:
-                best_m = slack_m
-                best = d
-                best_s = hold_s
-            if best_m >= 0.0:
-                return
+    for d in range(n_deflections):
+        _deflect(arena, i, wish_mps, d, command)
+        slack_m = _slack(arena, state, i, command, nonlinear, best_m, path_m, committed_m)
+        if slack_m > best_m:
+            best_m = slack_m
+            best = d
     if best < 0:
         write_brake(command)
     else:
         _deflect(arena, i, wish_mps, best, command)
-    _slack(arena, state, i, command, best_s, nonlinear, -math.inf, path_m, committed_m)
+    _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
 
 
 @njit(cache=True, error_model="numpy")
@@ -158,13 +147,13 @@ def filter_commands(arena, state, nonlinear, outcome):
         if state.status[i] == FLYING:
             x = state.x[i]
             reference = state.reference[i]
-            fly_and_brake(arena, i, x, reference, brake, ONE_STEP_S, nonlinear, committed_m[i])
+            fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i])
     for i in range(n_uas):
         if state.status[i] != FLYING:
             continue
         command = outcome[i].applied_command
         path_m = committed_m[i]
-        slack_m = _slack(arena, state, i, command, ONE_STEP_S, nonlinear, 0.0, path_m, committed_m)
+        slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
         if slack_m < 0.0:
             outcome[i].filtered = True
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)

@@ -1,7 +1,7 @@
 """The world as an object: one mission, step by step."""
 
 from collections.abc import Mapping
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from uas_coverage_env.world.arena import build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, SwarmState, WorldState
-from uas_coverage_env.world.step import ACCEPTED, begin_mission, step_world
+from uas_coverage_env.world.step import ACCEPTED, begin_mission, compiled_step
 
 Dynamics = Literal["lpv", "nonlinear"]
 
@@ -43,7 +43,6 @@ class World:
         scenario: The scenario.
         names: Names of the UAS, in order.
         arena: The scenario as arrays; not to be changed.
-        state: The state; written by `reset` and `step`.
         dynamics: The model that is flown.
         return_mode: Whether UAS are brought home in time.
         safety_filter: Whether commands are kept clear of harm.
@@ -67,10 +66,31 @@ class World:
         self.arena = build_arena(scenario)
         self._start = initial_state(scenario)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
-        self.state = self._start.copy()
+        self._state = self._start.copy()
+        self._before_commands = (*self.arena, *self._state)
+        self._switches = (dynamics == "nonlinear", self.return_mode, self.safety_filter)
+        self._prepare()
+
+    def _prepare(self) -> None:
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
-        self._switches = (dynamics == "nonlinear", self.return_mode, self.safety_filter)
+        commands = np.zeros(len(self.names), dtype=COMMAND_DTYPE)
+        outcome = self._fresh_outcome()
+        arguments = (*self._before_commands, commands, *self._switches, outcome)
+        self._step = compiled_step(arguments)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # machine code does not travel: it is there, or compiled, wherever the copy goes
+        return {k: v for k, v in self.__dict__.items() if k not in ("_step", "_outcomes")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepare()
+
+    @property
+    def state(self) -> WorldState:
+        """The state; its arrays are written by `reset` and `step`."""
+        return self._state
 
     def reset(self) -> None:
         """Go back to t = 0."""
@@ -97,8 +117,10 @@ class World:
                 f"commands have dtype {commands.dtype} and shape {commands.shape}; "
                 f"give COMMAND_DTYPE and ({len(self.names)},)"
             )
+        elif not commands.flags.c_contiguous:
+            commands = commands.copy()
         outcome = self._fresh_outcome()
-        invalid = step_world(*self.arena, *self.state, commands, *self._switches, outcome)
+        invalid = self._step(*self._before_commands, commands, *self._switches, outcome)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
         return outcome

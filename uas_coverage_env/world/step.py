@@ -1,9 +1,11 @@
 """One step of the world: the rules of the game."""
 
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof
 
 from uas_coverage_env.vehicle import N_INPUTS, X, Y, Z, lpv_step, plant_step, reseed_reference
 from uas_coverage_env.world.arena import Arena
@@ -187,3 +189,13 @@ def step_world(
     if invalid == ACCEPTED:
         advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome)
     return invalid
+
+
+def compiled_step(arguments: Sequence[Any]) -> Callable[..., int]:
+    """`step_world` for arguments of these types, which the caller has to keep to.
+
+    Called directly it spares the look at the type of each argument, a third of a short step.
+    """
+    if not hasattr(step_world, "compile"):
+        return step_world  # NUMBA_DISABLE_JIT=1: a function like any other
+    return step_world.compile(tuple(typeof(argument) for argument in arguments))

@@ -44,7 +44,7 @@ class Effort:
     teams: int = 6
 
 
-_RESERVE = 0.06  # share of the time limit kept for verification and whatever is late
+_RESERVE = 0.1  # share of the time limit kept for verification and whatever is late
 _RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
 _WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
 _RESTRICTED_NODES = 60

@@ -31,7 +31,7 @@ def seconds_saved(open_waypoints_m: FloatArray, speed_mps: float) -> FloatArray:
     return np.maximum(whole - rest, 0.0)
 
 
-def _tree_s(between: FloatArray) -> float:
+def _tree_s(between: NDArray[np.floating]) -> float:
     if len(between) < 2:
         return 0.0
     # zero would mean no edge: waypoints above each other are a millisecond apart

@@ -60,7 +60,7 @@ class Separation:
         spare = self.lowest_m - self.clearance_m[:, None, :]
         needed = np.zeros(spare.shape)
         needed[:, 0] = np.minimum(0.0, spare[:, 0].max(axis=1, keepdims=True))
-        result = np.asarray(spare >= needed)
+        result: NDArray[np.bool_] = np.asarray(spare >= needed)
         result[:, 0] |= spare[:, 0] >= needed[:, 0] - _ON_FACE_M
         if not self.prune:
             result[:, 1:] = False
@@ -78,7 +78,7 @@ class Separation:
     @cached_property
     def undecided(self) -> NDArray[np.bool_]:
         """(G, N) intervals over which no face separates whatever is flown."""
-        return ~(self.always[:, :-1] & self.always[:, 1:]).any(axis=2)
+        return np.asarray(~(self.always[:, :-1] & self.always[:, 1:]).any(axis=2))
 
     @cached_property
     def needed(self) -> NDArray[np.bool_]:

@@ -1,0 +1,179 @@
+"""When no plan comes, the last one's way out is flown; nobody touches anything."""
+
+import numpy as np
+import pytest
+from practice_missions import fly, mission, planner
+from toy_problems import flown
+from uas_coverage_baselines.milp_mpc import planner as planner_module
+from uas_coverage_baselines.milp_mpc.problem import Plan
+from uas_coverage_baselines.milp_mpc.verify import first_trouble
+
+from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.world import Velocity, World, Wrench
+
+decide_in_earnest = planner_module.decide
+
+
+class RoughDecisions:
+    """Plans out of the blue: wild flights that hold by our own geometry, or none.
+
+    What the planner does with plans does not depend on how good they are, so that these stand in
+    for the solver's: they come in a millisecond, and more of them lead towards walls.
+    """
+
+    def __init__(self, refused, seed=0):
+        self.refused, self.draw, self.calls = refused, np.random.default_rng(seed), 0
+
+    def __call__(self, problem, previous, dt_s, effort):
+        self.calls += 1
+        if self.refused(self.calls - 1):
+            return None
+        for _ in range(12):
+            plan = self._wild(problem, dt_s)
+            if first_trouble(problem, plan) is None:
+                return plan
+        return None
+
+    def _wild(self, problem, dt_s):
+        flights = []
+        for vehicle, x0 in zip(problem.vehicles, problem.x0, strict=True):
+            ways = self.draw.uniform((-12.0, -12.0, -2.5), (12.0, 12.0, 1.5), (2, 3))
+            turn = self.draw.integers(1, problem.horizon)
+            commands = np.repeat(ways, [turn, problem.horizon - turn], axis=0)
+            flights.append(flown(vehicle, x0, commands, dt_s))
+        x, u = (np.array([flight[k] for flight in flights]) for k in range(2))
+        covers = np.zeros((*u.shape[:2], problem.n_scenario_waypoints), bool)
+        return Plan(problem.names, x, u, covers, 0.0, -np.inf)
+
+
+def flown_with(monkeypatch, scenario, decide, steps, **options):
+    """Positions, decisions and outcomes of a flight whose plans come from `decide`."""
+    monkeypatch.setattr(planner_module, "decide", decide)
+    world, made = World(scenario), planner(scenario, **options)
+    positions, decisions, outcomes = [], [], []
+    for _ in range(steps):
+        if world.done:
+            break
+        commands = made.act(world.swarm_state())
+        assert set(commands) == set(world.active)
+        decisions.append(made.last_decision)
+        outcomes.append(world.step(commands))
+        positions.append(world.state.x[:, :3].copy())
+    return np.array(positions), decisions, np.array(outcomes)
+
+
+PATTERNS = {
+    "never": lambda call: False,
+    "now_and_then": lambda call: call % 7 in (2, 3),
+    "mostly": lambda call: call % 5 != 0,
+    "at_random": lambda call: np.random.default_rng(call).random() < 0.5,
+    "all_after_ten": lambda call: call >= 10,
+    "first_ones": lambda call: call < 6,
+}
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("name", ["open_field", "village", "corridor"])
+def test_nobody_touches_anything_however_often_there_is_no_plan(monkeypatch, name, pattern):
+    scenario = load_scenario(name)
+    decide = RoughDecisions(PATTERNS[pattern], seed=3)
+    positions, decisions, outcomes = flown_with(monkeypatch, scenario, decide, 50)
+    assert (outcomes["contact"] == 0).all()
+    for call, decision in enumerate(decisions):
+        if PATTERNS[pattern](call):
+            assert decision.fallback
+            assert decision.mip_gap is None
+    moved_m = np.linalg.norm(positions[-1] - positions[0], axis=1).max()
+    assert moved_m > 10.0, "a flight that stays at home proves nothing"
+
+
+def test_when_plans_stop_coming_everybody_ends_in_a_hover(monkeypatch):
+    decide = RoughDecisions(PATTERNS["all_after_ten"], seed=5)
+    positions, decisions, _ = flown_with(monkeypatch, load_scenario("village"), decide, 50)
+    assert all(decision.fallback for decision in decisions[10:])
+    assert np.abs(np.diff(positions[-5:], axis=0)).max() < 0.05
+    assert (np.ptp(positions[:12], axis=0).max(axis=1) > 1.0).any()
+
+
+def test_a_fallback_flies_what_it_says(monkeypatch):
+    decide = RoughDecisions(PATTERNS["mostly"], seed=1)
+    scenario = load_scenario("open_field")
+    positions, decisions, _ = flown_with(monkeypatch, scenario, decide, 30)
+    names = [uas.name for uas in scenario.uas]
+    followed = 0
+    for now, decision in enumerate(decisions):
+        for row, name in enumerate(names):
+            path = decision.predicted_m[name]
+            if len(path) > 1:
+                assert path[1] == pytest.approx(positions[now][row], abs=1e-6)
+                followed += decision.fallback
+    assert followed > 20
+
+
+def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):
+    scenario = load_scenario("village")
+    positions, decisions, outcomes = flown_with(monkeypatch, scenario, lambda *args: None, 25)
+    homes = np.array([uas.start_m for uas in scenario.uas])
+    assert np.abs(positions - homes).max() < 0.1
+    assert all(decision.fallback for decision in decisions)
+    assert (outcomes["contact"] == 0).all()
+
+
+def test_a_hover_command_names_the_altitude_and_no_speed(monkeypatch):
+    monkeypatch.setattr(planner_module, "decide", lambda *args: None)
+    scenario = load_scenario("open_field")
+    commands = planner(scenario).act(World(scenario).swarm_state())
+    assert set(commands.values()) == {Velocity(0.0, 0.0, 1.0, mode="covering")}
+
+
+def test_a_plan_without_a_way_out_is_not_flown(monkeypatch):
+    monkeypatch.setattr(planner_module, "way_out", lambda *args: None)
+    scenario = load_scenario("open_field")
+    made = planner(scenario)
+    commands = made.act(World(scenario).swarm_state())
+    assert made.last_decision.fallback
+    assert all(isinstance(command, Velocity) for command in commands.values())
+
+
+@pytest.fixture(scope="module")
+def garden():
+    return mission(
+        [((80.0, 50.0, -8.0), 8.0), ((75.0, 90.0, -6.0), 8.0), ((45.0, 95.0, -8.0), 10.0)],
+        [(50.0, 50.0, -1.0), (50.0, 70.0, -1.0)],
+    )
+
+
+def test_decisions_that_fail_in_between_do_not_end_a_mission(monkeypatch, garden):
+    calls = iter(range(1000))
+
+    def decide(*args):
+        return None if PATTERNS["now_and_then"](next(calls)) else decide_in_earnest(*args)
+
+    _, decisions, outcomes = flown_with(monkeypatch, garden, decide, 60)
+    refused = [PATTERNS["now_and_then"](call) for call in range(len(decisions))]
+    assert [decision.fallback for decision in decisions] == refused
+    assert (outcomes["contact"] == 0).all()
+    assert outcomes["newly_covered"].sum() == 3
+    assert outcomes["landed"].sum() == 2
+
+
+def test_a_plan_is_flown_as_a_wrench_and_tells_where_it_leads(garden):
+    world, made = World(garden), planner(garden)
+    commands = made.act(world.swarm_state())
+    assert all(isinstance(command, Wrench) for command in commands.values())
+    assert not made.last_decision.fallback
+    assert made.last_decision.mip_gap >= 0.0
+    for row, name in enumerate(world.names):
+        path = made.last_decision.predicted_m[name]
+        assert path.shape == (9, 3)
+        assert path[0] == pytest.approx(garden.uas[row].start_m)
+
+
+def test_a_reset_forgets_the_last_mission(garden):
+    world, made = World(garden), planner(garden)
+    first = made.act(world.swarm_state())
+    fly(world, made, 1)
+    world.reset()
+    made.reset(garden, 0)
+    assert made.last_decision is None
+    assert made.act(world.swarm_state()) == first

@@ -1,0 +1,150 @@
+"""The planner at work: repeatable, for different vehicles, until everybody has landed."""
+
+import numpy as np
+import pytest
+from practice_missions import fly, mission, planner, with_uas
+from uas_coverage_baselines.milp_mpc import planner as planner_module
+from uas_coverage_baselines.milp_mpc.verify import first_trouble
+
+from uas_coverage_env.flight import accomplished, load_planner, rollout
+from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.vehicle import VZ
+from uas_coverage_env.world import LANDED, World
+
+
+def commands_of(scenario, decisions, **options):
+    """The commands of a flight's first decisions, and its last state."""
+    world, made = World(scenario), planner(scenario, **options)
+    commands = []
+    for _ in range(decisions):
+        commands.append(made.act(world.swarm_state()))
+        world.step(commands[-1])
+    return commands, world.state.x
+
+
+def test_a_deterministic_planner_repeats_itself_bit_by_bit():
+    scenario = load_scenario("open_field")
+    first, there = commands_of(scenario, 6)
+    again, there_again = commands_of(scenario, 6)
+    assert first == again
+    assert there.tobytes() == there_again.tobytes()
+
+
+def test_how_many_programs_are_solved_side_by_side_changes_nothing_when_deterministic():
+    scenario = load_scenario("open_field")
+    alone, _ = commands_of(scenario, 2, threads=1)
+    together, _ = commands_of(scenario, 2, threads=4)
+    assert alone == together
+
+
+def test_one_decision_for_different_vehicles_is_a_verified_plan(monkeypatch):
+    seen = []
+    decide = planner_module.decide
+
+    def noting(problem, *rest):
+        plan = decide(problem, *rest)
+        seen.append((problem, plan))
+        return plan
+
+    monkeypatch.setattr(planner_module, "decide", noting)
+    scenario = load_scenario("corridor")
+    world = World(scenario)
+    commands = planner(scenario).act(world.swarm_state())
+    ((problem, plan),) = seen
+    motors = {vehicle.airframe.n_motors for vehicle in problem.vehicles}
+    assert motors == {4, 6}
+    assert first_trouble(problem, plan) is None
+    assert set(commands) == set(world.names)
+    world.step(commands)
+    assert world.state.x == pytest.approx(plan.x[:, 1], abs=1e-6)
+
+
+def test_everybody_lands_where_it_stands_once_there_is_nothing_to_do():
+    starts = [(50.0, 50.0, -1.0), (50.0, 90.0, -1.0)]
+    scenario = mission([((52.0, 51.0, -2.0), 8.0)], starts)
+    world = World(scenario)
+    assert not world.state.uncovered.any()
+    fly(world, planner(scenario), 4)
+    assert (world.state.status == LANDED).all()
+    assert np.abs(world.state.x[:, :3] - starts).max() < 1.0
+
+
+@pytest.fixture(scope="module")
+def finished():
+    """Outcomes, world and planner of a mission that needs only one of two UAS."""
+    scenario = mission([((75.0, 55.0, -6.0), 10.0)], [(50.0, 50.0, -1.0), (50.0, 180.0, -1.0)])
+    scenario = with_uas(scenario, 1, vehicle="hexacopter")
+    world, made = World(scenario), planner(scenario, horizon=18)
+    return fly(world, made, 40), world, made
+
+
+def test_a_mission_ends_with_everything_covered_and_everybody_landed(finished):
+    outcomes, world, _ = finished
+    assert not world.state.uncovered.any()
+    assert (world.state.status == LANDED).all()
+    assert (outcomes["contact"] == 0).all()
+    assert outcomes["breaches"].sum() == 0
+    assert outcomes["newly_covered"].sum(axis=0).tolist() == [1, 0]
+
+
+def test_a_uas_that_is_never_needed_lands_where_it_stands(finished):
+    outcomes, world, _ = finished
+    assert outcomes["landed"].sum(axis=0).tolist() == [1, 1]
+    assert np.linalg.norm(world.state.x[1, :3] - world.arena.uas["home_m"][1]) < 2.0
+    assert not world.state.departed[1]
+
+
+def test_a_landed_uas_is_no_part_of_the_plans_that_follow(finished):
+    outcomes, world, made = finished
+    landed_at = outcomes["landed"].argmax(axis=0)
+    assert landed_at[0] != landed_at[1], "both at once would prove nothing"
+    last = world.names[int(landed_at.argmax())]
+    assert set(made.last_decision.predicted_m) == {last}
+
+
+def test_the_mission_is_announced_as_returning_once_everything_is_covered(finished):
+    outcomes, _, _ = finished
+    covered_at = int(outcomes["newly_covered"].sum(axis=1).argmax())
+    flying = outcomes["u"].any(axis=2)
+    assert not outcomes["returning"][: covered_at + 1].any()
+    assert (outcomes["returning"] | ~flying)[covered_at + 1 :].all()
+
+
+def test_a_uas_too_low_on_charge_lands_before_it_leaves():
+    far = [((150.0, 100.0 + 20.0 * k, -8.0), 8.0) for k in range(3)]
+    scenario = mission(far, [(50.0, 50.0, -1.0), (50.0, 150.0, -1.0)])
+    scenario = with_uas(scenario, 0, soc_0=0.26)
+    world = World(scenario)
+    outcomes = fly(world, planner(scenario), 3)
+    assert outcomes["landed"][0].tolist() == [True, False]
+    assert outcomes["returning"][0].tolist() == [True, False]
+    assert world.state.uncovered.all()
+
+
+@pytest.mark.parametrize(
+    "horizon",
+    [
+        pytest.param(
+            8,
+            marks=pytest.mark.xfail(
+                reason="being at home at each sample, up and down in between, costs least",
+                strict=True,
+            ),
+        ),
+        18,
+    ],
+)
+def test_who_is_at_home_and_still_moves_comes_to_rest_and_lands(horizon):
+    scenario = mission([((52.0, 51.0, -2.0), 8.0)], [(50.0, 50.0, -1.0)])
+    world = World(scenario)
+    world.state.x[0, VZ] = 0.9
+    fly(world, planner(scenario, horizon=horizon), 12)
+    assert world.done
+
+
+@pytest.mark.slow
+def test_a_whole_mission_is_flown_to_its_end_without_a_violation():
+    options = {"deterministic": "true", "horizon": "16", "teams": "2"}
+    flight = rollout(load_scenario("open_field"), load_planner("milp-mpc", options), seed=0)
+    assert accomplished(flight)
+    assert flight.breaches == 0
