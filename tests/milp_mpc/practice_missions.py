@@ -11,7 +11,7 @@ from uas_coverage_env.strict_toml import parse
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
 from uas_coverage_env.world import OUTCOME_DTYPE, Wrench
 
-LITTLE = Effort(deterministic=True, teams=1)
+LITTLE = Effort(deterministic=True, teams=4)
 
 
 def corners(low, high):

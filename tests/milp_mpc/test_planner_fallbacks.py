@@ -162,7 +162,8 @@ def test_a_plan_is_flown_as_a_wrench_and_tells_where_it_leads(garden):
     commands = made.act(world.swarm_state())
     assert all(isinstance(command, Wrench) for command in commands.values())
     assert not made.last_decision.fallback
-    assert made.last_decision.mip_gap >= 0.0
+    gap = made.last_decision.mip_gap
+    assert gap is None or gap >= 0.0
     for row, name in enumerate(world.names):
         path = made.last_decision.predicted_m[name]
         assert path.shape == (9, 3)

@@ -72,7 +72,7 @@ def test_everybody_lands_where_it_stands_once_there_is_nothing_to_do():
 @pytest.fixture(scope="module")
 def finished():
     """Outcomes, world and planner of a mission that needs only one of two UAS."""
-    scenario = mission([((75.0, 55.0, -6.0), 10.0)], [(50.0, 50.0, -1.0), (50.0, 180.0, -1.0)])
+    scenario = mission([((35.0, 15.0, -6.0), 10.0)], [(10.0, 10.0, -1.0), (190.0, 190.0, -1.0)])
     scenario = with_uas(scenario, 1, vehicle="hexacopter")
     world, made = World(scenario), planner(scenario, horizon=18)
     return fly(world, made, 40), world, made

@@ -197,3 +197,21 @@ def test_leaving_the_start_does_not_depend_on_other_commands():
     for _ in fly(world, {"uas_1": GoTo(0), "uas_2": Velocity(0.0, 0.0, 1.0)}, 5):
         pass
     assert world.state.departed.tolist() == [True, False]
+
+
+def test_the_nonlinear_plant_is_guided_as_safely():
+    house = box("house", (80.0, 70.0, -40.0), (120.0, 110.0, 0.0))
+    shed = box("shed", (130.0, 60.0, -8.0), (150.0, 130.0, 0.0))
+    world = World(
+        meadow(
+            [(40.0, 95.0, -1.0)],
+            obstacles=[house, shed],
+            waypoints=[waypoint((170.0, 95.0, -6.0), 8.0)],
+        ),
+        dynamics="nonlinear",
+    )
+    breaches, clearance_m, _ = visit(world, [[0]])
+    assert not world.state.uncovered[0]
+    assert world.state.status[0] == LANDED
+    assert breaches == 0
+    assert clearance_m >= 2.36 - 1e-6

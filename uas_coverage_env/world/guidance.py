@@ -7,7 +7,7 @@ from numba import njit
 
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import VELOCITY
-from uas_coverage_env.world.control import write_brake
+from uas_coverage_env.world.control import write_brake, write_command
 from uas_coverage_env.world.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
 
@@ -19,7 +19,9 @@ CRUISE_ALTITUDE_M = 8.0
 
 _GLIDE_SLOPE = 0.12
 _HEADROOM_M = 0.5
-_SPEED_FACTORS = (1.0, 0.7, 0.4, 0.15, 0.0)
+_SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
+_TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
+_SHARE_WHEN_TURNED = 0.4
 
 
 @njit(cache=True, error_model="numpy")
@@ -52,13 +54,14 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     speed_mps = arena.uas[i].speed_mps
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
-        at, over = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
+        at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
         if at > 1.0:
             continue
         roof_m = obstacle.roof_m
         if leg == CLEAR:
-            # the straight line passes beside or below what is higher than both of its ends
-            passes_over = roof_m <= max(altitude_m, altitude1_m)
+            # the straight line passes beside or below what is higher than both of its ends, and
+            # where it ends there is nothing to stay above
+            passes_over = roof_m <= max(altitude_m, altitude1_m) and not ends
         else:
             passes_over = over or not obstacle.tall or leg == NO_WAY
         if not passes_over:
@@ -79,9 +82,11 @@ def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
         return min(uas.speed_mps, 0.65 * uas.speed_mps + 0.25 * distance_m)
     if stop:
         return min(uas.speed_mps, 0.28 * distance_m)
-    # flying by: fast, but not past the sphere before the altitude is reached
-    missing_m = abs(altitude1_m + x[Z]) - 0.6 * arena.waypoints[target].radius_m
-    speed_mps = min(uas.speed_mps, 0.75 * uas.speed_mps + 0.2 * max(0.0, distance_m - 8.0))
+    # flying by: fast, but neither past a small sphere nor before the altitude is reached
+    radius_m = arena.waypoints[target].radius_m
+    passing_mps = min(0.75 * uas.speed_mps, 0.8 * radius_m)
+    speed_mps = min(uas.speed_mps, passing_mps + 0.2 * max(0.0, distance_m - 8.0))
+    missing_m = abs(altitude1_m + x[Z]) - 0.6 * radius_m
     if missing_m > 0.0:
         rate_mps = uas.climb_mps if altitude1_m > -x[Z] else uas.descent_mps
         speed_mps = min(speed_mps, 0.5 + distance_m / (missing_m / rate_mps + LEAD_S))
@@ -99,11 +104,18 @@ def _altitude(arena, x, altitude1_m, way_m, needed_m):
 
 
 @njit(cache=True, error_model="numpy")
+def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+    """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
+    n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m)
+    return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def guide(arena, i, x, reference, target, stop, nonlinear, command):
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
     The wish (fly along the route, in time over low roofs) is flown as far as it leaves room to
-    brake: slower, without descending, or not at all where it does not.
+    brake: slower, without descending, up or down in place, to one side, or not at all.
 
     Args:
         arena: The arena.
@@ -134,23 +146,24 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
     if distance_m > 1e-9:
         north_mps = ahead_x / distance_m * speed_mps
         east_mps = ahead_y / distance_m * speed_mps
+    # what is in the way of a descent is not in the way of staying up
+    level_m = max(altitude_m, -x[Z] - x[VZ])
     path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
-    command.kind = VELOCITY
-    values = command.values
-    values[3] = 0.0
-    for factor in _SPEED_FACTORS:
-        values[0] = factor * north_mps
-        values[1] = factor * east_mps
-        for keep_altitude in (False, True):
-            values[2] = altitude_m
-            if keep_altitude:
-                # what is in the way of a descent is not in the way of staying up
-                level_m = -x[Z] - x[VZ]
-                if level_m <= altitude_m:
-                    break
-                values[2] = level_m
-            n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m)
-            slack_m = fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m)
-            if slack_m >= 0.0:
+    for share in _SHARES_OF_SPEED:
+        for wanted_m in (altitude_m, level_m):
+            write_command(command, VELOCITY, share * north_mps, share * east_mps, wanted_m)
+            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
                 return
+    if abs(altitude_m + x[Z]) > _HEADROOM_M:
+        write_command(command, VELOCITY, 0.0, 0.0, altitude_m)
+        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+            return
+    for turn in _TURNS:
+        cos = _SHARE_WHEN_TURNED * math.cos(turn)
+        sin = _SHARE_WHEN_TURNED * math.sin(turn)
+        turned_north_mps = cos * north_mps - sin * east_mps
+        turned_east_mps = sin * north_mps + cos * east_mps
+        write_command(command, VELOCITY, turned_north_mps, turned_east_mps, level_m)
+        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+            return
     write_brake(command)

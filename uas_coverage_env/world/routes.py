@@ -64,8 +64,9 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
     as long as it comes no closer to the walls.
 
     Returns:
-        (fraction of the leg, over): the fraction is 2 where the leg does not cross; `over` tells
-        that the leg starts or ends above (or below) the obstacle itself.
+        (fraction of the leg, over, ends): the fraction is 2 where the leg does not cross; `over`
+        tells that the leg starts or ends above (or below) the obstacle itself, and `ends` that
+        it ends in the widened footprint.
     """
     lower = obstacle.lower_m
     upper = obstacle.upper_m
@@ -75,7 +76,7 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
         or max(y0, y1) < lower[1]
         or min(y0, y1) > upper[1]
     ):
-        return 2.0, False
+        return 2.0, False, False
     first = obstacle.first_side
     last = obstacle.last_side
     d0 = signed_distance(normals, offsets_m, first, last, x0, y0, 0.0)
@@ -86,7 +87,8 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
         inflation_m = min(inflation_m, d0 - _CREEP_M)
     if d1 > -obstacle.wall_m:
         inflation_m = min(inflation_m, d1 - _CREEP_M)
-    return _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1), over
+    at = _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1)
+    return at, over, d1 <= 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -97,7 +99,7 @@ def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
     """
     for o in range(obstacles.shape[0]):
         if obstacles[o].tall:
-            at, over = crossing(obstacles[o], normals, offsets_m, x0, y0, x1, y1)
+            at, over, _ = crossing(obstacles[o], normals, offsets_m, x0, y0, x1, y1)
             if at <= 1.0 and not over:
                 return False
     return True

@@ -48,7 +48,6 @@ _RESERVE = 0.1  # share of the time limit kept for verification and whatever is 
 _RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
 _WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
 _RESTRICTED_NODES = 60
-_JOINT_NODES = 1
 
 
 def decide(
@@ -155,18 +154,18 @@ class _Search:
                 return
 
     def improve(self) -> None:
-        """The whole OCP from the best plan so far."""
-        left = self._time_left_s()
-        if not self.effort.deterministic and left < _WORTHWHILE_S:
+        """The whole OCP from the best plan so far, with the time that is left.
+
+        Its work cannot be bounded by nodes (the root alone may take any time), so a deterministic
+        decision goes without, and without a bound.
+        """
+        if self.effort.deterministic or self._time_left_s() < _WORTHWHILE_S:
             return
-        alone = self.problem.n_uas == 1
-        program = self._own[0] if alone else Program(self.problem)
-        limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
-        if self.effort.deterministic:
-            limits = replace(limits, time_s=None, nodes=_JOINT_NODES)
+        program = self._own[0] if self.problem.n_uas == 1 else Program(self.problem)
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], _visits(self.problem, self._best))
+        limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
         solution = solve(program.built, limits, start=start)
         self._bound = solution.bound
         if solution.values is not None:

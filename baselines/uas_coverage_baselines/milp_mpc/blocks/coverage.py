@@ -32,9 +32,9 @@ def coverable(problem: PlanningProblem) -> NDArray[np.bool_]:
 class Coverage:
     """|p_w - p(n)| > delta_WP implies b_W(n) = 0; Phi(n+1) = Phi(n) - sum of b_W(n) (OCP_8).
 
-    Via eq. (const_Vec_ub) with an H_WP-sided sphere approximated from inside, so that what the
-    plan counts as covered is covered in the world. b_W is `covers`, Phi is `uncovered`; the row
-    sum of b_W <= Phi follows from Phi(n+1) >= 0. Phi takes whole numbers because b_W does.
+    Sec. III-C.5, via eq. (const_Vec_ub) with an H_WP-sided sphere approximated from inside, so that
+    what the plan counts as covered is covered in the world. b_W is `covers`, Phi is `uncovered`;
+    the row sum of b_W <= Phi follows from Phi(n+1) >= 0. Phi takes whole numbers because b_W does.
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
