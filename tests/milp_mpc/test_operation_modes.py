@@ -176,7 +176,7 @@ def test_targets_are_open_unblocked_and_different_whatever_came_before(
 
 def target(memory, now, seconds_left=600.0, seconds_home=60.0, home_m=(100.0, 0.0, -1.0)):
     return target_of(
-        memory, now, np.array(home_m), WAYPOINTS, seconds_left, seconds_home, Weights()
+        memory, now, np.array(home_m), WAYPOINTS, seconds_left, seconds_home, 180.0, Weights()
     )
 
 
@@ -225,8 +225,19 @@ def test_the_way_home_weighs_much_once_there_is_nothing_left_to_cover():
 
 
 def test_the_return_weight_is_normalised_by_the_distance_too():
-    near, far = (target(Memory(RETURN), situation((north, 0.0, -1.0))) for north in (50.0, -150.0))
+    near, far = (
+        target(Memory(RETURN), situation((north, 0.0, -1.0), plans_coverage=False))
+        for north in (50.0, -150.0)
+    )
     assert near.weight * 50.0 == pytest.approx(far.weight * 250.0)
+
+
+def test_near_home_flying_on_to_cover_costs_no_more_than_farther_out():
+    at_50, at_100 = (
+        target(Memory(RETURN), situation((north, 0.0, -1.0), plans_coverage=True))
+        for north in (50.0, 0.0)
+    )
+    assert at_50.weight == at_100.weight
 
 
 def test_modes_have_the_names_of_the_flight_record():

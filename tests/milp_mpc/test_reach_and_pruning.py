@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy, written
 from uas_coverage_baselines.milp_mpc.blocks import Capabilities, Dynamics, coverable
@@ -19,6 +19,7 @@ DIRECTIONS = np.vstack(
     [closed_cylinder_faces(8), sphere_faces(8), [[0.3, -0.9, 0.1], [2.0, 1.0, -3.0]]]
 )
 LOST_TO_THE_BOUND_M = 30.0  # after 18 steps, of some 200 m; nothing is lost vertically
+FOUND_IS_ENOUGH = (Phase.explicit, Phase.generate)  # a shorter flight would say no more
 
 speeds = st.floats(-14.0, 14.0).map(lambda value: round(value, 1))
 commands = st.lists(
@@ -35,7 +36,7 @@ def already_flying(vehicle, seed, dt_s=1.0):
 
 @pytest.mark.parametrize("vehicle", [S500, HEXACOPTER])
 @pytest.mark.parametrize("dt_s", [0.5, 1.0])
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True, phases=FOUND_IS_ENOUGH)
 @given(seed=st.integers(0, 6), commands=commands)
 def test_no_flight_leaves_the_reachable_sets(vehicle, dt_s, seed, commands):
     start = already_flying(vehicle, seed, dt_s)
@@ -95,7 +96,7 @@ def test_without_pruning_everywhere_inside_the_fence_counts_as_reachable():
     assert reach == pytest.approx([50.0, 200.0, 200.0], abs=0.01)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True, phases=FOUND_IS_ENOUGH)
 @given(
     seed=st.integers(0, 6),
     commands=commands,

@@ -284,7 +284,9 @@ def load_vehicle(name_or_path: str | Path) -> VehicleParams:
     )
 
 
-def return_threshold(vehicle: VehicleParams, dod_max: float | None = None) -> float:
+def return_threshold(
+    vehicle: VehicleParams, dod_max: float | None = None, way_s: float | None = None
+) -> float:
     """DoD_r, from which on the way home is due (Gasche et al., Sec. III-C.6, return mode).
 
     DoD_r = DoD_max - p_hover (D_r,max / v_cruise) / (Q_b u_nom)
@@ -292,8 +294,10 @@ def return_threshold(vehicle: VehicleParams, dod_max: float | None = None) -> fl
     Args:
         vehicle: parameters.
         dod_max: DoD_max of the UAS; the vehicle's own by default.
+        way_s: [s] D_r,max / v_cruise; the vehicle's own by default.
     """
     battery = vehicle.battery
+    way = vehicle.return_rule.distance_over_speed_s if way_s is None else way_s
     energy_J = 3600.0 * battery.capacity_Ah * battery.voltage_nominal_V
-    taken = vehicle.power.hover_W * vehicle.return_rule.distance_over_speed_s / energy_J
+    taken = vehicle.power.hover_W * way / energy_J
     return (battery.dod_max if dod_max is None else dod_max) - taken

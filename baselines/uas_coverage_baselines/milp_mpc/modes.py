@@ -176,6 +176,7 @@ def target_of(
     waypoints_m: FloatArray,
     seconds_left: float,
     seconds_home: float,
+    horizon_m: float,
     weights: Weights,
 ) -> Target | None:
     """The target distance dynamics of one UAS (eq. (OCP_7)), None in covering mode.
@@ -194,6 +195,7 @@ def target_of(
         waypoints_m: (K, 3).
         seconds_left: flight time until DoD_max.
         seconds_home: flight time home.
+        horizon_m: how far a UAS cruises within the horizon.
         weights: cost coefficients.
     """
     if memory.mode is Mode.TRANSIT and memory.waypoint is not None:
@@ -201,7 +203,10 @@ def target_of(
         distance = max(float(np.linalg.norm(position - now.position_m)), _NEAR_M)
         return Target(position, weights.transit / distance, memory.waypoint)
     if memory.mode is Mode.RETURN:
-        distance = max(float(np.linalg.norm(home_m - now.position_m)), _NEAR_M)
+        # near home the normalised cost of flying away would outweigh all coverage: while there is
+        # something to cover on the way, distances within the horizon count alike
+        nearest = horizon_m if now.plans_coverage and now.uncovered.any() else _NEAR_M
+        distance = max(float(np.linalg.norm(home_m - now.position_m)), nearest)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
         growth = urgency / (1.0 - urgency) if now.uncovered.any() else 4.0
         return Target(home_m, weights.homing * growth / distance)

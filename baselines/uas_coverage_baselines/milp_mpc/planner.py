@@ -58,6 +58,12 @@ class Options(PlannerOptions):
         le=10.0,
         description="added to a waypoint's weight per second its coverage takes off the way left",
     )
+    return_detour: float = Field(
+        default=2.5,
+        ge=1.0,
+        le=20.0,
+        description="D_r,max over the distance from home to the fence's far corner",
+    )
     teams: int = Field(
         default=6, ge=1, le=20, description="constructed teams whose flights are refined"
     )
@@ -147,6 +153,7 @@ class MilpMpc:
                 self._around.waypoints_m,
                 self._around.seconds_left(name, now.dod),
                 self._around.seconds_home(name, now.position_m),
+                self._around.horizon_m(name),
                 self._weights,
             )
             for name, now in zip(swarm.active, situations, strict=True)

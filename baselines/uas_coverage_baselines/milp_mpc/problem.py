@@ -35,7 +35,7 @@ class Weights:
     yaw: float = 0.05
     energy: float = 0.05
     transit: float = 0.6
-    homing: float = 2.0
+    homing: float = 2.5
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,11 @@ class Formulation(Protocol):
         ...
 
     @property
+    def return_detour(self) -> float:
+        """D_r,max as a multiple of the distance to the fence's far corner."""
+        ...
+
+    @property
     def moving_margin_m(self) -> float:
         """Added to the clearance of moving obstacles."""
         ...
@@ -78,8 +83,15 @@ class Surroundings:
         return self._vehicles[name]
 
     def dod_return(self, name: str) -> float:
-        """DoD_r (Sec. III-C.6, return mode)."""
-        return return_threshold(self._vehicles[name], self._uas[name].dod_max)
+        """DoD_r (Sec. III-C.6, return mode).
+
+        D_r,max, the overestimated way home, is a multiple of the way to the fence's far corner.
+        """
+        vehicle, uas = self._vehicles[name], self._uas[name]
+        corners = self.scenario.fence.vertices_m - self.home_m[name]
+        farthest_m = float(np.linalg.norm(corners, axis=1).max())
+        way_s = self._options.return_detour * farthest_m / vehicle.limits.v_cruise_mps
+        return return_threshold(vehicle, uas.dod_max, way_s)
 
     def seconds_left(self, name: str, dod: float) -> float:
         """Flight time until DoD_max, at the pace of cruising."""
@@ -93,6 +105,10 @@ class Surroundings:
         away = self.home_m[name] - position_m
         level = 1.2 * float(np.hypot(away[0], away[1])) / limits.v_cruise_mps
         return level + abs(float(away[2])) / limits.v_down_max_mps + _LANDING_S
+
+    def horizon_m(self, name: str) -> float:
+        """How far a UAS cruises within the horizon."""
+        return self._options.horizon * self.dt_s * self._vehicles[name].limits.v_cruise_mps
 
     def blocked_waypoints(self, swarm: SwarmState) -> set[int]:
         """Waypoints whose whole inner polyhedron lies in a moving obstacle's keep-out, now."""
