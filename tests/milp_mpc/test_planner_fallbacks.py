@@ -1,5 +1,7 @@
 """When no plan comes, the last one's way out is flown; nobody touches anything."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from practice_missions import fly, mission, planner
@@ -46,10 +48,10 @@ class RoughDecisions:
         return Plan(problem.names, x, u, covers, 0.0, -np.inf)
 
 
-def flown_with(monkeypatch, scenario, decide, steps, **options):
+def flown_with(monkeypatch, scenario, decide, steps, dynamics="lpv"):
     """Positions, decisions and outcomes of a flight whose plans come from `decide`."""
     monkeypatch.setattr(planner_module, "decide", decide)
-    world, made = World(scenario), planner(scenario, **options)
+    world, made = World(scenario, dynamics=dynamics), planner(scenario)
     positions, decisions, outcomes = [], [], []
     for _ in range(steps):
         if world.done:
@@ -108,6 +110,67 @@ def test_a_fallback_flies_what_it_says(monkeypatch):
                 assert path[1] == pytest.approx(positions[now][row], abs=1e-6)
                 followed += decision.fallback
     assert followed > 20
+
+
+def test_when_plans_stop_coming_the_nonlinear_plant_comes_to_a_hover_too(monkeypatch):
+    decide = RoughDecisions(PATTERNS["all_after_ten"], seed=0)
+    positions, _, outcomes = flown_with(
+        monkeypatch, load_scenario("open_field"), decide, 45, dynamics="nonlinear"
+    )
+    assert (outcomes["contact"] == 0).all()
+    assert np.abs(np.diff(positions[-5:], axis=0)).max() < 0.1
+
+
+def test_a_way_out_that_a_moving_obstacle_has_come_to_cross_is_not_flown(monkeypatch):
+    balloon = {
+        "name": "balloon",
+        "radius_m": 5.0,
+        "height_m": 10.0,
+        "safe_distance_m": 3.0,
+        "start_m": (150.0, 150.0, -20.0),
+        "schedule": [{"from_s": 0.0, "velocity_mps": (0.0, 0.0, 0.0)}],
+    }
+    scenario = mission(
+        [((190.0, 10.0, -8.0), 8.0)], [(50.0, 50.0, -20.0)], moving_obstacles=[balloon]
+    )
+    world, made = World(scenario), planner(scenario)
+    monkeypatch.setattr(planner_module, "decide", AlwaysNorth())
+    for _ in range(3):
+        world.step(made.act(world.swarm_state()))
+    monkeypatch.setattr(planner_module, "decide", lambda *args: None)
+    ahead_m = world.state.x[0, :3] + np.array([25.0, 0.0, 0.0])
+    seen = dataclasses.replace(
+        world.swarm_state(),
+        moving_position_m=ahead_m[None],
+        moving_velocity_mps=np.array([[-2.0, 0.0, 0.0]]),
+    )
+    (command,) = made.act(seen).values()
+    assert isinstance(command, Velocity), "brake at once, with the inner loop"
+
+
+class AlwaysNorth(RoughDecisions):
+    """Plans that lead straight north at full speed."""
+
+    def __init__(self):
+        super().__init__(refused=PATTERNS["never"])
+
+    def _wild(self, problem, dt_s):
+        commands = np.tile((12.0, 0.0, 0.0), (problem.horizon, 1))
+        x, u = flown(problem.vehicles[0], problem.x0[0], commands, dt_s)
+        covers = np.zeros((1, len(u), problem.n_scenario_waypoints), bool)
+        return Plan(problem.names, x[None], u[None], covers, 0.0, -np.inf)
+
+
+@pytest.mark.parametrize("limit_s", [1e-3, 0.05])
+def test_a_planner_without_time_still_commands_everybody(limit_s):
+    scenario = load_scenario("village")
+    world = World(scenario)
+    made = planner(scenario, deterministic=False, time_limit_s=limit_s)
+    for _ in range(3):
+        commands = made.act(world.swarm_state())
+        assert set(commands) == set(world.active)
+        outcome = world.step(commands)
+        assert (outcome["contact"] == 0).all()
 
 
 def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):

@@ -121,19 +121,7 @@ def test_a_uas_too_low_on_charge_lands_before_it_leaves():
     assert world.state.uncovered.all()
 
 
-@pytest.mark.parametrize(
-    "horizon",
-    [
-        pytest.param(
-            8,
-            marks=pytest.mark.xfail(
-                reason="being at home at each sample, up and down in between, costs least",
-                strict=True,
-            ),
-        ),
-        18,
-    ],
-)
+@pytest.mark.parametrize("horizon", [8, 18])
 def test_who_is_at_home_and_still_moves_comes_to_rest_and_lands(horizon):
     scenario = mission([((52.0, 51.0, -2.0), 8.0)], [(50.0, 50.0, -1.0)])
     world = World(scenario)

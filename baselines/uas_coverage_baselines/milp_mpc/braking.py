@@ -48,6 +48,14 @@ def way_out(problem: PlanningProblem, plan: Plan, dt_s: float) -> Plan | None:
     return None
 
 
+def still_holds(problem: PlanningProblem, out: Plan) -> bool:
+    """Whether what is left of a way out is clear of what is seen now, beginning where it is."""
+    if any(name not in out.names for name in problem.names):
+        return False
+    longer = replace(problem, moving=_prolonged(problem, out.u.shape[1]))
+    return first_trouble(longer, out) is None
+
+
 def _prolonged(problem: PlanningProblem, steps: int) -> tuple[MovingHull, ...]:
     """The moving obstacles predicted further, at the same velocity."""
     result = []

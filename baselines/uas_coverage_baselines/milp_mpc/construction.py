@@ -215,7 +215,7 @@ def _stacked_hulls(problem: PlanningProblem, uas: int):
 
 
 @njit(cache=True, error_model="numpy")
-def _aim_at(box, half_m, x, following, lead_s):
+def _aim_at(box, half_m, x, following):
     """A point of the box on the way to what follows."""
     point = np.empty(3)
     for axis in range(3):
@@ -226,7 +226,7 @@ def _aim_at(box, half_m, x, following, lead_s):
 
 
 @njit(cache=True, error_model="numpy")
-def _over_roofs(x, down_mps, normals, offsets, first, last, clearance):
+def _over_roofs(vehicle, x, down_mps, normals, offsets, first, last, clearance):
     """Climb instead where the way ahead leads into an obstacle."""
     for step in range(1, _ROOF_LOOKAHEAD + 1):
         north, east = x[X] + step * x[VX], x[Y] + step * x[VY]
@@ -234,7 +234,7 @@ def _over_roofs(x, down_mps, normals, offsets, first, last, clearance):
             height = x[Z] + step * down_mps
             d = signed_distance(normals, offsets, first[o], last[o], north, east, height)
             if d < clearance[o] + 0.5:
-                return -3.0
+                return -vehicle.v_up_max_mps
     return down_mps
 
 
@@ -293,11 +293,11 @@ def _fly_all(
             ):
                 leg += 1
             w = sequences[s, leg] if leg < sequences.shape[1] else -1
-            speed = 12.0
+            speed = vehicle.v_xy_max_mps
             if w >= 0:
                 nxt = sequences[s, leg + 1] if leg + 1 < sequences.shape[1] else -1
                 following = waypoints[nxt] if nxt >= 0 else waypoints[w]
-                aim = _aim_at(waypoints[w], half_m[w], x, following, lead_s)
+                aim = _aim_at(waypoints[w], half_m[w], x, following)
             elif has_target:
                 aim = target.copy()
             else:
@@ -309,8 +309,9 @@ def _fly_all(
             length = np.hypot(ex, ey) + 1e-9
             if w < 0 and has_target:
                 speed = min(speed, 0.3 * away)
-            down = min(max(0.6 * (aim[2] - x[Z]) - 0.2 * x[VZ], -3.0), 1.5)
-            down = _over_roofs(x, down, normals, offsets, first, last, clearance)
+            down = 0.6 * (aim[2] - x[Z]) - 0.2 * x[VZ]
+            down = min(max(down, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
+            down = _over_roofs(vehicle, x, down, normals, offsets, first, last, clearance)
             velocity_climb_wrench(
                 vehicle, x, reference, speed * ex / length, speed * ey / length, down, u
             )

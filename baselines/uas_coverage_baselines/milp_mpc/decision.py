@@ -48,6 +48,7 @@ _RESERVE = 0.1  # share of the time limit kept for verification and whatever is 
 _RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
 _WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
 _RESTRICTED_NODES = 60
+_ALONE_NODES = 30
 
 
 def decide(
@@ -156,16 +157,21 @@ class _Search:
     def improve(self) -> None:
         """The whole OCP from the best plan so far, with the time that is left.
 
-        Its work cannot be bounded by nodes (the root alone may take any time), so a deterministic
-        decision goes without, and without a bound.
+        For several UAS its work cannot be bounded by nodes (the root alone may take any time), so
+        that a deterministic decision goes without it, and without a bound.
         """
-        if self.effort.deterministic or self._time_left_s() < _WORTHWHILE_S:
+        deterministic, alone = self.effort.deterministic, self.problem.n_uas == 1
+        if (deterministic and not alone) or (
+            not deterministic and self._time_left_s() < _WORTHWHILE_S
+        ):
             return
-        program = self._own[0] if self.problem.n_uas == 1 else Program(self.problem)
+        program = self._own[0] if alone else Program(self.problem)
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], _visits(self.problem, self._best))
         limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
+        if deterministic:
+            limits = SolverLimits(nodes=_ALONE_NODES, relative_gap=0.01, heuristics=False)
         solution = solve(program.built, limits, start=start)
         self._bound = solution.bound
         if solution.values is not None:

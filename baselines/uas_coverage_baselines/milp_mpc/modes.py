@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.problem import Target, Weights
 
 FloatArray = NDArray[np.float64]
+# distance counts at samples only: were it dearer than lift, a UAS would bob through its home
+# once a step instead of coming to rest
+_PER_METRE_MAX = 0.1
 _NEAR_M = 5.0  # distances below this no longer raise the normalised target cost
 
 
@@ -209,5 +212,6 @@ def target_of(
         distance = max(float(np.linalg.norm(home_m - now.position_m)), nearest)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
         growth = urgency / (1.0 - urgency) if now.uncovered.any() else 4.0
-        return Target(home_m, weights.homing * growth / distance)
+        weight = min(weights.homing * growth / distance, _PER_METRE_MAX)
+        return Target(home_m, weight)
     return None

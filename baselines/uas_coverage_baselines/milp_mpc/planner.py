@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from uas_coverage_baselines.milp_mpc.braking import way_out
+from uas_coverage_baselines.milp_mpc.braking import still_holds, way_out
 from uas_coverage_baselines.milp_mpc.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.modes import (
     Memory,
@@ -113,7 +113,7 @@ class MilpMpc:
         out = None if plan is None else way_out(problem, plan, dt_s)
         if plan is None or out is None:
             plan, out, fallback = self._way_out, self._way_out, True
-        if plan is None or out is None or any(name not in plan.names for name in swarm.active):
+        if plan is None or out is None or (fallback and not still_holds(problem, out)):
             return self._hover(swarm, situations)
         self._plan, self._way_out = plan.advanced(), out.advanced()
         self.last_decision = Decision(
@@ -178,7 +178,7 @@ class MilpMpc:
         )
 
     def _hover(self, swarm: SwarmState, situations: Sequence[Situation]) -> dict[str, Command]:
-        """Hold the position with the vehicle's inner loop: braking has ended, no plan has come."""
+        """Brake and hold with the vehicle's inner loop: no plan has come, no way out holds."""
         self._plan = self._way_out = None
         here = {n: s.position_m for n, s in zip(swarm.active, situations, strict=True)}
         self.last_decision = Decision({n: p[None] for n, p in here.items()}, fallback=True)
