@@ -106,7 +106,6 @@ def test_a_decision_that_cannot_be_made_is_none():
     assert decide(problem, None, 1.0, WITH_TIME) is None
 
 
-@pytest.mark.xfail(reason="no program is restricted around a flight that simply stops", strict=True)
 def test_a_plan_is_found_by_nodes_even_where_every_flight_to_a_waypoint_is_blocked():
     wall = box((60.0, 40.0, -20.0), (80.0, 80.0, 0.0))
     problem = toy(

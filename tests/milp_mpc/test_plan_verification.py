@@ -105,10 +105,6 @@ def test_two_uas_that_meet_between_two_samples_are_seen(step):
     assert "a and b come within" in first_trouble(problem, plan)
 
 
-FIRST_STEP = "verify judges segments from the second sample on only"
-
-
-@pytest.mark.xfail(reason=FIRST_STEP, strict=True)
 def test_two_uas_that_meet_in_the_very_first_step_are_seen():
     plan = planned(ahead(), ahead())
     side = np.where(np.arange(9) <= 0, -8.0, 8.0)
@@ -117,7 +113,6 @@ def test_two_uas_that_meet_in_the_very_first_step_are_seen():
     assert first_trouble(problem, plan) is not None
 
 
-@pytest.mark.xfail(reason=FIRST_STEP, strict=True)
 def test_an_obstacle_in_the_very_first_step_is_seen():
     plan = planned(ahead())
     problem = toy(START, horizon=8, obstacles=[plate_at(between(plan, 0))], clearance_m=0.3)

@@ -97,6 +97,8 @@ class MilpMpc:
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Decide for every active UAS: one step of Algorithm 1."""
+        if not swarm.active:
+            return {}
         situations = [self._situation(swarm, name) for name in swarm.active]
         memories = update_modes(
             [self._memories[name] for name in swarm.active],
