@@ -1,68 +1,318 @@
-"""Missions on generated scenarios, one planner: how they end, what they take.
+"""Whole missions: the village and generated scenarios, planner against planner.
 
-    python benchmarks/missions.py --planner milp-mpc --seeds 0:10
+    python benchmarks/missions.py --out missions
+    python benchmarks/missions.py --planners milp-mpc,lawnmower --seeds 1000:1100 --no-village
 
-Scenario number s has 1 + s mod 4 UAS. Exits with 1 where a flight has a violation or a breach.
+Every flight is judged twice: by the world that flew it and by `independent_check`. The generated
+scenario of a seed has 1 to 4 UAS, 20 to 60 waypoints and 5 to 20 blocks, drawn from the seed; the
+default seeds were used for no tuning. Flights that `--out` holds are not flown again. Decision
+times are comparable only where `--jobs` leaves each flight the cores it asks for.
+
+Exits 0 where nothing was touched, nothing came too near and both judges agree; 1 otherwise; 2
+where the input is bad.
 """
 
-import time
-from typing import Annotated
+from __future__ import annotations
 
+import csv
+import json
+import multiprocessing
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
 import typer
+from independent_check import BadFlightError, check
+from mission_statistics import COLUMNS, Row, flights_table, planners_table
 from rich.console import Console
-from rich.table import Table
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from uas_coverage_env import Flight, generate_scenario, load_planner, rollout
-from uas_coverage_env.flight import summary
+from uas_coverage_env import Scenario, generate_scenario, load_planner, load_scenario, rollout
+from uas_coverage_env.flight import Progress as FlightProgress
+from uas_coverage_env.flight import describe_planners
+from uas_coverage_env.flight.registry import options_of
+from uas_coverage_env.strict_toml import InputError
+
+PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"
+SEEDS = "1000:1020"
+CLEAN, TOUCHED, BAD_INPUT, STOPPED = 0, 1, 2, 130
+_SECONDS_BETWEEN_LOOKS = 0.5
+_TABLE_WIDTH = 190
+_STOP = "stop"  # among what the flights tell each other; no mission has this name
 
 
-def main(
-    planner: Annotated[str, typer.Option(help="See `uas-coverage planners`.")] = "milp-mpc",
-    seeds: Annotated[str, typer.Option(help="FIRST:END of the scenarios' seeds.")] = "0:10",
-    waypoints: Annotated[int, typer.Option(min=1, help="Waypoints of each scenario.")] = 20,
-    obstacles: Annotated[int, typer.Option(min=0, help="Fixed obstacles of each.")] = 6,
-) -> None:
-    """Fly one planner on generated scenarios and print a table."""
-    first, end = (int(part) for part in seeds.split(":"))
-    table = Table(
-        *("seed", "UAS", "covered", "steps", "Wh", "home", "violations", "breaches"),
-        *("fallbacks", "p50 s", "p95 s", "wall s"),
+class StoppedError(Exception):
+    """A flight was ended by hand: there is nothing to keep."""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """One planner on one scenario, and where the flight is kept."""
+
+    scenario: Scenario
+    planner: str
+    options: dict[str, str]
+    seed: int
+    directory: Path
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return f"{self.scenario.name} {self.planner}"
+
+
+def mission_scenario(seed: int) -> Scenario:
+    """The generated scenario of a seed: 1 to 4 UAS, 20 to 60 waypoints, 5 to 20 blocks."""
+    lots = np.random.default_rng([seed, 20, 60, 5, 20])
+    return generate_scenario(
+        seed,
+        n_uas=int(lots.integers(1, 5)),
+        n_waypoints=int(lots.integers(20, 61)),
+        n_obstacles=int(lots.integers(5, 21)),
     )
-    console = Console()
-    clean = True
-    for seed in range(first, end):
-        scenario = generate_scenario(
-            seed, n_uas=1 + seed % 4, n_waypoints=waypoints, n_obstacles=obstacles
-        )
-        began = time.perf_counter()
-        with console.status(f"seed {seed}"):
-            flight = rollout(scenario, load_planner(planner), seed=seed)
-        row = _row(seed, flight, time.perf_counter() - began)
-        table.add_row(*row)
-        console.print("  ".join(row), highlight=False)
-        clean = clean and not flight.violations and flight.breaches == 0
-    console.print(table)
-    raise typer.Exit(0 if clean else 1)
 
 
-def _row(seed: int, flight: Flight, wall_s: float) -> list[str]:
-    result = summary(flight)
-    times = result["decision_time_s"]
+def fly(mission: Mission, told: MutableMapping[str, str] | None = None) -> Row:
+    """Fly a mission unless its directory holds it, and judge it.
+
+    The directory appears whole or not at all.
+
+    Args:
+        mission: What to fly.
+        told: To which the flight's progress is written, under the mission's name; once it holds
+            `_STOP`, the flight ends.
+
+    Raises:
+        InputError: The directory holds another flight, or cannot be written.
+        StoppedError: Ctrl-C ended the flight.
+    """
+    if mission.directory.exists():
+        _make_sure_it_is(mission)
+    else:
+        _fly_and_keep(mission, told)
+    summary = json.loads((mission.directory / "summary.json").read_text(encoding="utf-8"))
+    try:
+        report = check(mission.directory)
+    except BadFlightError as error:
+        raise InputError(str(error)) from error
+    n_uas = len(mission.scenario.uas)
+    return Row.of(mission.scenario.name, mission.planner, n_uas, summary, report)
+
+
+def _fly_and_keep(mission: Mission, told: MutableMapping[str, str] | None) -> None:
+    def tell(progress: FlightProgress) -> None:
+        if told is not None:
+            swarm = progress.swarm
+            told[mission.name] = (
+                f"step {swarm.step}, {progress.covered}/{len(swarm.uncovered)} covered"
+            )
+
+    planner = load_planner(mission.planner, mission.options)
+    flight = rollout(
+        mission.scenario,
+        planner,
+        seed=mission.seed,
+        on_step=tell,
+        should_stop=lambda: told is not None and _STOP in told,
+    )
+    if flight.ended == "stopped":
+        raise StoppedError
+    folder = mission.directory.parent
+    folder.mkdir(parents=True, exist_ok=True)
+    half_done = folder / f".{mission.directory.name}.{os.getpid()}"
+    try:
+        flight.save(half_done, overwrite=True)
+        half_done.rename(mission.directory)
+    finally:
+        shutil.rmtree(half_done, ignore_errors=True)
+
+
+def _make_sure_it_is(mission: Mission) -> None:
+    """What is kept was flown with the same scenario, planner, options and seed."""
+    try:
+        summary = json.loads((mission.directory / "summary.json").read_text(encoding="utf-8"))
+        scenario = json.loads((mission.directory / "scenario.json").read_text(encoding="utf-8"))
+        kept = {"scenario": scenario, "seed": summary["seed"], **summary["planner"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{mission.directory}: holds no whole flight; remove it") from error
+    asked = {
+        "scenario": mission.scenario.model_dump(mode="json", by_alias=True),
+        "seed": mission.seed,
+        "name": mission.planner,
+        "options": options_of(load_planner(mission.planner, mission.options)),
+    }
+    for key, value in asked.items():
+        if kept[key] != value:
+            raise InputError(
+                f"{mission.directory}: holds a flight with another {key}; "
+                "give another --out, or remove it"
+            )
+
+
+def planner_options(planners: Sequence[str], pairs: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Each planner's share of the options: those it has.
+
+    Raises:
+        InputError: An unknown planner, or an option that none of them has.
+    """
+    known = {planner.name: planner for planner in describe_planners()}
+    for name in planners:
+        if name not in known:
+            raise InputError(f"unknown planner {name!r}; allowed: {', '.join(known)}")
+    shares: dict[str, dict[str, str]] = {name: {} for name in planners}
+    for pair in pairs:
+        key, separator, value = (part.strip() for part in pair.partition("="))
+        if not key or not separator:
+            raise InputError(f"--option {pair!r}: should be KEY=VALUE, as in horizon=12")
+        takers = [n for n in planners if key in {option.name for option in known[n].options}]
+        if not takers:
+            raise InputError(f"no planner of {', '.join(planners)} has an option {key!r}")
+        for name in takers:
+            shares[name][key] = value
+    for name, options in shares.items():
+        load_planner(name, options)
+    return shares
+
+
+def seed_range(text: str) -> range:
+    """FIRST:END as a range; END is not part of it.
+
+    Raises:
+        InputError: It is not that.
+    """
+    first, separator, end = text.partition(":")
+    if not separator or not first.isdigit() or not end.isdigit():
+        raise InputError(f"--seeds {text!r}: should be FIRST:END, as in {SEEDS}")
+    return range(int(first), int(end))
+
+
+def _missions(
+    planners: Sequence[str], options: Mapping[str, dict[str, str]], seeds: range,
+    village: bool, folder: Path,
+) -> list[Mission]:  # fmt: skip
+    scenarios = [(0, load_scenario("village"))] if village else []
+    scenarios += [(seed, mission_scenario(seed)) for seed in seeds]
+    if not scenarios or not planners:
+        raise InputError("nothing to fly: give --planners, and --village or some --seeds")
     return [
-        str(seed),
-        str(len(flight.names)),
-        f"{result['coverage']:.0%}",
-        str(flight.steps),
-        f"{result['energy_Wh']:.2f}",
-        "all" if result["all_home"] else "no",
-        str(len(flight.violations)),
-        str(flight.breaches),
-        str(result["fallbacks"]),
-        f"{times['p50']:.2f}",
-        f"{times['p95']:.2f}",
-        f"{wall_s:.0f}",
+        Mission(scenario, name, options[name], seed, folder / name / scenario.name)
+        for seed, scenario in scenarios
+        for name in planners
     ]
 
 
+@contextmanager
+def _folder(out: Path | None) -> Iterator[Path]:
+    if out is not None:
+        yield out
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+def fly_all(missions: Sequence[Mission], jobs: int, console: Console) -> list[Row]:
+    """All missions, in processes side by side, with a bar that shows how far they are."""
+    context = multiprocessing.get_context(
+        "spawn"
+    )  # threads and compiled code do not survive a fork
+    rows: dict[str, Row] = {}
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with (
+        context.Manager() as manager,
+        ProcessPoolExecutor(jobs, mp_context=context) as pool,
+        Progress(*columns, TimeElapsedColumn(), console=console) as progress,
+    ):
+        told = manager.dict()
+        bar = progress.add_task("flying", total=len(missions))
+        futures: dict[Future[Row], Mission] = {pool.submit(fly, m, told): m for m in missions}
+        waiting = set(futures)
+        try:
+            while waiting:
+                done, waiting = wait(waiting, _SECONDS_BETWEEN_LOOKS, FIRST_COMPLETED)
+                for future in done:
+                    name = futures[future].name
+                    rows[name] = future.result()
+                    told.pop(name, None)
+                    progress.advance(bar)
+                    if not rows[name].clean or not console.is_terminal:
+                        progress.console.print(
+                            rows[name].line(), highlight=False, markup=False, soft_wrap=True
+                        )
+                underway = "; ".join(f"{name}: {text}" for name, text in sorted(told.items()))
+                progress.update(bar, description=underway or "flying")
+        except (KeyboardInterrupt, Exception) as error:
+            told[_STOP] = ""  # some wait inside the pool, where they cannot be cancelled
+            pool.shutdown(cancel_futures=True)
+            if isinstance(error, KeyboardInterrupt):
+                raise StoppedError from error
+            raise
+    return [rows[mission.name] for mission in missions]
+
+
+def _write_rows(path: Path, rows: Sequence[Row]) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(row.values() for row in rows)
+    temporary.replace(path)
+
+
+def main(
+    planners: Annotated[
+        str, typer.Option(help="Planners, the first is what the others are compared with.")
+    ] = PLANNERS,
+    seeds: Annotated[str, typer.Option(help="FIRST:END of the generated scenarios.")] = SEEDS,
+    village: Annotated[bool, typer.Option(help="Fly the village too.")] = True,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY=VALUE", help="Option, for each planner that has it; repeatable."),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="Flights side by side.")] = 1,
+    out: Annotated[
+        Path | None, typer.Option(help="Keeps every finished flight; what it holds is not flown.")
+    ] = None,
+) -> None:
+    """Fly planners on the village and on generated scenarios, and print two tables."""
+    names = list(dict.fromkeys(name.strip() for name in planners.split(",") if name.strip()))
+    console = Console()
+    with _folder(out) as folder:
+        shares = planner_options(names, option or ())
+        missions = _missions(names, shares, seed_range(seeds), village, folder)
+        rows = fly_all(missions, jobs, console)
+        if out is not None:
+            _write_rows(out / "missions.csv", rows)
+    wide = Console(width=max(console.width, _TABLE_WIDTH))
+    wide.print(flights_table(rows))
+    wide.print(planners_table(rows, names))
+    for row in rows:
+        for problem in row.problems:
+            wide.print(f"{row.scenario} {row.planner}: {problem}", markup=False)
+    raise typer.Exit(CLEAN if all(row.clean for row in rows) else TOUCHED)
+
+
+def _run(command: Callable[[], Any]) -> int:
+    """The exit code of the command; a person's mistake is one line."""
+    try:
+        command()
+    except InputError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return BAD_INPUT
+    except StoppedError:
+        sys.stderr.write("stopped by hand; finished flights are kept, run again to go on\n")
+        return STOPPED
+    return CLEAN
+
+
 if __name__ == "__main__":
-    typer.run(main)
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(main)
+    sys.exit(_run(app))

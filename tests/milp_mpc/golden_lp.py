@@ -22,7 +22,7 @@ def readable(milp, heading, only=""):
     """
     parts = _sections(milp.lp_text())
     rows = [row for row in parts["subject to"] if re.match(only, row)]
-    cost = [] if only else parts["minimize"]
+    cost = [] if only else parts["minimize"][:1]  # the constant is a line of its own
     shown = set(_COLUMN.findall(" ".join(cost + rows)))
     bounds = [b for b in parts["bounds"] if _column(b) in shown]
     free = [b for b in bounds if b.startswith("-inf") and b.endswith("<= inf")]

@@ -1,16 +1,24 @@
 """A decision as a whole: restricted programs, teams of plans, the joint program."""
 
+import dataclasses
+import time
+
 import numpy as np
 import pytest
 from toy_problems import S500, box, flight, flown, state, toy
+from uas_coverage_baselines.milp_mpc import decision
+from uas_coverage_baselines.milp_mpc.braking import way_out
 from uas_coverage_baselines.milp_mpc.construction import NEVER, Flight, flights, teams
 from uas_coverage_baselines.milp_mpc.decision import Effort, decide
-from uas_coverage_baselines.milp_mpc.highs import SolverLimits, SolveStatus, solve
 from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.problem import Target
-from uas_coverage_baselines.milp_mpc.program import Program
+from uas_coverage_baselines.milp_mpc.program import NARROW, WIDE, Program
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.standby import standby_plans
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
+
+from uas_coverage_env.geometry import sphere_faces
 
 BY_NODES = Effort(deterministic=True, teams=4)
 WITH_TIME = Effort(time_limit_s=60.0, teams=4)  # all of it is needed only on a very busy machine
@@ -119,6 +127,84 @@ def test_a_plan_is_found_by_nodes_even_where_every_flight_to_a_waypoint_is_block
     assert decide(problem, None, 1.0, BY_NODES) is not None
 
 
+def test_several_uas_get_plans_by_nodes_where_every_flight_is_blocked():
+    wall = box((60.0, 40.0, -20.0), (80.0, 130.0, 0.0))
+    problem = toy(
+        state((30.0, 60.0, -1.0)),
+        state((30.0, 110.0, -1.0)),
+        horizon=12,
+        obstacles=[wall],
+        clearance_m=2.6,
+        waypoints=[((59.9, 60.0, -6.0), 5.0), ((59.9, 110.0, -6.0), 5.0)],
+    )
+    for uas in range(2):
+        assert all((one.visit == NEVER).all() for one in flights(problem, uas, 1.0))
+    plan = decide(problem, None, 1.0, BY_NODES)
+    assert first_trouble(problem, plan) is None
+
+
+def test_a_decision_whose_time_is_over_when_it_begins_is_none(problem):
+    late = time.perf_counter() - 10.0
+    assert decide(problem, None, 1.0, Effort(time_limit_s=1.0), began=late) is None
+
+
+@pytest.fixture
+def nothing_for_b(monkeypatch):
+    """No program gives the second UAS a plan."""
+    refined = decision._Search.refined
+
+    def for_a_alone(search, uas, *rest):
+        return refined(search, uas, *rest) if uas == 0 else None
+
+    monkeypatch.setattr(decision._Search, "refined", for_a_alone)
+
+
+def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
+    plan = decide(problem, None, 1.0, BY_NODES)
+    assert first_trouble(problem, plan) is None
+    assert plan.covers[0].any()
+    assert not plan.covers[1].any()
+    braking = standby_plans(problem, 1, None, 1.0)[-1]
+    assert plan.x[1] == pytest.approx(braking.x[0])
+
+
+def test_who_gets_no_plan_flies_the_rest_of_its_way_out(problem, by_nodes, nothing_for_b):
+    out = way_out(problem, by_nodes, 1.0)
+    plan = decide(problem, None, 1.0, BY_NODES, out=out)
+    assert plan.x[1] == pytest.approx(out.x[1, :8])
+    assert first_trouble(problem, plan) is None
+
+
+def test_where_no_team_holds_who_can_leaves_standby(problem, by_nodes, monkeypatch):
+    monkeypatch.setattr(decision, "teams", lambda problem, pools, keep: [])
+    search = decision._Search(problem, BY_NODES, time.perf_counter())
+    search.formulate()
+    for uas in range(2):
+        alone = dataclasses.replace(
+            by_nodes,
+            names=by_nodes.names[uas : uas + 1],
+            **{key: getattr(by_nodes, key)[uas : uas + 1] for key in ("x", "u", "covers")},
+        )
+        search.collect([(uas, None)], [alone])
+    search.combine([standby_plans(problem, uas, None, 1.0) for uas in range(2)])
+    assert search.plan.x == pytest.approx(by_nodes.x)
+
+
+@pytest.mark.parametrize("uas", [0, 1])
+def test_a_plan_on_standby_has_the_objective_it_says(problem, uas):
+    alone = problem.only(uas)
+    (plan,) = standby_plans(problem, uas, None, 1.0)
+    assert first_trouble(alone, plan) is None
+    assert objective_of(alone, plan) == pytest.approx(plan.objective, abs=2e-3)
+
+
+def test_the_rest_of_a_way_out_is_a_plan_with_the_objective_it_says(problem, by_nodes):
+    out = way_out(problem, by_nodes, 1.0)
+    plan, _ = standby_plans(problem, 0, out, 1.0)
+    assert plan.covers.tolist() == by_nodes.covers[:1].tolist()
+    assert objective_of(problem.only(0), plan) == pytest.approx(plan.objective, abs=2e-3)
+
+
 def test_what_is_left_of_the_last_plan_can_be_flown_on(problem, by_nodes):
     moved = toy(
         *by_nodes.x[:, 1],
@@ -165,6 +251,18 @@ def test_the_bounds_near_a_plan_leave_that_plan_possible(problem, by_nodes):
     assert free.sum() < program.built.integer.sum()
 
 
+def test_the_bounds_near_a_flight_through_a_tower_widen_until_there_is_a_way_around():
+    start = flight(S500, state((80.0, 86.0, -12.0)), [(6.0, 0.0, 0.0)] * 3)[-1]
+    problem = toy(start, horizon=9, obstacles=[box((112.0, 80.0, -25.0), (122.0, 92.0, 0.0))])
+    through = flight(S500, start, [(9.0, 0.0, 0.0)] * 9)[None, :, :3]
+    program, never = Program(problem), np.zeros((1, 0), np.int64)
+    found = []
+    for nearness in (NARROW, WIDE):
+        lower, upper = program.near(through, never, nearness)
+        found.append(solve(program.built, OPTIMAL, lower=lower, upper=upper).values is not None)
+    assert found == [False, True]
+
+
 def test_a_start_made_of_a_plan_can_be_completed_to_it(problem, by_nodes):
     program = Program(problem)
     columns, values = program.start(by_nodes.x[:, :, :3], visits(problem, by_nodes))
@@ -187,6 +285,29 @@ def test_constructed_flights_start_here_cover_what_they_say_and_differ(problem):
             inside = away <= problem.waypoint_reach_m
             first = np.where(inside.any(axis=0), inside.argmax(axis=0), NEVER)
             assert one.visit.tolist() == first.tolist()
+
+
+def test_a_flight_with_nothing_to_do_at_rest_stays_where_it_is():
+    (one,) = flights(toy(state((60.0, 60.0, -10.0)), horizon=8), 0, 1.0)
+    assert np.abs(one.positions_m - one.positions_m[0]).max() < 1e-6
+
+
+def test_a_flight_with_nothing_to_do_goes_straight_on():
+    (one,) = flights(toy(state((60.0, 60.0, -10.0), (5.0, 0.0, 0.0)), horizon=8), 0, 1.0)
+    assert one.positions_m[-1, 0] > 100.0
+    assert np.abs(one.positions_m[:, 1:] - (60.0, -10.0)).max() < 0.5
+
+
+@pytest.mark.parametrize("sides", [4, 8])
+def test_flights_cover_within_the_waypoints_polyhedron_whatever_its_sides(sides):
+    corner = ((85.0, 66.0, -10.0), 10.0)
+    start = state((60.0, 60.0, -10.0), (8.0, 0.0, 0.0))
+    problem = toy(start, horizon=8, waypoints=[corner], waypoint_sides=sides)
+    covering = [one for one in flights(problem, 0, 1.0) if one.visit[0] < NEVER]
+    assert covering
+    for one in covering:
+        out = ((one.positions_m - problem.waypoints_m[0]) @ sphere_faces(sides).T).max(axis=1)
+        assert int((out <= problem.waypoint_reach_m[0]).argmax()) == one.visit[0]
 
 
 def test_constructed_flights_can_be_flown(problem):
@@ -219,6 +340,16 @@ def test_a_team_has_one_flight_of_each_uas(problem):
         )
 
 
+def test_who_has_nothing_to_gain_flies_no_way_to_what_another_one_takes():
+    starts = [state((60.0, 60.0, -10.0)), state((60.0, 35.0, -10.0))]
+    problem = toy(*starts, horizon=9, waypoints=[((60.0, 72.0, -10.0), 8.0)])
+    pools = [flights(problem, uas, 1.0) for uas in range(2)]
+    assert any((one.visit < NEVER).any() for one in pools[1])
+    first, second = teams(problem, pools, keep=1)[0]
+    assert (first.visit < NEVER).all()
+    assert second.length_m == min(one.length_m for one in pools[1])
+
+
 def test_flights_that_come_too_close_make_no_good_team():
     starts = [state((60.0, 60.0, -10.0)), state((60.0, 72.0, -10.0))]
     problem = toy(*starts, horizon=4, separation_m=6.0)
@@ -233,16 +364,3 @@ def test_flights_that_come_too_close_make_no_good_team():
 
 def _as_flight(x):
     return Flight(x[:, :3], np.zeros(0, np.int64), 0.0, 0.0)
-
-
-def test_a_waypoint_at_the_fringe_saves_more_of_the_way_than_one_in_the_middle():
-    row = np.array([(10.0 * k, 0.0, -5.0) for k in (0, 1, 2, 3, 10)])
-    saved = seconds_saved(row, 10.0)
-    assert saved == pytest.approx([1.0, 0.0, 0.0, 0.0, 7.0])
-
-
-@pytest.mark.parametrize("places", [[], [(1.0, 2.0, -5.0)], [(1.0, 2.0, -5.0), (1.0, 2.0, -15.0)]])
-def test_a_tree_of_few_waypoints_saves_nothing_and_raises_nothing(places):
-    saved = seconds_saved(np.array(places).reshape(-1, 3), 10.0)
-    assert saved.shape == (len(places),)
-    assert saved == pytest.approx(np.zeros(len(places)), abs=2e-3)

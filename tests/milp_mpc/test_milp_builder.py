@@ -1,5 +1,6 @@
 """Families of rows and columns become one program, and the program judges its solutions."""
 
+import highspy
 import numpy as np
 import pytest
 from uas_coverage_baselines.milp_mpc.milp import ABSENT, Milp
@@ -145,3 +146,18 @@ def test_the_text_says_what_the_program_is(tmp_path):
     assert text[-5:] == ["binary", " b(0)", "general", " k(0)", "end"]
     milp.write_lp(tmp_path / "program.lp")
     assert (tmp_path / "program.lp").read_text(encoding="utf-8") == milp.lp_text()
+
+
+@pytest.mark.parametrize("constant", [12.5, -3.0])
+def test_a_program_written_as_text_keeps_its_constant(tmp_path, constant):
+    milp = Milp()
+    x = milp.variables("x", (1,), lower=2.0, upper=4.0)
+    milp.minimize(1.0, x)
+    milp.add_constant(constant)
+    path = tmp_path / "program.lp"
+    milp.write_lp(path)
+    solver = highspy.Highs()
+    solver.setOptionValue("output_flag", False)
+    solver.readModel(str(path))
+    solver.run()
+    assert solver.getInfo().objective_function_value == pytest.approx(2.0 + constant)

@@ -36,7 +36,7 @@ def planned(request):
         world.step({name: Velocity(3.0, 4.0, 7.0) for name in world.names})
     swarm = world.swarm_state()
     around = Surroundings(scenario, Options(horizon=HORIZON))
-    problem = around.problem(swarm, dict.fromkeys(world.names), Weights())
+    problem = around.problem(swarm, dict.fromkeys(world.names), Weights(), 0.15)
     plan = decide(problem, None, scenario.dt_s, LITTLE)
     assert plan is not None
     return world, problem, plan

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from practice_missions import fly, mission, planner
 from toy_problems import flown
-from uas_coverage_baselines.milp_mpc import planner as planner_module
+from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
 from uas_coverage_baselines.milp_mpc.problem import Plan
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
@@ -26,7 +26,7 @@ class RoughDecisions:
     def __init__(self, refused, seed=0):
         self.refused, self.draw, self.calls = refused, np.random.default_rng(seed), 0
 
-    def __call__(self, problem, previous, dt_s, effort):
+    def __call__(self, problem, previous, dt_s, effort, **rest):
         self.calls += 1
         if self.refused(self.calls - 1):
             return None
@@ -137,15 +137,20 @@ def test_a_way_out_that_a_moving_obstacle_has_come_to_cross_is_not_flown(monkeyp
     monkeypatch.setattr(planner_module, "decide", AlwaysNorth())
     for _ in range(3):
         world.step(made.act(world.swarm_state()))
-    monkeypatch.setattr(planner_module, "decide", lambda *args: None)
+    monkeypatch.setattr(planner_module, "decide", lambda *args, **rest: None)
     ahead_m = world.state.x[0, :3] + np.array([25.0, 0.0, 0.0])
     seen = dataclasses.replace(
         world.swarm_state(),
         moving_position_m=ahead_m[None],
         moving_velocity_mps=np.array([[-2.0, 0.0, 0.0]]),
     )
-    (command,) = made.act(seen).values()
-    assert isinstance(command, Velocity), "brake at once, with the inner loop"
+    made.act(seen)
+    assert made.last_decision.fallback
+    path = made.last_decision.predicted_m["uas_1"]
+    balloon_m = ahead_m + np.arange(len(path))[:, None] * np.array([-2.0, 0.0, 0.0])
+    level_m = np.hypot(*(path - balloon_m)[:, :2].T)
+    clear_m = np.maximum(level_m - 5.0, np.abs((path - balloon_m)[:, 2]) - 5.0)
+    assert clear_m.min() > 0.36, "braking or getting out of the way, nothing is touched"
 
 
 class AlwaysNorth(RoughDecisions):
@@ -175,7 +180,9 @@ def test_a_planner_without_time_still_commands_everybody(limit_s):
 
 def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):
     scenario = load_scenario("village")
-    positions, decisions, outcomes = flown_with(monkeypatch, scenario, lambda *args: None, 25)
+    positions, decisions, outcomes = flown_with(
+        monkeypatch, scenario, lambda *args, **rest: None, 25
+    )
     homes = np.array([uas.start_m for uas in scenario.uas])
     assert np.abs(positions - homes).max() < 0.1
     assert all(decision.fallback for decision in decisions)
@@ -183,14 +190,14 @@ def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):
 
 
 def test_a_hover_command_names_the_altitude_and_no_speed(monkeypatch):
-    monkeypatch.setattr(planner_module, "decide", lambda *args: None)
+    monkeypatch.setattr(planner_module, "decide", lambda *args, **rest: None)
     scenario = load_scenario("open_field")
     commands = planner(scenario).act(World(scenario).swarm_state())
     assert set(commands.values()) == {Velocity(0.0, 0.0, 1.0, mode="covering")}
 
 
 def test_a_plan_without_a_way_out_is_not_flown(monkeypatch):
-    monkeypatch.setattr(planner_module, "way_out", lambda *args: None)
+    monkeypatch.setattr(planner_module, "way_out", lambda *args, **rest: None)
     scenario = load_scenario("open_field")
     made = planner(scenario)
     commands = made.act(World(scenario).swarm_state())
@@ -209,8 +216,10 @@ def garden():
 def test_decisions_that_fail_in_between_do_not_end_a_mission(monkeypatch, garden):
     calls = iter(range(1000))
 
-    def decide(*args):
-        return None if PATTERNS["now_and_then"](next(calls)) else decide_in_earnest(*args)
+    def decide(*args, **rest):
+        if PATTERNS["now_and_then"](next(calls)):
+            return None
+        return decide_in_earnest(*args, **rest)
 
     _, decisions, outcomes = flown_with(monkeypatch, garden, decide, 60)
     refused = [PATTERNS["now_and_then"](call) for call in range(len(decisions))]
@@ -241,3 +250,21 @@ def test_a_reset_forgets_the_last_mission(garden):
     made.reset(garden, 0)
     assert made.last_decision is None
     assert made.act(world.swarm_state()) == first
+
+
+def test_a_decision_is_told_what_is_left_of_the_way_out_and_when_its_time_began(
+    monkeypatch, garden
+):
+    told = []
+
+    def decide(problem, *rest, out, began):
+        told.append((problem, out, began))
+        return decide_in_earnest(problem, *rest, out=out, began=began)
+
+    monkeypatch.setattr(planner_module, "decide", decide)
+    world, made = World(garden), planner(garden)
+    fly(world, made, 2)
+    (_, nothing, first), (problem, out, second) = told
+    assert nothing is None
+    assert first < second
+    assert out.x[:, 0] == pytest.approx(problem.x0, abs=1e-6)

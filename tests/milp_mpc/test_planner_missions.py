@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from practice_missions import fly, mission, planner, with_uas
-from uas_coverage_baselines.milp_mpc import planner as planner_module
+from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
@@ -41,8 +41,8 @@ def test_one_decision_for_different_vehicles_is_a_verified_plan(monkeypatch):
     seen = []
     decide = planner_module.decide
 
-    def noting(problem, *rest):
-        plan = decide(problem, *rest)
+    def noting(problem, *rest, **options):
+        plan = decide(problem, *rest, **options)
         seen.append((problem, plan))
         return plan
 

@@ -46,7 +46,7 @@ def without_targets(scenario):
 
 
 def test_clearances_are_the_sums_that_the_paper_writes_and_the_margins(scenario, around):
-    problem = around.problem(seen(scenario), without_targets(scenario), Weights())
+    problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
     options = Options()
     assert problem.obstacle_clearance_m == pytest.approx(
         np.array([[0.36 + 2.0], [0.5 + 2.0]]) + options.margin_m
@@ -59,7 +59,7 @@ def test_clearances_are_the_sums_that_the_paper_writes_and_the_margins(scenario,
 
 
 def test_each_uas_is_planned_with_its_own_vehicle_and_its_own_battery(scenario, around):
-    problem = around.problem(seen(scenario), without_targets(scenario), Weights())
+    problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
     assert [vehicle.airframe.n_motors for vehicle in problem.vehicles] == [4, 6]
     assert not np.array_equal(problem.models[0].B, problem.models[1].B)
     assert problem.horizon == 9
@@ -67,7 +67,7 @@ def test_each_uas_is_planned_with_its_own_vehicle_and_its_own_battery(scenario, 
 
 def test_moving_obstacles_are_predicted_at_the_velocity_that_is_seen(scenario, around):
     swarm = seen(scenario)
-    (balloon,) = around.problem(swarm, without_targets(scenario), Weights()).moving
+    (balloon,) = around.problem(swarm, without_targets(scenario), Weights(), 0.15).moving
     assert balloon.position_m.shape == (10, 3)
     assert balloon.position_m[0] == pytest.approx([60.0, 22.0, -6.5])
     assert np.diff(balloon.position_m, axis=0) == pytest.approx(np.tile([0.0, 2.0, -0.5], (9, 1)))
@@ -75,7 +75,7 @@ def test_moving_obstacles_are_predicted_at_the_velocity_that_is_seen(scenario, a
 
 
 def test_waypoints_that_nobody_reaches_within_the_horizon_are_left_out(scenario, around):
-    problem = around.problem(seen(scenario), without_targets(scenario), Weights())
+    problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
     assert problem.waypoint_index.tolist() == [0, 1]
     assert problem.n_scenario_waypoints == 3
     assert problem.waypoint_reach_m == pytest.approx([4.0, 4.0])
@@ -87,7 +87,7 @@ def test_covered_waypoints_are_left_out_and_targets_follow_the_new_rows(scenario
         "uas_1": Target(np.array(PLACES[1][0]), 0.1, waypoint=1),
         "uas_2": Target(np.array(PLACES[2][0]), 0.2, waypoint=2),
     }
-    problem = around.problem(swarm, targets, Weights())
+    problem = around.problem(swarm, targets, Weights(), 0.15)
     assert problem.waypoint_index.tolist() == [1]
     near, far = problem.targets
     assert near == dataclasses.replace(targets["uas_1"], waypoint=0)
@@ -97,7 +97,7 @@ def test_covered_waypoints_are_left_out_and_targets_follow_the_new_rows(scenario
 
 def test_landed_uas_are_no_part_of_the_problem(scenario, around):
     swarm = seen(scenario, status=np.array([LANDED, 0]))
-    problem = around.problem(swarm, without_targets(scenario), Weights())
+    problem = around.problem(swarm, without_targets(scenario), Weights(), 0.15)
     assert problem.names == ("uas_2",)
     assert problem.x0 == pytest.approx(swarm.x[1:])
     assert problem.separation_m.shape == (1, 1)
@@ -118,4 +118,4 @@ def test_the_battery_gives_less_time_and_the_way_home_takes_more_the_farther_out
     assert left[-1] == pytest.approx(0.0)
     away = [around.seconds_home("uas_1", np.array([50.0 + d, 50.0, -1.0])) for d in (0, 50, 100)]
     assert (np.diff(away) > 0.0).all()
-    assert 0.0 < around.dod_return("uas_1") < 0.75
+    assert 0.0 < around.dod_return("uas_1", 2.5) < 0.75

@@ -6,9 +6,10 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy, written
 from uas_coverage_baselines.milp_mpc.blocks import Capabilities, Dynamics, coverable
-from uas_coverage_baselines.milp_mpc.highs import SolverLimits, SolveStatus, solve
 from uas_coverage_baselines.milp_mpc.ocp import formulate
 from uas_coverage_baselines.milp_mpc.problem import Target
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import closed_cylinder_faces, sphere_faces
 from uas_coverage_env.vehicle import VX, VY, load_vehicle

@@ -3,10 +3,11 @@
 from itertools import product
 
 import numpy as np
-from uas_coverage_baselines.milp_mpc.highs import SolverLimits, solve
 from uas_coverage_baselines.milp_mpc.milp import Milp
 from uas_coverage_baselines.milp_mpc.ocp import shared_variables
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
+from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import ConvexPolytope, inner_factor
 from uas_coverage_env.vehicle import (
@@ -60,6 +61,8 @@ def toy(
     fence=FIELD,
     fence_margin_m=0.5,
     dt_s=1.0,
+    home_m=None,
+    dod_max=0.75,
     **fields,
 ):
     """A decision; `waypoints` are (position, radius) or (position, radius, weight)."""
@@ -88,6 +91,8 @@ def toy(
         waypoint_weight=np.array([row[2] for row in rows], float),
         waypoint_index=np.arange(len(rows)),
         n_scenario_waypoints=len(rows),
+        home_m=np.array(states)[:, :3] if home_m is None else np.array(home_m, float),
+        dod_max=np.full(U, dod_max),
         targets=(None,) * U if targets is None else tuple(targets),
         **fields,
     )

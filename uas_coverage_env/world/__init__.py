@@ -22,7 +22,7 @@ from uas_coverage_env.world.commands import (
 from uas_coverage_env.world.guidance import guide, path_length_home_m, target_position
 from uas_coverage_env.world.outcome import CONTACT_NAMES, OUTCOME_DTYPE
 from uas_coverage_env.world.return_mode import has_to_return, seconds_home
-from uas_coverage_env.world.routes import route
+from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, crossing, route
 from uas_coverage_env.world.simulation import Dynamics, World, initial_state
 from uas_coverage_env.world.state import (
     FLYING,
@@ -36,12 +36,14 @@ from uas_coverage_env.world.step import advance, begin_mission, first_invalid
 
 __all__ = [
     "ACCELERATION",
+    "CLEAR",
     "CLIMB",
     "COMMAND_DTYPE",
     "CONTACT_NAMES",
     "FLYING",
     "GO_TO",
     "HOME",
+    "IN_SIGHT",
     "KIND_NAMES",
     "LANDED",
     "LOST",
@@ -64,6 +66,7 @@ __all__ = [
     "begin_mission",
     "build_arena",
     "command_mode",
+    "crossing",
     "first_invalid",
     "guide",
     "has_to_return",

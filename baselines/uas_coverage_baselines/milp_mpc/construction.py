@@ -14,8 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem
-from uas_coverage_env.geometry import closed_cylinder_faces, signed_distance
+from uas_coverage_baselines.milp_mpc.blocks import time_to_go
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Tour
+from uas_coverage_env.geometry import closed_cylinder_faces, signed_distance, sphere_faces
 from uas_coverage_env.vehicle import (
     VX,
     VY,
@@ -31,9 +32,11 @@ from uas_coverage_env.vehicle import (
 FloatArray = NDArray[np.float64]
 NEVER = 10_000
 _DEPTH = 4
+_TOUR_DEPTH = 6
 _BRANCHES = (10, 5, 4, 3)
 _LEADS_S = (1.0, 2.0)  # how far ahead of itself the UAS aims; which is better depends on the turn
 _ROOF_LOOKAHEAD = 4
+_PER_METRE = 1e-4  # of two flights that gain the same the shorter one; a waypoint's step is worth 1
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,11 @@ class Flight:
     target_cost: float
     too_close_m: float
 
+    @property
+    def length_m(self) -> float:
+        """Length of its path."""
+        return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
+
 
 def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> list[Flight]:
     """The most promising flights of one UAS, best first, no two covering the same waypoints.
@@ -67,6 +75,8 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
     normals, offsets, first, last, clearance = _stacked_hulls(problem, uas)
     target = problem.targets[uas]
     aim = np.full(3, np.nan) if target is None else target.position_m
+    if problem.tours and (tour := problem.tours[uas]) is not None:
+        aim = tour.aims_m[-1]
     best: dict[bytes, tuple[float, Flight]] = {}
     for lead_s in _LEADS_S:
         positions, visits, depth = _fly_all(
@@ -75,6 +85,7 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
             sequences,
             problem.waypoints_m,
             problem.waypoint_reach_m,
+            sphere_faces(problem.waypoint_sides),
             normals,
             offsets,
             first,
@@ -84,6 +95,7 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
             lead_s,
             problem.horizon,
         )
+        visits[:, ~problem.assigned[uas]] = NEVER
         costs = target_cost(problem, uas, positions, visits)
         values = _rewards(problem, visits).sum(axis=1) - costs - depth
         for row in np.argsort(-values, kind="stable")[: 4 * keep]:
@@ -101,10 +113,14 @@ def teams(
     """Good combinations of one flight per UAS, best first.
 
     A waypoint counts once, for who gets there first; flights that come too close to each other
-    are charged. Coordinate ascent from each UAS's leading flights.
+    are charged, and each metre a little: who gains nothing more flies no detour to a waypoint that
+    another one takes. Coordinate ascent from each UAS's leading flights.
     """
     rewards = [np.array([_rewards(problem, f.visit[None])[0] for f in pool]) for pool in pools]
-    costs = [np.array([f.target_cost + f.too_close_m for f in pool]) for pool in pools]
+    costs = [
+        np.array([f.target_cost + f.too_close_m + _PER_METRE * f.length_m for f in pool])
+        for pool in pools
+    ]
     clashes = _clashes(problem, pools)
     found: dict[tuple[int, ...], float] = {}
     for leader in range(len(pools)):
@@ -143,7 +159,10 @@ def _rewards(problem: PlanningProblem, visits: NDArray[np.int64]) -> FloatArray:
 def target_cost(
     problem: PlanningProblem, uas: int, positions: FloatArray, visits: NDArray[np.int64]
 ) -> FloatArray:
-    """(S,) part II of the objective along S flights of one UAS."""
+    """(S,) part II of the objective, or the time to go, along S flights of one UAS."""
+    tour = problem.tours[uas] if problem.tours else None
+    if tour is not None:
+        return time_to_go(problem, uas, tour, positions, visits)
     target = problem.targets[uas]
     if target is None:
         return np.zeros(len(positions))
@@ -174,6 +193,8 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
     """(S, _DEPTH) waypoint sequences, padded with -1: near ones first, then their neighbours."""
     if not problem.n_waypoints:
         return np.full((1, _DEPTH), -1, np.int64)
+    if problem.tours:
+        return _along(problem.tours[uas])
     waypoints = problem.waypoints_m
     ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, 3:6]
     near = np.argsort(_travel_m(waypoints - ahead), kind="stable")[: _BRANCHES[0]]
@@ -191,6 +212,20 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
         ]
     sequences += open_ends
     padded = np.full((len(sequences), _DEPTH), -1, np.int64)
+    for row, sequence in enumerate(sequences):
+        padded[row, : len(sequence)] = sequence
+    return padded
+
+
+def _along(tour: Tour | None) -> NDArray[np.int64]:
+    """(S, _TOUR_DEPTH) a tour, without one of its waypoints, and with two neighbours exchanged."""
+    order = [] if tour is None else tour.waypoints[:_TOUR_DEPTH].tolist()
+    sequences = [order]
+    for k in range(len(order)):
+        sequences.append(order[:k] + order[k + 1 :])
+        if k + 1 < len(order):
+            sequences.append([*order[:k], order[k + 1], order[k], *order[k + 2 :]])
+    padded = np.full((len(sequences), _TOUR_DEPTH), -1, np.int64)
     for row, sequence in enumerate(sequences):
         padded[row, : len(sequence)] = sequence
     return padded
@@ -215,13 +250,28 @@ def _stacked_hulls(problem: PlanningProblem, uas: int):
 
 
 @njit(cache=True, error_model="numpy")
-def _aim_at(box, half_m, x, following):
-    """A point of the box on the way to what follows."""
+def _out_m(faces, x, center):
+    """How far out a position is from the centre of a polyhedron, by its farthest face."""
+    out = 0.0
+    for f in range(len(faces)):
+        along = 0.0
+        for axis in range(3):
+            along += faces[f, axis] * (x[axis] - center[axis])
+        out = max(out, along)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _aim_at(center, reach_m, faces, x, following):
+    """A point well inside the waypoint's polyhedron on the way to what follows."""
     point = np.empty(3)
+    inner_m = 0.8 * reach_m
     for axis in range(3):
         middle = 0.5 * (x[axis] + following[axis])
-        low, high = box[axis] - 0.8 * half_m, box[axis] + 0.8 * half_m
-        point[axis] = min(max(middle, low), high)
+        point[axis] = min(max(middle, center[axis] - inner_m), center[axis] + inner_m)
+    out = _out_m(faces, point, center)
+    if out > inner_m:  # a corner of the box beyond a rounder polyhedron
+        point[:] = center + (point - center) * (inner_m / out)
     return point
 
 
@@ -256,7 +306,8 @@ def _fly_all(
     x0,
     sequences,
     waypoints,
-    half_m,
+    reach_m,
+    faces,
     normals,
     offsets,
     first,
@@ -282,12 +333,8 @@ def _fly_all(
         leg = 0
         for n in range(horizon):
             for w in range(W):
-                if visits[s, w] == NEVER:
-                    inside = True
-                    for axis in range(3):
-                        inside = inside and abs(x[axis] - waypoints[w, axis]) <= half_m[w]
-                    if inside:
-                        visits[s, w] = n
+                if visits[s, w] == NEVER and _out_m(faces, x, waypoints[w]) <= reach_m[w]:
+                    visits[s, w] = n
             while leg < sequences.shape[1] and (
                 sequences[s, leg] >= 0 and visits[s, sequences[s, leg]] < NEVER
             ):
@@ -297,11 +344,14 @@ def _fly_all(
             if w >= 0:
                 nxt = sequences[s, leg + 1] if leg + 1 < sequences.shape[1] else -1
                 following = waypoints[nxt] if nxt >= 0 else waypoints[w]
-                aim = _aim_at(waypoints[w], half_m[w], x, following)
+                aim = _aim_at(waypoints[w], reach_m[w], faces, x, following)
             elif has_target:
                 aim = target.copy()
             else:
-                aim = x[:3] + 60.0 * x[3:6] + 1e-9
+                # straight on and level; a UAS at rest stays where it is
+                aim = x[:3] + 60.0 * x[VX : VZ + 1]
+                aim[2] = x[Z]
+                speed = min(speed, 2.0 * np.hypot(x[VX], x[VY]))
             dx, dy = aim[0] - x[X], aim[1] - x[Y]
             away = np.hypot(dx, dy) + 1e-9
             lead = lead_s if away > 15.0 else 0.0

@@ -3,7 +3,8 @@
 UAS couple only where they may cover the same waypoint or come close. So each UAS's own OCP is
 solved first, restricted to what lies near a flight: what is left of its previous plan, and the
 constructed flights that make the best teams (programs of some hundredths of a second, solved side
-by side). The best team of the plans found is checked as a whole; then the whole OCP starts from
+by side). Who has no plan then gets wider programs, and after these a plan that needs no solver
+(`standby`). The best team of the plans found is checked as a whole; then the whole OCP starts from
 it with the time that is left, for the bound and what it still finds.
 """
 
@@ -18,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.construction import Flight, flights, target_cost, teams
-from uas_coverage_baselines.milp_mpc.highs import SolverLimits, solve
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.program import NEVER, Program
+from uas_coverage_baselines.milp_mpc.program import ALONG, NARROW, NEVER, WIDE, Nearness, Program
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
+from uas_coverage_baselines.milp_mpc.standby import as_flight, standby_plans, visits
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 FloatArray = NDArray[np.float64]
@@ -36,40 +38,77 @@ class Effort:
         deterministic: limits by nodes instead of the clock, so that the same state gives the
             same plan on any machine.
         teams: how many constructed teams are refined.
+        solver: one of `SOLVERS`.
     """
 
     time_limit_s: float = 1.0
     threads: int = 2
     deterministic: bool = False
     teams: int = 6
+    solver: str = "highs"
 
 
-_RESERVE = 0.1  # share of the time limit kept for verification and whatever is late
+_RESERVE = 0.15  # share of the time limit kept for verification and whatever is late
 _RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
+_ALONG_SHARE = 0.8
 _WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
+_TEAMS_VERIFIED = 6
 _RESTRICTED_NODES = 60
 _ALONE_NODES = 30
 
 
 def decide(
-    problem: PlanningProblem, previous: Plan | None, dt_s: float, effort: Effort
+    problem: PlanningProblem,
+    previous: Plan | None,
+    dt_s: float,
+    effort: Effort,
+    *,
+    out: Plan | None = None,
+    began: float | None = None,
 ) -> Plan | None:
-    """The best plan found, verified by our own arithmetic; None without any.
+    """The best plan found, verified by our own arithmetic; None where no program has a solution.
 
     Args:
         problem: the decision to make.
         previous: what is left of the last plan, beginning now.
         dt_s: sampling time.
         effort: how much work it may take.
+        out: what is left of the last way out, beginning now.
+        began: `time.perf_counter()` at which the decision's time began to count; now where None.
     """
-    search = _Search(problem, effort)
-    with ThreadPoolExecutor(effort.threads) as side_by_side:  # the solver frees the interpreter
-        pools = list(side_by_side.map(lambda u: flights(problem, u, dt_s), range(problem.n_uas)))
+    search = _Search(problem, effort, time.perf_counter() if began is None else began)
+    everyone = range(problem.n_uas)
+    with ThreadPoolExecutor(effort.threads) as side_by_side:  # kernels and solver free the GIL
+        constructing = [side_by_side.submit(flights, problem, uas, dt_s) for uas in everyone]
+        search.formulate()
+        pools = [constructed.result() for constructed in constructing]
         tasks = _unique_tasks(problem, previous, teams(problem, pools, effort.teams), dt_s)
-        search.collect(tasks, list(side_by_side.map(lambda task: search.refined(*task), tasks)))
-    search.combine()
+        near = ALONG if problem.tours else NARROW
+        refined = side_by_side.map(lambda task: search.refined(task[0], task[1], near), tasks)
+        search.collect(tasks, list(refined))
+        standby = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
+        tasks = [
+            task
+            for uas in everyone
+            if not search.has_plan(uas)
+            for task in _last_resorts(problem, uas, tasks, standby[uas])
+        ]
+        wider = side_by_side.map(lambda task: search.refined(task[0], task[1], WIDE), tasks)
+        search.collect(tasks, list(wider))
+    search.combine(standby)
     search.improve()
     return search.plan
+
+
+_RESORTS = 2  # flights of a UAS without a plan that are refined again, more widely
+
+
+def _last_resorts(
+    problem: PlanningProblem, uas: int, tasks: Sequence[tuple[int, Flight]], standby: Sequence[Plan]
+) -> list[tuple[int, Flight]]:
+    """What to look around more widely for a UAS without a plan: its best flights, and stopping."""
+    own = [task for task in tasks if task[0] == uas][:_RESORTS]
+    return own + [(uas, as_flight(problem, uas, plan)) for plan in standby[-1:]]
 
 
 def _unique_tasks(
@@ -94,13 +133,24 @@ def _unique_tasks(
 class _Search:
     """The programs of one decision, the best verified plan so far and the time left."""
 
-    def __init__(self, problem: PlanningProblem, effort: Effort) -> None:
-        self.problem, self.effort = problem, effort
-        self._began = time.perf_counter()
-        self._own = [Program(problem.only(uas)) for uas in range(problem.n_uas)]
+    def __init__(self, problem: PlanningProblem, effort: Effort, began: float) -> None:
+        self.problem, self.effort, self._began = problem, effort, began
+        self._solve = solver_named(effort.solver)
+        self._own: list[Program] = []
+        self._formulating_s = 0.0
         self._plans: list[list[Plan]] = [[] for _ in range(problem.n_uas)]
         self._best: Plan | None = None
         self._bound = -np.inf
+
+    def formulate(self) -> None:
+        """Write each UAS's own program."""
+        before = time.perf_counter()
+        self._own = [Program(self.problem.only(uas)) for uas in range(self.problem.n_uas)]
+        self._formulating_s = time.perf_counter() - before
+
+    def has_plan(self, uas: int) -> bool:
+        """Whether a program has given the UAS a plan."""
+        return bool(self._plans[uas])
 
     @property
     def plan(self) -> Plan | None:
@@ -109,16 +159,16 @@ class _Search:
             return None
         return replace(self._best, bound=min(self._bound, self._best.objective))
 
-    def refined(self, uas: int, flight: Flight) -> Plan | None:
+    def refined(self, uas: int, flight: Flight, nearness: Nearness) -> Plan | None:
         """Solve a UAS's own OCP restricted to what its flight covers, and when."""
-        left = self._time_left_s()
-        if not self.effort.deterministic and left < _WORTHWHILE_S:
+        if not self._has_time(_WORTHWHILE_S):
             return None
         program = self._own[uas]
-        path, visits = flight.positions_m[None], flight.visit[None]
-        lower, upper = program.near(path, visits)
+        path, visit = flight.positions_m[None], flight.visit[None]
+        lower, upper = program.near(path, visit, nearness)
+        start = program.start(path, visit)
         limits = SolverLimits(
-            time_s=min(_RESTRICTED_SHARE * self.effort.time_limit_s, left),
+            time_s=min(self._share(nearness) * self.effort.time_limit_s, self._time_left_s()),
             nodes=None,
             relative_gap=0.01,
             absolute_gap=0.05,
@@ -126,9 +176,14 @@ class _Search:
         )
         if self.effort.deterministic:
             limits = replace(limits, time_s=None, nodes=_RESTRICTED_NODES)
-        start = program.start(path, visits)
-        solution = solve(program.built, limits, start=start, lower=lower, upper=upper)
+        solution = self._solve(program.built, limits, start=start, lower=lower, upper=upper)
         return None if solution.values is None else program.plan(solution)
+
+    def _share(self, nearness: Nearness) -> float:
+        """Of the time limit, for one program at most; those along tours are few and worth it."""
+        if nearness is not ALONG:
+            return _RESTRICTED_SHARE
+        return min(_ALONG_SHARE * self.effort.threads / self.problem.n_uas, 1.0)
 
     def collect(self, tasks: Sequence[tuple[int, Flight]], plans: Sequence[Plan | None]) -> None:
         """Keep the plans found for each UAS."""
@@ -136,23 +191,46 @@ class _Search:
             if plan is not None and first_trouble(self._own[uas].problem, plan) is None:
                 self._plans[uas].append(plan)
 
-    def combine(self) -> None:
-        """The best team of the plans found that holds as a whole."""
-        if not all(self._plans):
+    def combine(self, standby: Sequence[Sequence[Plan]]) -> None:
+        """The best team of the plans found that holds as a whole.
+
+        Who has none flies on standby. Where none of the best teams holds, everybody is on standby
+        and takes a plan of its own, one after the other, as far as the whole still holds.
+        """
+        if not any(self._plans):
+            return
+        safe = [
+            [plan for plan in plans if first_trouble(self._own[uas].problem, plan) is None]
+            for uas, plans in enumerate(standby)
+        ]
+        choices = [plans + spare for plans, spare in zip(self._plans, safe, strict=True)]
+        if not all(choices):
             return
         pools = [
-            [_as_flight(self.problem, uas, plan) for plan in plans]
-            for uas, plans in enumerate(self._plans)
+            [as_flight(self.problem, uas, plan) for plan in plans]
+            for uas, plans in enumerate(choices)
         ]
         of_flight = {
             id(flight): plan
-            for pool, plans in zip(pools, self._plans, strict=True)
+            for pool, plans in zip(pools, choices, strict=True)
             for flight, plan in zip(pool, plans, strict=True)
         }
-        for team in teams(self.problem, pools, keep=6):
+        for team in teams(self.problem, pools, keep=_TEAMS_VERIFIED):
             self._offer(_joined(self.problem, [of_flight[id(flight)] for flight in team]))
             if self._best is not None:
                 return
+        if all(safe):
+            self._one_after_the_other([plans[0] for plans in safe])
+
+    def _one_after_the_other(self, team: list[Plan]) -> None:
+        """From a team on standby towards one with plans, while it holds as a whole."""
+        for uas, plans in enumerate(self._plans):
+            for plan in sorted(plans, key=lambda one: one.objective):
+                trial = [*team[:uas], plan, *team[uas + 1 :]]
+                if first_trouble(self.problem, _joined(self.problem, trial)) is None:
+                    team = trial
+                    break
+        self._offer(_joined(self.problem, team))
 
     def improve(self) -> None:
         """The whole OCP from the best plan so far, with the time that is left.
@@ -161,18 +239,19 @@ class _Search:
         that a deterministic decision goes without it, and without a bound.
         """
         deterministic, alone = self.effort.deterministic, self.problem.n_uas == 1
-        if (deterministic and not alone) or (
-            not deterministic and self._time_left_s() < _WORTHWHILE_S
-        ):
+        if deterministic and not alone:
+            return
+        # the whole program takes about as long to write as everybody's own together
+        if not self._has_time(_WORTHWHILE_S + (0.0 if alone else 1.5 * self._formulating_s)):
             return
         program = self._own[0] if alone else Program(self.problem)
         start = None
         if self._best is not None:
-            start = program.start(self._best.x[:, :, 0:3], _visits(self.problem, self._best))
+            start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
         limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
         if deterministic:
             limits = SolverLimits(nodes=_ALONE_NODES, relative_gap=0.01, heuristics=False)
-        solution = solve(program.built, limits, start=start)
+        solution = self._solve(program.built, limits, start=start)
         self._bound = solution.bound
         if solution.values is not None:
             self._offer(program.plan(solution))
@@ -183,6 +262,10 @@ class _Search:
             return
         if first_trouble(self.problem, plan) is None:
             self._best = plan
+
+    def _has_time(self, seconds: float) -> bool:
+        """Whether so much is left, where the clock counts."""
+        return self.effort.deterministic or self._time_left_s() >= seconds
 
     def _time_left_s(self) -> float:
         limit = (1.0 - _RESERVE) * self.effort.time_limit_s
@@ -208,19 +291,6 @@ def left_over_flights(problem: PlanningProblem, left: Plan, dt_s: float) -> list
         cost = float(target_cost(problem, row, path[None], visit[None])[0])
         result.append(Flight(path, visit, cost, 0.0))
     return result
-
-
-def _as_flight(problem: PlanningProblem, uas: int, plan: Plan) -> Flight:
-    """A UAS's own plan as a flight: what it covers when, and what it costs besides."""
-    visit = _visits(problem, plan)[0]
-    gained = problem.waypoint_weight * np.maximum(problem.horizon - visit, 0)
-    return Flight(plan.x[0, :, 0:3], visit, plan.objective + float(gained.sum()), 0.0)
-
-
-def _visits(problem: PlanningProblem, plan: Plan) -> NDArray[np.int64]:
-    """(U, W) step at which the plan covers each of the problem's waypoints, `NEVER` if not."""
-    covers = plan.covers[:, :, problem.waypoint_index]
-    return np.where(covers.any(axis=1), covers.argmax(axis=1), NEVER)
 
 
 def _joined(problem: PlanningProblem, plans: Sequence[Plan]) -> Plan:

@@ -3,7 +3,8 @@
 Four verbs: `variables`, `subject_to`, `minimize`, `build`. Columns are handed around as integer
 index arrays with the shape of the mathematics; a family of rows is one NumPy expression. The index
 `ABSENT` stands for a variable that is known to be zero: its terms vanish, so that pruned variables
-need no special case in the formulas.
+need no special case in the formulas. The index `ELIMINATED` stands for one that a reduced
+formulation expresses through others: it is not zero, and using it is an error.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 ABSENT = -1
+ELIMINATED = -2
 INFINITY = float("inf")
 Columns = NDArray[np.int64]
 Term = tuple[ArrayLike, Columns]
@@ -84,6 +86,7 @@ class Milp:
         self._upper: list[NDArray[np.float64]] = []
         self._integer: list[NDArray[np.bool_]] = []
         self._implied: list[Columns] = []
+        self._whole: list[Columns] = []
         self._n_columns = 0
         self._row_names: list[tuple[str, NDArray[np.int64]]] = []
         self._entries: list[tuple[NDArray[np.int64], Columns, NDArray[np.float64]]] = []
@@ -138,7 +141,11 @@ class Milp:
 
     def drop_integrality(self, columns: Columns) -> None:
         """Let columns take any value within their bounds: rows added now make them whole."""
-        self._implied.append(columns[columns != ABSENT])
+        self._implied.append(columns[columns >= 0])
+
+    def require_integrality(self, columns: Columns) -> None:
+        """Let columns take whole numbers only, though they were added as continuous."""
+        self._whole.append(columns[columns >= 0])
 
     def columns(self, name: str) -> Columns:
         """Index array of a group added before; blocks find each other's columns by name."""
@@ -154,6 +161,8 @@ class Milp:
     ) -> None:
         """Add the rows  lower <= sum of the terms <= upper.
 
+        A row all of whose terms vanish and that holds so (0 = 0) is not made.
+
         Args:
             name: dotted name of the family, for messages and LP files.
             terms: pairs (coefficients, columns), broadcast together; the last axis is summed, the
@@ -161,6 +170,9 @@ class Milp:
             lower: bound, broadcast to the shape of the family.
             upper: bound, broadcast to the shape of the family.
             where: mask in the shape of the family; rows are made only where it is True.
+
+        Raises:
+            ValueError: if a term uses an eliminated column.
         """
         shapes = [np.broadcast_shapes(np.shape(c), np.shape(k)) for c, k in terms]
         masks = () if where is None else (np.shape(where),)
@@ -169,25 +181,39 @@ class Milp:
         count = int(made.sum())
         if count == 0:
             return
-        rows = np.arange(self._n_rows, self._n_rows + count)
+        low = np.broadcast_to(np.asarray(lower, float), shape)[made]
+        high = np.broadcast_to(np.asarray(upper, float), shape)[made]
+        entries, wanted = [], (low > 0.0) | (high < 0.0)
         for (coefficients, columns), full in zip(terms, shapes, strict=True):
             wide = (*shape, full[-1])
             picked = np.broadcast_to(columns, wide)[made]
             values = np.broadcast_to(np.asarray(coefficients, float), wide)[made]
             keep = (picked != ABSENT) & (values != 0.0)
+            if (picked[keep] < 0).any():
+                raise ValueError(f"rows '{name}' use a column that the formulation has eliminated")
+            entries.append((picked, values, keep))
+            wanted |= keep.any(axis=1)
+        rows = self._n_rows + np.cumsum(wanted) - 1
+        for picked, values, keep in entries:
             repeated = np.broadcast_to(rows[:, None], picked.shape)
             self._entries.append((repeated[keep], picked[keep], values[keep]))
-        self._row_lower.append(np.broadcast_to(np.asarray(lower, float), shape)[made])
-        self._row_upper.append(np.broadcast_to(np.asarray(upper, float), shape)[made])
-        self._row_names.append((name, np.argwhere(made)))
-        self._n_rows += count
+        self._row_lower.append(low[wanted])
+        self._row_upper.append(high[wanted])
+        self._row_names.append((name, np.argwhere(made)[wanted]))
+        self._n_rows += int(wanted.sum())
 
     def minimize(self, coefficients: ArrayLike, columns: Columns) -> None:
-        """Add coefficients · columns (broadcast together) to the objective."""
+        """Add coefficients · columns (broadcast together) to the objective.
+
+        Raises:
+            ValueError: if an eliminated column is used.
+        """
         shape = np.broadcast_shapes(np.shape(coefficients), columns.shape)
         picked = np.broadcast_to(columns, shape).ravel()
         values = np.broadcast_to(np.asarray(coefficients, float), shape).ravel()
         keep = picked != ABSENT
+        if (picked[keep] < 0).any():
+            raise ValueError("the objective uses a column that the formulation has eliminated")
         self._cost.append((picked[keep], values[keep]))
 
     def add_constant(self, value: float) -> None:
@@ -204,6 +230,8 @@ class Milp:
             for k in range(3)
         )
         integer = _joined(self._integer).astype(bool)
+        for columns in self._whole:
+            integer[columns] = True
         for columns in self._implied:
             integer[columns] = False
         shape = (self._n_rows, self._n_columns)
@@ -226,7 +254,7 @@ class Milp:
         """Readable name of each column: its group and its index in the group."""
         names = [""] * self._n_columns
         for group, columns in self._columns.items():
-            for index in np.argwhere(columns != ABSENT):
+            for index in np.argwhere(columns >= 0):
                 names[columns[tuple(index)]] = f"{group}({','.join(map(str, index))})"
         return names
 
@@ -242,6 +270,8 @@ class Milp:
         """The program in LP format, one row per line, for people and for golden files."""
         built, names = self.build(), self.column_names()
         lines = ["minimize", f" cost: {_expression(built.cost, range(len(names)), names)}"]
+        if built.constant:
+            lines.append(f"  {'+' if built.constant > 0 else '-'} {_number(abs(built.constant))}")
         lines.append("subject to")
         for row, name in enumerate(self.row_names()):
             span = slice(built.row_start[row], built.row_start[row + 1])

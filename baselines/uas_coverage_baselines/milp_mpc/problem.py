@@ -26,7 +26,8 @@ class Weights:
     """Cost coefficients of the objective (OF); each term is normalised by its largest value.
 
     The paper names what is penalised but publishes no figures; these are ours, in units of one
-    waypoint of weight 1 left uncovered for one step.
+    waypoint of weight 1 left uncovered for one step. `climb`, on |v_z|, is not among the paper's:
+    without it heights are indifferent, and a plan may descend for nothing.
     """
 
     lift: float = 0.05
@@ -34,6 +35,7 @@ class Weights:
     rate: float = 0.03
     yaw: float = 0.05
     energy: float = 0.05
+    climb: float = 0.0
     transit: float = 0.6
     homing: float = 2.5
 
@@ -52,6 +54,25 @@ class Target:
     position_m: FloatArray
     weight: float
     waypoint: int | None = None
+
+
+@dataclass(frozen=True)
+class Tour:
+    """What a UAS is to visit next, in this order, before it goes on (`milp-mpc-guided`).
+
+    Attributes:
+        waypoints: (K,) positions in `PlanningProblem.waypoints_m`.
+        aims_m: (K+1, 3) these waypoints, and what follows them: a waypoint farther on, or home.
+        radius_m: (K+1,) how near to an aim counts as there.
+        lead_s: the next aim is measured from where the UAS would be after so long.
+        onward_s: (K,) flight time from each waypoint to the next aim.
+    """
+
+    waypoints: NDArray[np.int64]
+    aims_m: FloatArray
+    radius_m: FloatArray
+    lead_s: float
+    onward_s: FloatArray
 
 
 @dataclass(frozen=True)
@@ -93,7 +114,12 @@ class PlanningProblem:
         waypoint_weight: (W,) W_Phi.
         waypoint_index: (W,) index of each in the scenario.
         n_scenario_waypoints: K, how many waypoints the scenario has.
+        home_m: (U, 3) where each UAS lands.
+        dod_max: (U,) depth of discharge with which it lands at the latest.
         targets: (U) see `Target`.
+        tours: (U) each UAS's own order, where it has one: it plans these waypoints only; empty
+            where nobody has one.
+        dt_s: sampling time.
         weights: see `Weights`.
         physical_sides: H_P.
         obstacle_sides: H_O.
@@ -119,7 +145,11 @@ class PlanningProblem:
     waypoint_weight: FloatArray
     waypoint_index: NDArray[np.int64]
     n_scenario_waypoints: int
+    home_m: FloatArray
+    dod_max: FloatArray
     targets: tuple[Target | None, ...]
+    tours: tuple[Tour | None, ...] = ()
+    dt_s: float = 1.0
     weights: Weights = field(default_factory=Weights)
     physical_sides: int = 8
     obstacle_sides: int = 8
@@ -135,6 +165,16 @@ class PlanningProblem:
     def n_waypoints(self) -> int:
         """W."""
         return len(self.waypoints_m)
+
+    @property
+    def assigned(self) -> NDArray[np.bool_]:
+        """(U, W) which waypoints each UAS may plan to cover: those of its order, or all."""
+        result = np.ones((self.n_uas, self.n_waypoints), bool)
+        for uas, tour in enumerate(self.tours):
+            result[uas] = False
+            if tour is not None:
+                result[uas, tour.waypoints] = True
+        return result
 
     @cached_property
     def reach(self) -> Reach:
@@ -157,7 +197,10 @@ class PlanningProblem:
             obstacle_clearance_m=self.obstacle_clearance_m[row],
             moving_clearance_m=self.moving_clearance_m[row],
             separation_m=self.separation_m[np.ix_(row, row)],
+            home_m=self.home_m[row],
+            dod_max=self.dod_max[row],
             targets=(self.targets[uas],),
+            tours=self.tours[uas : uas + 1],
         )
 
     def torque_max_Nm(self, axis: int) -> FloatArray:

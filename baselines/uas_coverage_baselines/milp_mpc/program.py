@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
@@ -9,40 +10,67 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks.separation import (
     Separation,
-    binary_columns,
     from_each_other,
     from_moving_obstacles,
     from_obstacles,
 )
 from uas_coverage_baselines.milp_mpc.construction import NEVER
-from uas_coverage_baselines.milp_mpc.highs import Solution
 from uas_coverage_baselines.milp_mpc.milp import ABSENT, Columns
-from uas_coverage_baselines.milp_mpc.ocp import formulate
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
+from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS, Formulation
+from uas_coverage_baselines.milp_mpc.reductions.elimination import flown_states
+from uas_coverage_baselines.milp_mpc.solvers import Solution
 
 FloatArray = NDArray[np.float64]
+_QUICKEST = "state"  # to write and to solve, where little is free
+_TIGHTEST = "clique"  # where times of visits are free
 
-EARLIER_STEPS = 3
-"""A restricted program may cover a waypoint by so many steps earlier than the flight it is near."""
-LATER_STEPS = 1
-"""Likewise later."""
-FACE_SLACK_M = 1.0
-"""Faces that a flight misses by no more than this stay free."""
+
+@dataclass(frozen=True)
+class Nearness:
+    """How near to a flight a restricted program stays.
+
+    Attributes:
+        earlier_steps: it may cover a waypoint by so many steps earlier than the flight.
+        later_steps: likewise later.
+        face_slack_m: faces that the flight misses by no more than this stay free.
+        other_faces: whether they do also where the flight passes a face with room to spare.
+    """
+
+    earlier_steps: int
+    later_steps: int
+    face_slack_m: float
+    other_faces: bool = False
+
+
+NARROW = Nearness(earlier_steps=3, later_steps=1, face_slack_m=1.0)
+"""Some hundredths of a second, as long as the flight is a good one."""
+ALONG = Nearness(earlier_steps=100, later_steps=100, face_slack_m=1.0)
+"""With an order given, when to visit is free: little is left to choose but the times."""
+WIDE = Nearness(earlier_steps=100, later_steps=100, face_slack_m=30.0, other_faces=True)
+"""Finds the way around what the flight runs into."""
 
 
 class Program:
-    """The OCP of one problem, formulated and built."""
+    """The OCP of one problem, formulated and built.
 
-    def __init__(self, problem: PlanningProblem) -> None:
+    Args:
+        problem: the decision.
+        formulation: how it is written, see `reductions`; all give the same optimum. Where None,
+            what is quickest.
+    """
+
+    def __init__(self, problem: PlanningProblem, formulation: Formulation | None = None) -> None:
         self.problem = problem
-        self.milp, self.variables = formulate(problem)
-        self.built = self.milp.build()
+        formulation = formulation or FORMULATIONS[_TIGHTEST if problem.tours else _QUICKEST]
+        self.milp, self.variables = formulation.write(problem)
+        self.built = formulation.finish(self.milp.build())
         self._separations = list(
             chain(from_obstacles(problem), from_moving_obstacles(problem), from_each_other(problem))
         )
 
     def near(
-        self, positions_m: FloatArray, visits: NDArray[np.int64]
+        self, positions_m: FloatArray, visits: NDArray[np.int64], nearness: Nearness = NARROW
     ) -> tuple[FloatArray, FloatArray]:
         """Column bounds that leave free only what lies near flights.
 
@@ -52,28 +80,26 @@ class Program:
         Args:
             positions_m: (U, N+1, 3) the flights.
             visits: (U, W) first step at which each covers a waypoint, `NEVER` if not.
+            nearness: what counts as near.
         """
         lower, upper = self.built.lower.copy(), self.built.upper.copy()
         steps = np.arange(self.problem.horizon)[None, :, None]
-        allowed = (visits < NEVER)[:, None, :] & (steps >= visits[:, None, :] - EARLIER_STEPS)
-        allowed &= steps <= visits[:, None, :] + LATER_STEPS
+        allowed = (visits < NEVER)[:, None, :]
+        allowed = allowed & (steps >= visits[:, None, :] - nearness.earlier_steps)
+        allowed &= steps <= visits[:, None, :] + nearness.later_steps
         upper[_made(self.variables.covers[~allowed])] = 0.0
         for separation in self._separations:
-            columns = binary_columns(self.milp, separation)
-            if columns is None:
+            if not separation.undecided.any():
                 continue
-            relaxed, crossed = columns
+            crossed = self.milp.columns(f"{separation.name}.crossed")
             spare = _spare_over_intervals(separation, positions_m)
             best = spare.max(axis=2, keepdims=True)
-            faces = np.where(
-                best >= FACE_SLACK_M, spare == best, spare >= best - FACE_SLACK_M
-            ) & (spare > -np.inf)  # fmt: skip
+            faces = spare >= best - nearness.face_slack_m
+            if not nearness.other_faces:
+                faces = np.where(best >= nearness.face_slack_m, spare == best, faces)
+            faces &= spare > -np.inf
             free = faces | ~faces.any(axis=2, keepdims=True)
             lower[_made(crossed[~free])] = 1.0
-            used = np.zeros(relaxed.shape, bool)
-            used[:, :-1] |= free
-            used[:, 1:] |= free
-            lower[_made(relaxed[~used])] = 1.0
         return lower, upper
 
     def start(
@@ -89,10 +115,9 @@ class Program:
         covers = steps == visits[:, None, :]
         columns, values = [self.variables.covers.ravel()], [covers.astype(float).ravel()]
         for separation in self._separations:
-            binaries = binary_columns(self.milp, separation)
-            if binaries is None:
+            if not separation.undecided.any():
                 continue
-            crossed = binaries[1]
+            crossed = self.milp.columns(f"{separation.name}.crossed")
             spare = _spare_over_intervals(separation, positions_m)
             best = spare.argmax(axis=2)[..., None]
             chosen = np.arange(spare.shape[2]) != best
@@ -114,7 +139,9 @@ class Program:
         covers = np.zeros((problem.n_uas, problem.horizon, problem.n_scenario_waypoints), bool)
         chosen = np.where(v.covers != ABSENT, values[v.covers], 0.0) > 0.5
         covers[:, :, problem.waypoint_index] = chosen
-        return Plan(problem.names, values[v.x], values[v.u], covers, solution.objective, -np.inf)
+        u = np.where(v.u != ABSENT, values[v.u], 0.0)
+        x = flown_states(problem, u)  # those without columns too, and free of rounding
+        return Plan(problem.names, x, u, covers, solution.objective, -np.inf)
 
 
 def _made(columns: Columns) -> Columns:

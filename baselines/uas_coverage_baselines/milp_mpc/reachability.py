@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ from uas_coverage_env.vehicle import (
 )
 
 FloatArray = NDArray[np.float64]
+_AXES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 _SLACK_M = 1e-3  # rounding and solver tolerance, so that the sets stay supersets
 
 
@@ -82,6 +84,26 @@ class Reach:
             self._known[key] = self._support(directions)
         return self._known[key]
 
+    def displacement(self, directions: FloatArray) -> FloatArray:
+        """Largest value of direction · (position(m + n) - position(m)), whatever sample m is.
+
+        Args:
+            directions: (F, 3), any length.
+
+        Returns:
+            (U, N+1, F) [m] over n = 0..N.
+        """
+        length = np.hypot(directions[:, 0], directions[:, 1])
+        unit = directions[:, :2] / np.maximum(length, 1e-12)[:, None]
+        result = np.empty((len(self.x0), self.vertical.shape[2], len(directions)))
+        for uas, (x, chain) in enumerate(zip(self.x0, self.chains, strict=True)):
+            down, up = chain.vertical_stride_m(x)
+            rise = down * np.maximum(directions[:, 2], 0.0)
+            rise += up * np.maximum(-directions[:, 2], 0.0)
+            steps = np.arange(chain.horizon + 1)[:, None]
+            result[uas] = chain.displacement(x, unit) * length + steps * rise
+        return result
+
     def _support(self, directions: FloatArray) -> FloatArray:
         inside = np.max(self.fence.vertices_m @ directions.T, axis=0) + _SLACK_M
         length = np.hypot(directions[:, 0], directions[:, 1])
@@ -101,13 +123,18 @@ class Reach:
 
     def _box(self, uas: int, directions: FloatArray) -> FloatArray:
         """The same through the reach along the four axes: tighter inside the fence's corners."""
-        axes = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-        largest = self.chains[uas].support(self.x0[uas], axes)
-        axes3 = np.hstack([axes, np.zeros((4, 1))])
-        largest[1:] = np.minimum(
-            largest[1:], np.max(self.fence.vertices_m @ axes3.T, axis=0) + _SLACK_M
+        return self._along_axes[uas] @ np.maximum(_AXES @ directions[:, :2].T, 0.0)
+
+    @cached_property
+    def _along_axes(self) -> FloatArray:
+        """(U, N+1, 4) largest position north, south, east, west."""
+        axes3 = np.hstack([_AXES, np.zeros((4, 1))])
+        inside = np.max(self.fence.vertices_m @ axes3.T, axis=0) + _SLACK_M
+        result = np.array(
+            [chain.support(x, _AXES) for x, chain in zip(self.x0, self.chains, strict=True)]
         )
-        return largest @ np.maximum(axes @ directions[:, :2].T, 0.0)
+        result[:, 1:] = np.minimum(result[:, 1:], inside)
+        return result
 
 
 @dataclass(frozen=True)
@@ -121,6 +148,8 @@ class _Chain:
     tilt_vertices: FloatArray
     rate_vertices: FloatArray
     alpha_max: FloatArray  # (2,) box of the angular accelerations that move north and east
+    dt_s: float
+    climb_limits_mps: tuple[float, float]  # down, up
 
     @classmethod
     def of(cls, vehicle: VehicleParams, model: LinearModel, horizon: int) -> _Chain:
@@ -140,7 +169,35 @@ class _Chain:
             limits.tilt_max_rad * polygon,
             limits.rate_max_radps * polygon,
             alpha,
+            float(model.A[Z, VZ]),
+            (limits.v_down_max_mps, limits.v_up_max_mps),
         )
+
+    def displacement(self, x: FloatArray, unit: FloatArray) -> FloatArray:
+        """(N+1, F) largest unit · (north, east) of what n steps can move, from any sample."""
+        c1, c2, c3, epsilon = self._telescoped()
+        fastest = np.maximum(np.max(unit @ self.speed_vertices.T, axis=1), unit @ x[3:5])
+        tilted = unit @ np.array([-x[7], x[6]])
+        ahead = np.maximum(np.max(unit @ self.tilt_vertices.T, axis=1), tilted)
+        behind = np.maximum(np.max(-unit @ self.tilt_vertices.T, axis=1), -tilted)
+        alpha = np.abs(unit) @ self.alpha_max
+        steps = np.arange(self.horizon + 1)[:, None]
+        swing = np.where(steps > 0, abs(c3) * (ahead + behind), 0.0)
+        return steps * ((c1 + c2) * fastest + abs(epsilon) * alpha) + swing + _SLACK_M
+
+    def vertical_stride_m(self, x: FloatArray) -> tuple[float, float]:
+        """Largest downward and upward way within one step, from any sample."""
+        down = self.dt_s * max(self.climb_limits_mps[0], float(x[VZ]))
+        up = self.dt_s * max(self.climb_limits_mps[1], -float(x[VZ]))
+        return down, up
+
+    def _telescoped(self) -> tuple[float, float, float, float]:
+        """c1, c2, c3 and epsilon of the one-step map as rewritten above."""
+        (_, p_v, p_t, p_w), (_, v_v, v_t, v_w) = self.a[0], self.a[1]
+        b_p, b_v, b_t, _ = self.b
+        c2 = p_t / v_t
+        c3 = (c2 * v_w - p_w) / self.a[2, 3]
+        return p_v - c2 * v_v, c2, c3, b_p - c2 * b_v + c3 * b_t
 
     def support(self, x: FloatArray, unit: FloatArray) -> FloatArray:
         """(N+1, F) largest unit · (north, east) of the position."""
@@ -150,12 +207,9 @@ class _Chain:
         steepest = np.max(unit @ self.tilt_vertices.T, axis=1)
         quickest = np.max(unit @ self.rate_vertices.T, axis=1)
         alpha = np.abs(unit) @ self.alpha_max
-        (_, p_v, p_t, p_w), (_, v_v, v_t, v_w) = self.a[0], self.a[1]
-        (b_p, b_v, b_t, b_w) = self.b
-        c2 = p_t / v_t
-        c1 = p_v - c2 * v_v
-        c3 = (c2 * v_w - p_w) / self.a[2, 3]
-        epsilon = b_p - c2 * b_v + c3 * b_t
+        _, v_v, v_t, v_w = self.a[1]
+        _, b_v, b_t, b_w = self.b
+        c1, c2, c3, epsilon = self._telescoped()
         speeds = [velocity]
         v, t, w = velocity, tilt, rate
         for _ in range(self.horizon):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks import coverable
+from uas_coverage_baselines.milp_mpc.energy import dod_per_s, seconds_home
 from uas_coverage_baselines.milp_mpc.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem, Target, Weights
 from uas_coverage_env.geometry import inner_factor
@@ -18,7 +19,6 @@ from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model, return_th
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
-_LANDING_S = 12.0  # settling above the landing site, generously
 
 
 class Formulation(Protocol):
@@ -42,16 +42,6 @@ class Formulation(Protocol):
     @property
     def margin_m(self) -> float:
         """Added to every clearance."""
-        ...
-
-    @property
-    def priority_per_s(self) -> float:
-        """Added to W_Phi per second that covering a waypoint saves, see `priority`."""
-        ...
-
-    @property
-    def return_detour(self) -> float:
-        """D_r,max as a multiple of the distance to the fence's far corner."""
         ...
 
     @property
@@ -82,29 +72,29 @@ class Surroundings:
         """Parameters of a UAS's vehicle."""
         return self._vehicles[name]
 
-    def dod_return(self, name: str) -> float:
+    def dod_return(self, name: str, detour: float) -> float:
         """DoD_r (Sec. III-C.6, return mode).
 
-        D_r,max, the overestimated way home, is a multiple of the way to the fence's far corner.
+        D_r,max, the overestimated way home, is `detour` times the way to the fence's far corner.
         """
         vehicle, uas = self._vehicles[name], self._uas[name]
         corners = self.scenario.fence.vertices_m - self.home_m[name]
         farthest_m = float(np.linalg.norm(corners, axis=1).max())
-        way_s = self._options.return_detour * farthest_m / vehicle.limits.v_cruise_mps
+        way_s = detour * farthest_m / vehicle.limits.v_cruise_mps
         return return_threshold(vehicle, uas.dod_max, way_s)
 
     def seconds_left(self, name: str, dod: float) -> float:
         """Flight time until DoD_max, at the pace of cruising."""
-        vehicle = self._vehicles[name]
-        energy_J = 3600.0 * vehicle.battery.capacity_Ah * vehicle.battery.voltage_nominal_V
-        return (self._uas[name].dod_max - dod) * energy_J / (1.1 * vehicle.power.hover_W)
+        return (self._uas[name].dod_max - dod) / dod_per_s(self._vehicles[name])
 
     def seconds_home(self, name: str, position_m: FloatArray) -> float:
-        """Flight time home at cruise speed, with a detour and the landing."""
-        limits = self._vehicles[name].limits
-        away = self.home_m[name] - position_m
-        level = 1.2 * float(np.hypot(away[0], away[1])) / limits.v_cruise_mps
-        return level + abs(float(away[2])) / limits.v_down_max_mps + _LANDING_S
+        """Flight time home, with a detour and the landing, see `energy`."""
+        return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
+
+    @property
+    def horizon_s(self) -> float:
+        """How long a plan lasts."""
+        return self._options.horizon * self.dt_s
 
     def horizon_m(self, name: str) -> float:
         """How far a UAS cruises within the horizon."""
@@ -124,9 +114,46 @@ class Surroundings:
         return blocked
 
     def problem(
-        self, swarm: SwarmState, targets: Mapping[str, Target | None], weights: Weights
+        self,
+        swarm: SwarmState,
+        targets: Mapping[str, Target | None],
+        weights: Weights,
+        priority_per_s: float,
     ) -> PlanningProblem:
-        """The decision to make now; waypoints that nobody can reach in time are left out."""
+        """The paper's decision: open waypoints, but those that nobody can reach in time.
+
+        Args:
+            swarm: what is seen.
+            targets: of each active UAS; waypoints are the scenario's rows.
+            weights: cost coefficients.
+            priority_per_s: added to W_Phi per second saved, see `priority`.
+        """
+        open_now = np.flatnonzero(swarm.uncovered)
+        problem = self.seen(swarm, weights, open_now, self._waypoint_weight[open_now])
+        near = np.flatnonzero(coverable(problem).any(axis=(0, 1)))
+        index = open_now[near]
+        weight = self._waypoint_weight[index]
+        if priority_per_s > 0.0:
+            speed = min(vehicle.limits.v_xy_max_mps for vehicle in problem.vehicles)
+            saved = seconds_saved(self.waypoints_m[open_now], speed, near)
+            weight = weight + priority_per_s * saved
+        return replace(
+            problem,
+            waypoints_m=self.waypoints_m[index],
+            waypoint_reach_m=self._waypoint_reach_m[index],
+            waypoint_weight=weight,
+            waypoint_index=index,
+            targets=tuple(_in_rows(targets[name], index) for name in problem.names),
+        )
+
+    def seen(
+        self,
+        swarm: SwarmState,
+        weights: Weights,
+        waypoints: NDArray[np.int64],
+        waypoint_weight: FloatArray,
+    ) -> PlanningProblem:
+        """What is seen now, about the given waypoints, which are the scenario's rows."""
         options, names = self._options, swarm.active
         rows = [swarm.names.index(name) for name in names]
         x0 = swarm.x[rows]
@@ -134,14 +161,8 @@ class Surroundings:
         radius = np.array([u.radius_m for u in uas])
         fixed = np.array([o.safe_distance_m for o in self.scenario.obstacles])
         moving = np.array([o.safe_distance_m for o in self.scenario.moving_obstacles])
-        open_now = np.flatnonzero(swarm.uncovered)
-        weight = self._waypoint_weight.copy()
-        if options.priority_per_s > 0.0 and len(open_now):
-            speed = min(self._vehicles[name].limits.v_xy_max_mps for name in names)
-            saved = seconds_saved(self.waypoints_m[open_now], speed)
-            weight[open_now] += options.priority_per_s * saved
         vehicles = tuple(self._vehicles[name] for name in names)
-        problem = PlanningProblem(
+        return PlanningProblem(
             names=names,
             vehicles=vehicles,
             models=tuple(
@@ -159,25 +180,18 @@ class Surroundings:
             separation_m=(
                 radius[:, None] + radius + self.scenario.uas_safe_distance_m + options.margin_m
             ),
-            waypoints_m=self.waypoints_m[open_now],
-            waypoint_reach_m=self._waypoint_reach_m[open_now],
-            waypoint_weight=weight[open_now],
-            waypoint_index=open_now,
+            waypoints_m=self.waypoints_m[waypoints],
+            waypoint_reach_m=self._waypoint_reach_m[waypoints],
+            waypoint_weight=waypoint_weight,
+            waypoint_index=waypoints,
             n_scenario_waypoints=len(self.waypoints_m),
-            targets=(),
+            home_m=np.array([self.home_m[name] for name in names]),
+            dod_max=np.array([u.dod_max for u in uas]),
+            targets=(None,) * len(names),
+            dt_s=self.dt_s,
             weights=weights,
             obstacle_sides=options.obstacle_sides,
             waypoint_sides=options.waypoint_sides,
-        )
-        near = coverable(problem).any(axis=(0, 1))
-        index = open_now[near]
-        return replace(
-            problem,
-            waypoints_m=self.waypoints_m[index],
-            waypoint_reach_m=self._waypoint_reach_m[index],
-            waypoint_weight=weight[index],
-            waypoint_index=index,
-            targets=tuple(_in_rows(targets[name], index) for name in names),
         )
 
     def _predicted(self, swarm: SwarmState) -> tuple[MovingHull, ...]:

@@ -1,5 +1,6 @@
 """The constraint families of the OCP, one file each, named after the paper's (Sec. III-C)."""
 
+from uas_coverage_baselines.milp_mpc.blocks.battery_reserve import BatteryReserve
 from uas_coverage_baselines.milp_mpc.blocks.capabilities import Capabilities
 from uas_coverage_baselines.milp_mpc.blocks.collision import Collision
 from uas_coverage_baselines.milp_mpc.blocks.corner_cutting import CornerCutting
@@ -10,8 +11,10 @@ from uas_coverage_baselines.milp_mpc.blocks.moving_obstacles import MovingObstac
 from uas_coverage_baselines.milp_mpc.blocks.obstacles import Obstacles
 from uas_coverage_baselines.milp_mpc.blocks.slack import Slack
 from uas_coverage_baselines.milp_mpc.blocks.target_distance import TargetDistance
+from uas_coverage_baselines.milp_mpc.blocks.time_to_go import TimeToGo, time_to_go
 
 __all__ = [
+    "BatteryReserve",
     "Capabilities",
     "Collision",
     "CornerCutting",
@@ -22,5 +25,7 @@ __all__ = [
     "Obstacles",
     "Slack",
     "TargetDistance",
+    "TimeToGo",
     "coverable",
+    "time_to_go",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.milp import ABSENT, Milp
+from uas_coverage_baselines.milp_mpc.milp import ABSENT, Columns, Milp
 from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
 from uas_coverage_env.geometry import cylinder_faces, sphere_faces
 
@@ -26,7 +26,47 @@ def coverable(problem: PlanningProblem) -> NDArray[np.bool_]:
         result &= (diagonal >= problem.waypoints_m @ between.T - box).all(axis=-1)
     if not problem.prune:
         result[:] = True
-    return result
+    return result & problem.assigned[:, None, :]
+
+
+def uncovered_as(
+    v: Variables, waypoint: int
+) -> tuple[NDArray[np.float64], Columns, NDArray[np.float64]]:
+    """Phi_w(n) for n = 1..N as constant + coefficient · columns, whether it has columns or not.
+
+    Without, Phi_w(n) is 1 less the visits before n.
+
+    Args:
+        v: the shared columns.
+        waypoint: w.
+
+    Returns:
+        Coefficients and columns (N, K), constants (N, 1).
+    """
+    if (v.uncovered >= 0).all():
+        columns = v.uncovered[1:, waypoint, None]
+        return np.ones(columns.shape), columns, np.zeros(columns.shape)
+    U, N, _ = v.covers.shape
+    before = np.tri(N)  # row n = 1..N, step 0..N-1
+    visits = np.broadcast_to(v.covers[None, :, :, waypoint], (N, U, N)).reshape(N, U * N)
+    return -np.tile(before, U), visits, np.ones((N, 1))
+
+
+def require_inside(milp: Milp, v: Variables, problem: PlanningProblem) -> None:
+    """|p_w - p(n)| <= delta_WP where b_W(n) = 1: a row per UAS, step, waypoint and face."""
+    faces = sphere_faces(problem.waypoint_sides)
+    center = problem.waypoints_m @ faces.T
+    upper = center + problem.waypoint_reach_m[:, None]
+    reach = problem.reach.support(faces)[:, :-1, None, :]
+    big_m = np.maximum(reach - upper, 0.0)
+    covers = v.covers[..., None, None]
+    milp.subject_to(
+        "coverage.inside",
+        (faces, v.position[:, :-1, None, None, :]),
+        (big_m[..., None], covers),
+        upper=upper + big_m,
+        where=(v.covers != ABSENT)[..., None] & (big_m > 0.0),
+    )
 
 
 class Coverage:
@@ -39,19 +79,7 @@ class Coverage:
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
         """Add the rows and part III of the objective."""
-        faces = sphere_faces(problem.waypoint_sides)
-        center = problem.waypoints_m @ faces.T
-        upper = center + problem.waypoint_reach_m[:, None]
-        reach = problem.reach.support(faces)[:, :-1, None, :]
-        big_m = np.maximum(reach - upper, 0.0)
-        covers = v.covers[..., None, None]
-        milp.subject_to(
-            "coverage.inside",
-            (faces, v.position[:, :-1, None, None, :]),
-            (big_m[..., None], covers),
-            upper=upper + big_m,
-            where=(v.covers != ABSENT)[..., None] & (big_m > 0.0),
-        )
+        require_inside(milp, v, problem)
         milp.subject_to(
             "coverage.state",
             (1.0, v.uncovered[1:, :, None]),

@@ -149,22 +149,94 @@ class Separation:
         )
         milp.drop_integrality(relaxed)
 
+    def add_one_face(self, milp: Milp, v: Variables) -> None:
+        """Both of the above with `crossed` alone (`reductions.one_face`)."""
+        if not self.undecided.any():
+            return
+        F = self.always.shape[2]
+        never = self.never[:, :-1] | self.never[:, 1:]
+        crossed = milp.variables(
+            f"{self.name}.crossed",
+            (*self.undecided.shape, F),
+            lower=never.astype(float),
+            upper=1.0,
+            integer=True,
+            where=self.undecided[:, :, None],
+        )
+        clearance = np.broadcast_to(self.clearance_m[:, None, :], self.always.shape)
+        big_m = np.maximum(clearance - self.lowest_m, 0.0)
+        lower = clearance - self.offset_m
+        later = np.arange(self.undecided.shape[1]) > 0  # the first sample is given
+        free = self.undecided[:, :, None] & ~never
+        for end, steps, asked in (
+            ("from", slice(None, -1), free & later[:, None]),
+            ("to", slice(1, None), free),
+        ):
+            terms = [
+                (self.normals, v.position[self.mover][:, steps, None, :]),
+                (big_m[:, steps, :, None], crossed[..., None]),
+            ]
+            if self.partner is not None:
+                terms.append((-self.normals, v.position[self.partner][:, steps, None, :]))
+            milp.subject_to(
+                f"{self.name}.outside_{end}",
+                *terms,
+                lower=lower[:, steps],
+                where=asked & ~self.always[:, steps],
+            )
+        milp.subject_to(
+            f"{self.name}.one_face_stays", (1.0, crossed), upper=F - 1, where=self.undecided
+        )
+
+    def spare_m(self, positions_m: FloatArray) -> FloatArray:
+        """(G, N, F) distance to spare beyond each face at both ends of each interval.
+
+        Args:
+            positions_m: (U, N+1, 3) a flight; its first sample is the measured one.
+        """
+        position = positions_m[self.mover]
+        if self.partner is not None:
+            position = position - positions_m[self.partner]
+        spare = position @ self.normals.T + self.offset_m - self.clearance_m[:, None, :]
+        spare[:, 0] = np.where(self.always[:, 0], np.inf, -np.inf)
+        return np.minimum(spare[:, :-1], spare[:, 1:])
+
+    def is_kept(self, positions_m: FloatArray, tolerance_m: float = 1e-6) -> bool:
+        """Whether some face separates over every interval of a flight (U, N+1, 3)."""
+        return bool((self.spare_m(positions_m).max(axis=2) >= -tolerance_m).all())
+
 
 def from_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
-    """Every UAS from each fixed obstacle: D_O(p) >= delta_O,min."""
+    """Every UAS from each fixed obstacle: D_O(p) >= delta_O,min.
+
+    Obstacles of which one face separates over the whole horizon, whatever is flown, have no rows;
+    they are left out here, all at once, so that many far ones cost nothing.
+    """
+    if not problem.obstacles:
+        return
+    hulls = [hull for _, hull in problem.obstacles]
+    faces = np.array([hull.n_faces for hull in hulls])
+    ends = np.cumsum(faces)
+    normals = np.concatenate([hull.normals for hull in hulls])
+    offsets = np.concatenate([hull.offsets_m for hull in hulls])
+    clearance = np.repeat(problem.obstacle_clearance_m, faces, axis=1)
+    lowest = offsets - problem.reach.support(-normals)
+    highest = offsets + problem.reach.support(normals)
+    separates = (lowest >= clearance[:, None]).all(axis=1)
+    far = np.logical_or.reduceat(separates, ends - faces, axis=1).all(axis=0) & problem.prune
     everyone = np.arange(problem.n_uas)
-    for row, (name, hull) in enumerate(problem.obstacles):
-        clearance = np.repeat(problem.obstacle_clearance_m[:, [row]], hull.n_faces, axis=1)
-        shape = (problem.n_uas, problem.horizon + 1, hull.n_faces)
+    for row in np.flatnonzero(~far):
+        own = slice(ends[row] - faces[row], ends[row])
+        shape = (problem.n_uas, problem.horizon + 1, faces[row])
         yield Separation(
-            name,
-            hull.normals,
+            problem.obstacles[row][0],
+            normals[own],
             everyone,
             None,
-            np.broadcast_to(hull.offsets_m, shape),
-            clearance,
-            hull.offsets_m - problem.reach.support(-hull.normals),
-            hull.offsets_m + problem.reach.support(hull.normals),
+            np.broadcast_to(offsets[own], shape),
+            clearance[:, own],
+            lowest[..., own],
+            highest[..., own],
             problem.prune,
         )
 

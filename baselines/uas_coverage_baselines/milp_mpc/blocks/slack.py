@@ -6,7 +6,7 @@ import numpy as np
 
 from uas_coverage_baselines.milp_mpc.milp import Milp
 from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
-from uas_coverage_env.vehicle import DOD, LIFT, PSI, TAU_X, TAU_Y, TAU_Z, WX, WY, WZ
+from uas_coverage_env.vehicle import DOD, LIFT, PSI, TAU_X, TAU_Y, TAU_Z, VZ, WX, WY, WZ
 
 
 class Slack:
@@ -29,7 +29,10 @@ class Slack:
             ("rate_y", v.x[:, 1:, WY], w.rate, limit("rate_max_radps")),
             ("rate_z", v.x[:, 1:, WZ], w.rate, limit("yaw_rate_max_radps")),
             ("yaw", v.x[:, 1:, PSI], w.yaw, limit("yaw_max_rad")),
+            ("climb", v.x[:, 1:, VZ], w.climb, limit("v_down_max_mps")),
         ):
+            if weight == 0.0:
+                continue
             slack = milp.variables(f"slack.{name}", columns.shape, lower=0.0)
             for side, sign in (("above", -1.0), ("below", 1.0)):
                 milp.subject_to(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from uas_coverage_baselines.milp_mpc.blocks.coverage import uncovered_as
 from uas_coverage_baselines.milp_mpc.milp import Milp
 from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
 from uas_coverage_env.geometry import closed_cylinder_faces
@@ -33,8 +34,8 @@ class TargetDistance:
             lower = np.broadcast_to(-center, (problem.horizon, len(faces)))
             if target.waypoint is not None:
                 big_m = np.maximum(reach[uas, 1:] - center, 0.0)
-                uncovered = v.uncovered[1:, target.waypoint, None, None]
-                terms.append((-big_m[..., None], uncovered))
-                lower = lower - big_m
+                coefficient, columns, constant = uncovered_as(v, target.waypoint)
+                terms.append((-big_m[..., None] * coefficient[:, None, :], columns[:, None, :]))
+                lower = lower - big_m * (1.0 - constant)
             milp.subject_to(f"{name}.from_target", *terms, lower=lower)
             milp.minimize(target.weight, distance)

@@ -1,0 +1,86 @@
+"""`milp-mpc-guided`: the same OCP along a global order of the waypoints.
+
+What the paper's planner loses, it loses in the order of the waypoints. Here the order of the whole
+swarm is searched apart (`uas_coverage_baselines.order`) and given to the OCP as a terminal cost,
+the time still to go along one's own order, and as the few waypoints that get binaries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon, MovingHorizonOptions
+from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Target, Weights
+from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Mode, SwarmState, World
+
+_HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is left to visit
+
+
+class Options(MovingHorizonOptions):
+    """Options of `milp-mpc-guided`."""
+
+    waypoint_sides: int = Field(default=8, ge=4, le=16, multiple_of=4, description="H_WP")
+    early_s: float = Field(
+        default=0.05,
+        ge=0.0,
+        le=1.0,
+        description="worth of covering a waypoint a step earlier, in seconds of flight",
+    )
+
+
+class MilpMpcGuided(MovingHorizon[Options]):
+    """MILP-MPC with a global order as terminal cost."""
+
+    Options = Options
+
+    def __init__(self, options: Options | None = None) -> None:
+        super().__init__(options or Options())
+        # in seconds, as the terminal cost is
+        self._weights = Weights(lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03)
+
+    def rehearsal(self) -> MilpMpcGuided:
+        """The same planner with time enough to compile everything."""
+        return MilpMpcGuided(self.options.model_copy(update={"time_limit_s": 10.0}))
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Start a mission: the first order is searched here, before take-off.
+
+        Args:
+            scenario: the mission.
+            seed: of the search.
+        """
+        super().reset(scenario, seed)
+        self._around = Surroundings(scenario, self.options)
+        self._guide = OrderGuide(scenario, self._around, TourShape())
+        world = World(scenario)
+        world.reset()
+        self._guide.begin(world.swarm_state(), seed)
+        self._returning: set[str] = set()
+
+    def mode(self, name: str) -> Mode:
+        """Covering while a UAS has anything left to visit."""
+        return "return" if name in self._returning else "covering"
+
+    def problem(self, swarm: SwarmState) -> PlanningProblem:
+        """The OCP along everybody's order."""
+        self._guide.update(swarm)
+        ahead = self._guide.tours(swarm.active)
+        index = np.concatenate(ahead).astype(np.int64)
+        early = np.full(len(index), self.options.early_s)
+        problem = self._around.seen(swarm, self._weights, index, early)
+        rows = np.split(np.arange(len(index)), np.cumsum([len(a) for a in ahead])[:-1])
+        tours = tuple(
+            self._guide.tour(name, row) for name, row in zip(swarm.active, rows, strict=True)
+        )
+        targets = tuple(
+            Target(self._around.home_m[name], _HOMING_PER_M) if tour is None else None
+            for name, tour in zip(swarm.active, tours, strict=True)
+        )
+        self._returning = {n for n, t in zip(swarm.active, tours, strict=True) if t is None}
+        return replace(problem, tours=tours, targets=targets)

@@ -1,0 +1,162 @@
+"""The global order of the swarm, kept up to date, and the tours it gives each decision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.problem import Tour
+from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
+from uas_coverage_baselines.order import Effort, Legs, Order, Task, improved, no_order
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import SwarmState
+
+FloatArray = NDArray[np.float64]
+_LANDING_S = 4.0  # coming to rest above the start
+_MOVES_PER_WAYPOINT = 40_000  # of the first search, before take-off
+_MOVES_AT_MOST = 4_000_000
+_MOVES_AFTERWARDS = 60_000  # of each decision's
+_FIRST_SEARCHES = 3
+_WORTH_CHANGING_S = 0.5
+_RESERVE_S = 20.0  # flight time to come home with, as the OCP's reserve asks for
+_BLOCKED_SHARE = 0.5  # a blocked waypoint is expected to open after so much of the time still to go
+_BLOCKED_AT_LEAST_S = 20.0
+_AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
+
+
+@dataclass(frozen=True)
+class TourShape:
+    """How much of an order a decision looks at.
+
+    Attributes:
+        most: waypoints at most.
+        beyond: share of the horizon's time by which a tour may last longer than the horizon.
+        lead_s: aims are measured from where the UAS would be after so long.
+    """
+
+    most: int = 6
+    beyond: float = 0.2
+    lead_s: float = 1.0
+
+
+class OrderGuide:
+    """Keeps the swarm's order; searches before take-off and a little at every decision.
+
+    The search runs at every decision rather than on events: a lost UAS, a waypoint that opens, a
+    flight that takes longer are all seen in the state, and a better order is taken when it comes.
+    """
+
+    def __init__(self, scenario: Scenario, around: Surroundings, shape: TourShape) -> None:
+        self._around, self._shape = around, shape
+        self._legs = Legs(scenario)
+        self._names = tuple(uas.name for uas in scenario.uas)
+        limits = [vehicle.limits for vehicle in scenario.vehicles]
+        gravity = [vehicle.airframe.gravity_mps2 for vehicle in scenario.vehicles]
+        self._speed = np.array([limit.v_xy_max_mps for limit in limits])
+        self._acceleration = _AGILITY * np.array(
+            [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
+        )
+        radius = np.array([w.radius_m for w in scenario.waypoints])
+        self._turn_s = radius / self._speed[:, None]
+        self._radius_m = radius
+        self._weight = np.array([w.weight for w in scenario.waypoints], float)
+        self._order: Order | None = None
+
+    @property
+    def order(self) -> Order | None:
+        """The order as it stands."""
+        return self._order
+
+    def begin(self, swarm: SwarmState, seed: int) -> None:
+        """Search long, before take-off."""
+        task = self._task(swarm, blocked=set())
+        moves = min(_MOVES_PER_WAYPOINT * max(len(task.open_waypoints), 1), _MOVES_AT_MOST)
+        orders = [
+            improved(task, no_order(task.n_uas), Effort(moves), seed + attempt)
+            for attempt in range(_FIRST_SEARCHES)
+        ]
+        self._order = min(orders, key=lambda order: order.cost_s)
+
+    def update(self, swarm: SwarmState) -> None:
+        """Bring the order up to date with what is seen now."""
+        previous = self._order or no_order(len(self._names))
+        task = self._task(swarm, self._around.blocked_waypoints(swarm))
+        effort = Effort(_MOVES_AFTERWARDS, hottest_s=1.5, window=24)
+        kept = improved(task, previous, Effort(0), 0)
+        better = improved(task, kept, effort, swarm.step)
+        worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
+        self._order = better if worthwhile else kept
+
+    def tours(self, names: Sequence[str]) -> list[NDArray[np.int64]]:
+        """Per UAS the waypoints (the scenario's rows) that its next decision is about."""
+        return [self._ahead(self._names.index(name)) for name in names]
+
+    def tour(self, name: str, rows: NDArray[np.int64]) -> Tour | None:
+        """The tour of a UAS; None where nothing is left for it.
+
+        Args:
+            name: the UAS.
+            rows: (K,) where the tour's waypoints are in the problem.
+        """
+        uas = self._names.index(name)
+        assert self._order is not None
+        route, K = self._order.routes[uas], len(rows)
+        if not K:
+            return None
+        between, home = self._legs.between_s[self._legs.kind[uas]], self._legs.home_s[uas]
+        after = route[K] if len(route) > K else None
+        last_s = home[route[K - 1]] if after is None else between[route[K - 1], after]
+        aims = self._legs.waypoints_m[route[: K + 1]]
+        radius, lead_s = 0.5 * self._radius_m[route[: K + 1]], self._shape.lead_s
+        if after is None:  # at home it has to stand still
+            aims = np.vstack([aims, self._legs.starts_m[uas]])
+            radius, lead_s = np.append(radius, 0.0), 0.0
+        onward = np.append(between[route[: K - 1], route[1:K]], last_s)
+        return Tour(rows, aims, radius, lead_s, onward)
+
+    def _ahead(self, uas: int) -> NDArray[np.int64]:
+        assert self._order is not None
+        route = self._order.routes[uas]
+        between = self._legs.between_s[self._legs.kind[uas]]
+        until = np.concatenate([[0.0], np.cumsum(between[route[:-1], route[1:]])])
+        horizon_s = (1.0 + self._shape.beyond) * self._around.horizon_s
+        within = until[: len(route)] <= horizon_s
+        return route[: min(int(within.sum()), self._shape.most)]
+
+    def _task(self, swarm: SwarmState, blocked: set[int]) -> Task:
+        rows = np.array([swarm.names.index(name) for name in self._names])
+        active = np.array([name in swarm.active for name in self._names])
+        x = swarm.x[rows]
+        first_s = np.array([self._legs.from_here_s(u, x[u, 0:3]) for u in range(len(self._names))])
+        idle_s = np.array([self._legs.way_home_s(u, x[u, 0:3]) for u in range(len(self._names))])
+        left_s = np.array(
+            [self._around.seconds_left(n, x[u, DOD]) for u, n in enumerate(self._names)]
+        )
+        opens = np.zeros(len(self._weight))
+        if blocked:
+            longest = self._order.seconds.max() if self._order else 0.0
+            opens[list(blocked)] = max(_BLOCKED_SHARE * longest, _BLOCKED_AT_LEAST_S)
+        return Task(
+            open_waypoints=np.flatnonzero(swarm.uncovered),
+            first_s=first_s,
+            between_s=self._legs.between_s,
+            kind=self._legs.kind,
+            home_s=self._legs.home_s + _LANDING_S,
+            idle_s=np.where(active, idle_s, 0.0),
+            position_m=np.ascontiguousarray(x[:, 0:2]),
+            velocity_mps=np.ascontiguousarray(x[:, 3:5]),
+            speed_mps=self._speed,
+            acceleration_mps2=self._acceleration,
+            start_m=np.ascontiguousarray(self._legs.starts_m[:, :2]),
+            waypoints_m=self._legs.waypoints_m,
+            turn_s=self._turn_s,
+            neighbours=self._legs.neighbours,
+            weight=self._weight,
+            not_before_s=opens,
+            # who is not there any more can visit nothing
+            budget_s=np.where(active, left_s - _RESERVE_S, -np.inf),
+        )

@@ -1,0 +1,153 @@
+"""Leg times between waypoints, from where the UAS are and to their starts.
+
+A leg goes straight where the way is free, round tall obstacles along the corners that the world's
+routes turn at, and over low ones. It takes as long as the slower of its horizontal and its
+vertical part.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import VehicleParams
+from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
+
+FloatArray = NDArray[np.float64]
+_NEIGHBOURS = 24
+"""Legs to so many nearest waypoints are routed past obstacles; longer ones are taken straight."""
+_OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
+
+
+class Legs:
+    """The leg times of a scenario; what does not change during a mission is computed once.
+
+    Attributes:
+        between_s: (V, W, W) between waypoints, for each kind of vehicle.
+        waypoints_m: (W, 3).
+        starts_m: (U, 3).
+        home_s: (U, W) from a waypoint to each UAS's start.
+        kind: (U,) row of each UAS in `between_s`.
+        neighbours: (W, K) the nearest other waypoints of each, nearest first.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.waypoints_m = np.array([w.position_m for w in scenario.waypoints], float)
+        self._credit_m = np.array([0.5 * w.radius_m for w in scenario.waypoints])
+        # a planner must not know what the moving obstacles are going to do
+        self._arena = build_arena(scenario.model_copy(update={"moving_obstacles": ()}))
+        kinds = list(dict.fromkeys(scenario.vehicles))
+        self.kind = np.array([kinds.index(vehicle) for vehicle in scenario.vehicles])
+        self._speeds = np.array([_speeds(vehicle) for vehicle in kinds])
+        n = len(self.waypoints_m)
+        nearest = min(_NEIGHBOURS, n - 1)
+        found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]
+        self.neighbours = _without_self(np.reshape(found, (n, nearest + 1)))
+        self.between_s = np.array([self._between(speeds) for speeds in self._speeds])
+        self.starts_m = np.array([uas.start_m for uas in scenario.uas], float)
+        self.home_s = np.array(
+            [self._towards_home(u, start) for u, start in enumerate(self.starts_m)]
+        )
+
+    def from_here_s(self, uas: int, position_m: FloatArray) -> FloatArray:
+        """(W,) leg times from a position of a UAS to every waypoint."""
+        ends = np.broadcast_to(position_m, self.waypoints_m.shape)
+        targets = np.arange(len(self.waypoints_m))
+        speeds = self._speeds[self.kind[uas]]
+        return _legs_s(
+            self._arena, targets, ends, self.waypoints_m, self._credit_m, speeds, _OCTAGON
+        )
+
+    def way_home_s(self, uas: int, position_m: FloatArray) -> float:
+        """Leg time from a position of a UAS to its start."""
+        target = np.array([len(self.waypoints_m) + uas])
+        start = self.starts_m[[uas]]
+        here = np.asarray(position_m, float)[None]
+        speeds = self._speeds[self.kind[uas]]
+        return float(_legs_s(self._arena, target, here, start, np.zeros(1), speeds, _OCTAGON)[0])
+
+    def _between(self, speeds: FloatArray) -> FloatArray:
+        n = len(self.waypoints_m)
+        first, second = (axis.ravel() for axis in np.indices((n, n)))
+        straight = _straight_s(
+            self.waypoints_m[first], self.waypoints_m[second], self._credit_m[second], speeds
+        ).reshape(n, n)
+        near = np.repeat(np.arange(n), self.neighbours.shape[1]), self.neighbours.ravel()
+        straight[near] = _legs_s(
+            self._arena,
+            near[1],
+            self.waypoints_m[near[0]],
+            self.waypoints_m[near[1]],
+            self._credit_m[near[1]],
+            speeds,
+            _OCTAGON,
+        )
+        np.fill_diagonal(straight, 0.0)
+        return straight
+
+    def _towards_home(self, uas: int, start_m: FloatArray) -> FloatArray:
+        n = len(self.waypoints_m)
+        return _legs_s(
+            self._arena,
+            np.full(n, n + uas),
+            self.waypoints_m,
+            np.broadcast_to(start_m, (n, 3)),
+            np.zeros(n),
+            self._speeds[self.kind[uas]],
+            _OCTAGON,
+        )
+
+
+def _speeds(vehicle: VehicleParams) -> tuple[float, float, float]:
+    limits = vehicle.limits
+    return limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps
+
+
+def _without_self(found: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(W, K) the neighbours; a waypoint at the very same place may come before the waypoint."""
+    rows = [row[row != w][: len(row) - 1] for w, row in enumerate(found)]
+    return np.array(rows, np.intp).reshape(len(found), -1)
+
+
+def _straight_s(
+    start_m: FloatArray, end_m: FloatArray, credit_m: FloatArray, speeds: FloatArray
+) -> FloatArray:
+    away = end_m - start_m
+    level = (away[:, :2] @ _OCTAGON.T).max(axis=1) / speeds[0]
+    up = np.maximum(-away[:, 2] - credit_m, 0.0) / speeds[1]
+    down = np.maximum(away[:, 2] - credit_m, 0.0) / speeds[2]
+    return np.maximum(level, np.maximum(up, down))
+
+
+@njit(cache=True, error_model="numpy")
+def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, octagon):
+    """Flight times past the fixed obstacles; `targets` are rows of the arena's routes."""
+    result = np.empty(len(targets))
+    for i in range(len(targets)):
+        x0, y0, z0 = start_m[i, 0], start_m[i, 1], start_m[i, 2]
+        x1, y1, z1 = end_m[i, 0], end_m[i, 1], end_m[i, 2]
+        _, _, length_m, leg = route(arena, targets[i], x0, y0, z0, x1, y1, z1)
+        up = max(z0 - z1 - credit_m[i], 0.0)
+        down = max(z1 - z0 - credit_m[i], 0.0)
+        if leg in (CLEAR, IN_SIGHT):
+            straight_m = 0.0
+            for face in range(octagon.shape[0]):
+                along = (x1 - x0) * octagon[face, 0] + (y1 - y0) * octagon[face, 1]
+                straight_m = max(straight_m, along)
+            length_m = straight_m
+        if leg == IN_SIGHT:
+            top = min(z0, z1)  # down: the smallest is the highest
+            for o in range(arena.obstacles.shape[0]):
+                obstacle = arena.obstacles[o]
+                at, _, _ = crossing(obstacle, arena.normals, arena.offsets_m, x0, y0, x1, y1)
+                if at <= 1.0:
+                    top = min(top, -obstacle.roof_m)
+            up = max(up, z0 - top)
+            down = max(down, z1 - top - credit_m[i])
+        result[i] = max(length_m / speeds[0], up / speeds[1] + down / speeds[2])
+    return result

@@ -1,0 +1,153 @@
+"""Whole missions in which the solver fails at random decisions, judged by the independent check."""
+
+import dataclasses
+import time
+
+import independent_check
+import numpy as np
+import pytest
+from lively_missions import with_balloon
+from uas_coverage_baselines.milp_mpc.solvers import Solution, SolveStatus, highs
+from uas_coverage_baselines.milp_mpc.solvers.interface import confirmed
+
+from uas_coverage_env import generate_scenario, load_planner, rollout
+
+QUICK = {"deterministic": "true", "horizon": "8", "teams": "1", "threads": "1"}
+RUNS = (1, 2, 3, 5, 8, 13)  # decisions in a row
+
+
+def nothing(status):
+    """A solve that ends with nothing in hand."""
+    return lambda *args, **limits: Solution(status, None, np.inf, -np.inf, np.inf, 0.0)
+
+
+def late(*args, **limits):
+    """A solve that takes its time and has found nothing by then."""
+    time.sleep(0.02)
+    return nothing(SolveStatus.NO_SOLUTION)(*args, **limits)
+
+
+FAILURES = {
+    "no solution": nothing(SolveStatus.NO_SOLUTION),
+    "infeasible": nothing(SolveStatus.INFEASIBLE),
+    "late": late,
+}
+
+
+class Killed:
+    """A planner whose solver fails at the decisions of a list.
+
+    Attributes:
+        failures: Decision -> what the solver does instead of solving.
+        failed: Whether each decision so far was one of them.
+    """
+
+    def __init__(self, planner, failures, monkeypatch):
+        self.planner, self.failures, self._monkeypatch = planner, failures, monkeypatch
+        self.options, self.failed = planner.options, []
+        self._solve = highs.solve
+
+    def warm_up(self, scenario):
+        self.planner.warm_up(scenario)
+
+    def reset(self, scenario, seed):
+        self.planner.reset(scenario, seed)
+        self.failed = []
+
+    def act(self, swarm):
+        failure = self.failures.get(swarm.step)
+        self.failed.append(failure is not None)
+        with self._monkeypatch.context() as patched:
+            if failure is not None:
+                patched.setattr(highs, "solve", failure)
+            return self.planner.act(swarm)
+
+    @property
+    def last_decision(self):
+        return self.planner.last_decision
+
+
+def at_random(seed, first_run=()):
+    """Failures of all kinds in runs of 1 to 13 decisions, after the given runs."""
+    draw = np.random.default_rng(seed)
+    failures, step = {}, int(draw.integers(3, 9))
+    for run in (*first_run, *draw.choice(RUNS, 12)):
+        for now in range(step, step + int(run)):
+            failures[now] = FAILURES[str(draw.choice(list(FAILURES)))]
+        step += int(run) + int(draw.integers(2, 9))
+    return failures
+
+
+@pytest.fixture(scope="module")
+def town():
+    """Three UAS among four blocks, and a balloon that drifts across their ways."""
+    built = generate_scenario(7, n_uas=3, n_waypoints=5, n_obstacles=4)
+    return with_balloon(built, start_m=(200.0, 150.0, -18.0), velocity_mps=(-1.5, -1.0, 0.0))
+
+
+def judged(flight, directory):
+    """The independent check's report; nothing touched, nothing too near, nothing that differs."""
+    flight.save(directory)
+    report = independent_check.check(directory)
+    assert report.problems == []
+    assert report.breaches == 0
+    return report
+
+
+@pytest.mark.parametrize(("seed", "first_run"), [(0, (5, 8)), (1, (30,)), (3, ())])
+def test_a_mission_survives_a_solver_killed_at_random(monkeypatch, tmp_path, town, seed, first_run):
+    planner = Killed(load_planner("milp-mpc", QUICK), at_random(seed, first_run), monkeypatch)
+    flight = rollout(town, planner, max_steps=200)
+    report = judged(flight, tmp_path / "flight")
+    fallbacks = [decision.fallback for decision in flight.decisions]
+    assert sum(planner.failed) >= 15, "a mission that nothing happens to proves nothing"
+    missed = [
+        k for k, (f, g) in enumerate(zip(planner.failed, fallbacks, strict=True)) if f and not g
+    ]
+    assert not missed
+    assert fallbacks == planner.failed
+    assert report.coverage == 1.0
+    assert report.all_home
+
+
+def test_a_solver_that_lies_is_not_believed(monkeypatch, tmp_path, town):
+    draw = np.random.default_rng(4)
+
+    def lied(claim, *args):
+        if claim.values is not None:
+            claim = dataclasses.replace(
+                claim, values=claim.values + draw.normal(0.0, 0.1, len(claim.values))
+            )
+        return confirmed(claim, *args)
+
+    def lying(*args, **limits):
+        with monkeypatch.context() as patched:
+            patched.setattr(highs, "confirmed", lied)
+            return solve(*args, **limits)
+
+    solve = highs.solve
+    failures = {step: lying for step in range(60) if step % 6 in (3, 4)}
+    planner = Killed(load_planner("milp-mpc", QUICK), failures, monkeypatch)
+    flight = rollout(town, planner, max_steps=30)
+    judged(flight, tmp_path / "flight")
+    assert [decision.fallback for decision in flight.decisions] == planner.failed
+
+
+def test_a_start_inside_the_planner_s_margin_ends_in_a_fallback_and_touches_nothing(tmp_path):
+    built = generate_scenario(7, n_uas=2, n_waypoints=3, n_obstacles=3)
+    north_m, east_m, _ = built.uas[1].start_m
+    # radius and safe distance of the balloon, radius of the UAS, and a hand's breadth
+    beside_m = 4.0 + 3.0 + built.uas[1].radius_m + 0.05
+    town = with_balloon(built, (north_m + beside_m, east_m, -4.0), (0.0, 0.0, 0.0))
+    flight = rollout(town, load_planner("milp-mpc", QUICK), max_steps=8)
+    judged(flight, tmp_path / "flight")
+    assert flight.decisions[0].fallback
+
+
+def test_without_time_everybody_hovers_at_the_start(tmp_path, town):
+    planner = load_planner("milp-mpc", {"time_limit_s": "0.01", "horizon": "8", "threads": "1"})
+    flight = rollout(town, planner, max_steps=15)
+    judged(flight, tmp_path / "hovering")
+    assert all(decision.fallback for decision in flight.decisions)
+    starts = flight.x[0, :, :3]
+    assert np.abs(flight.x[:, :, :3] - starts).max() < 0.2
