@@ -50,7 +50,8 @@ class Effort:
 
 _RESERVE = 0.15  # share of the time limit kept for verification and whatever is late
 _RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
-_ALONG_SHARE = 0.8
+_STARTS, _POLISHES = 2, 3  # programs along a UAS's tour: around flights, then around the best
+_WORTH_POLISHING = 0.05
 _WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
 _TEAMS_VERIFIED = 6
 _RESTRICTED_NODES = 60
@@ -83,9 +84,16 @@ def decide(
         search.formulate()
         pools = [constructed.result() for constructed in constructing]
         tasks = _unique_tasks(problem, previous, teams(problem, pools, effort.teams), dt_s)
-        near = ALONG if problem.tours else NARROW
-        refined = side_by_side.map(lambda task: search.refined(task[0], task[1], near), tasks)
-        search.collect(tasks, list(refined))
+        if problem.tours:
+            per_uas_s = search.time_left_s() * effort.threads / problem.n_uas
+            for uas, plans in enumerate(
+                side_by_side.map(lambda uas: search.polished(uas, tasks, per_uas_s), everyone)
+            ):
+                search.collect(uas, plans)
+        else:
+            found = side_by_side.map(lambda task: search.refined(*task, NARROW), tasks)
+            for (uas, _), plan in zip(tasks, found, strict=True):
+                search.collect(uas, [plan])
         standby = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
         tasks = [
             task
@@ -93,8 +101,9 @@ def decide(
             if not search.has_plan(uas)
             for task in _last_resorts(problem, uas, tasks, standby[uas])
         ]
-        wider = side_by_side.map(lambda task: search.refined(task[0], task[1], WIDE), tasks)
-        search.collect(tasks, list(wider))
+        found = side_by_side.map(lambda task: search.refined(*task, WIDE), tasks)
+        for (uas, _), plan in zip(tasks, found, strict=True):
+            search.collect(uas, [plan])
     search.combine(standby)
     search.improve()
     return search.plan
@@ -159,16 +168,19 @@ class _Search:
             return None
         return replace(self._best, bound=min(self._bound, self._best.objective))
 
-    def refined(self, uas: int, flight: Flight, nearness: Nearness) -> Plan | None:
-        """Solve a UAS's own OCP restricted to what its flight covers, and when."""
+    def refined(
+        self, uas: int, flight: Flight, nearness: Nearness, at_most_s: float = np.inf
+    ) -> Plan | None:
+        """Solve a UAS's own OCP restricted to what lies near a flight."""
         if not self._has_time(_WORTHWHILE_S):
             return None
         program = self._own[uas]
         path, visit = flight.positions_m[None], flight.visit[None]
         lower, upper = program.near(path, visit, nearness)
         start = program.start(path, visit)
+        share_s = self.effort.time_limit_s * (1.0 if nearness is ALONG else _RESTRICTED_SHARE)
         limits = SolverLimits(
-            time_s=min(self._share(nearness) * self.effort.time_limit_s, self._time_left_s()),
+            time_s=min(share_s, self.time_left_s(), at_most_s),
             nodes=None,
             relative_gap=0.01,
             absolute_gap=0.05,
@@ -179,15 +191,33 @@ class _Search:
         solution = self._solve(program.built, limits, start=start, lower=lower, upper=upper)
         return None if solution.values is None else program.plan(solution)
 
-    def _share(self, nearness: Nearness) -> float:
-        """Of the time limit, for one program at most; those along tours are few and worth it."""
-        if nearness is not ALONG:
-            return _RESTRICTED_SHARE
-        return min(_ALONG_SHARE * self.effort.threads / self.problem.n_uas, 1.0)
+    def polished(
+        self, uas: int, tasks: Sequence[tuple[int, Flight]], at_most_s: float
+    ) -> list[Plan]:
+        """Plans of one UAS along its tour: around its flights, then around the best again.
 
-    def collect(self, tasks: Sequence[tuple[int, Flight]], plans: Sequence[Plan | None]) -> None:
-        """Keep the plans found for each UAS."""
-        for (uas, _), plan in zip(tasks, plans, strict=True):
+        Restricted to the sides at which a flight passes obstacles a program takes a fraction of a
+        second; around its solution other sides come near, until nothing is gained.
+        """
+        until = time.perf_counter() + at_most_s
+        own = [flight for other, flight in tasks if other == uas][:_STARTS]
+        plans: list[Plan] = []
+        for _ in range(_STARTS + _POLISHES):
+            left_s = until - time.perf_counter()
+            if not self.effort.deterministic and left_s < _WORTHWHILE_S:
+                break
+            flight = own.pop(0) if own else as_flight(self._own[uas].problem, 0, plans[0])
+            plan = self.refined(uas, flight, ALONG, left_s)
+            if plan is not None:
+                gained = not plans or plan.objective < plans[0].objective - _WORTH_POLISHING
+                plans = sorted([plan, *plans], key=lambda one: one.objective)
+            if not own and (not plans or (plan is not None and not gained)):
+                break
+        return plans
+
+    def collect(self, uas: int, plans: Sequence[Plan | None]) -> None:
+        """Keep the plans found for a UAS."""
+        for plan in plans:
             if plan is not None and first_trouble(self._own[uas].problem, plan) is None:
                 self._plans[uas].append(plan)
 
@@ -248,7 +278,7 @@ class _Search:
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
-        limits = SolverLimits(time_s=max(self._time_left_s(), 0.01))
+        limits = SolverLimits(time_s=max(self.time_left_s(), 0.01))
         if deterministic:
             limits = SolverLimits(nodes=_ALONE_NODES, relative_gap=0.01, heuristics=False)
         solution = self._solve(program.built, limits, start=start)
@@ -265,9 +295,10 @@ class _Search:
 
     def _has_time(self, seconds: float) -> bool:
         """Whether so much is left, where the clock counts."""
-        return self.effort.deterministic or self._time_left_s() >= seconds
+        return self.effort.deterministic or self.time_left_s() >= seconds
 
-    def _time_left_s(self) -> float:
+    def time_left_s(self) -> float:
+        """Until the decision's time is up, less what is kept for afterwards."""
         limit = (1.0 - _RESERVE) * self.effort.time_limit_s
         return limit - (time.perf_counter() - self._began)
 

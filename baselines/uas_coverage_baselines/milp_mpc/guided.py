@@ -42,7 +42,9 @@ class MilpMpcGuided(MovingHorizon[Options]):
     def __init__(self, options: Options | None = None) -> None:
         super().__init__(options or Options())
         # in seconds, as the terminal cost is
-        self._weights = Weights(lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03)
+        self._weights = Weights(
+            lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03
+        )
 
     def rehearsal(self) -> MilpMpcGuided:
         """The same planner with time enough to compile everything."""

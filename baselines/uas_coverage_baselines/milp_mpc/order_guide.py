@@ -23,8 +23,8 @@ _MOVES_AFTERWARDS = 60_000  # of each decision's
 _FIRST_SEARCHES = 3
 _WORTH_CHANGING_S = 0.5
 _RESERVE_S = 20.0  # flight time to come home with, as the OCP's reserve asks for
-_BLOCKED_SHARE = 0.5  # a blocked waypoint is expected to open after so much of the time still to go
-_BLOCKED_AT_LEAST_S = 20.0
+_WAIT_WHEN_LEFT_S = 45.0  # with less than this still to go, blocked waypoints are waited for
+_WAIT_S = 20.0  # how long is then expected
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 
 
@@ -73,7 +73,7 @@ class OrderGuide:
 
     def begin(self, swarm: SwarmState, seed: int) -> None:
         """Search long, before take-off."""
-        task = self._task(swarm, blocked=set())
+        task = self._task(swarm)
         moves = min(_MOVES_PER_WAYPOINT * max(len(task.open_waypoints), 1), _MOVES_AT_MOST)
         orders = [
             improved(task, no_order(task.n_uas), Effort(moves), seed + attempt)
@@ -84,7 +84,7 @@ class OrderGuide:
     def update(self, swarm: SwarmState) -> None:
         """Bring the order up to date with what is seen now."""
         previous = self._order or no_order(len(self._names))
-        task = self._task(swarm, self._around.blocked_waypoints(swarm))
+        task = self._task(swarm)
         effort = Effort(_MOVES_AFTERWARDS, hottest_s=1.5, window=24)
         kept = improved(task, previous, Effort(0), 0)
         better = improved(task, kept, effort, swarm.step)
@@ -127,7 +127,7 @@ class OrderGuide:
         within = until[: len(route)] <= horizon_s
         return route[: min(int(within.sum()), self._shape.most)]
 
-    def _task(self, swarm: SwarmState, blocked: set[int]) -> Task:
+    def _task(self, swarm: SwarmState) -> Task:
         rows = np.array([swarm.names.index(name) for name in self._names])
         active = np.array([name in swarm.active for name in self._names])
         x = swarm.x[rows]
@@ -136,12 +136,17 @@ class OrderGuide:
         left_s = np.array(
             [self._around.seconds_left(n, x[u, DOD]) for u, n in enumerate(self._names)]
         )
-        opens = np.zeros(len(self._weight))
-        if blocked:
-            longest = self._order.seconds.max() if self._order else 0.0
-            opens[list(blocked)] = max(_BLOCKED_SHARE * longest, _BLOCKED_AT_LEAST_S)
+        # nobody knows when a blocked waypoint opens: it is left aside as long as there is other
+        # work, since an order that waits has no reason to be quick with the rest
+        wanted, opens = swarm.uncovered.copy(), np.zeros(len(self._weight))
+        blocked = list(self._around.blocked_waypoints(swarm))
+        if self._order is None or self._order.seconds.max() > _WAIT_WHEN_LEFT_S:
+            wanted[blocked] = False
+        if not wanted.any():
+            wanted = swarm.uncovered
+        opens[blocked] = _WAIT_S
         return Task(
-            open_waypoints=np.flatnonzero(swarm.uncovered),
+            open_waypoints=np.flatnonzero(wanted),
             first_s=first_s,
             between_s=self._legs.between_s,
             kind=self._legs.kind,

@@ -35,18 +35,23 @@ class Nearness:
         later_steps: likewise later.
         face_slack_m: faces that the flight misses by no more than this stay free.
         other_faces: whether they do also where the flight passes a face with room to spare.
+        other_waypoints: whether waypoints may be covered that the flight does not.
     """
 
     earlier_steps: int
     later_steps: int
     face_slack_m: float
     other_faces: bool = False
+    other_waypoints: bool = False
 
 
 NARROW = Nearness(earlier_steps=3, later_steps=1, face_slack_m=1.0)
 """Some hundredths of a second, as long as the flight is a good one."""
-ALONG = Nearness(earlier_steps=100, later_steps=100, face_slack_m=1.0)
-"""With an order given, when to visit is free: little is left to choose but the times."""
+ALONG = Nearness(
+    earlier_steps=100, later_steps=100, face_slack_m=3.0, other_faces=True, other_waypoints=True
+)
+"""With an order given little is left to choose but when to visit: only the sides at which shapes
+are passed stay near the flight's."""
 WIDE = Nearness(earlier_steps=100, later_steps=100, face_slack_m=30.0, other_faces=True)
 """Finds the way around what the flight runs into."""
 
@@ -84,9 +89,10 @@ class Program:
         """
         lower, upper = self.built.lower.copy(), self.built.upper.copy()
         steps = np.arange(self.problem.horizon)[None, :, None]
-        allowed = (visits < NEVER)[:, None, :]
-        allowed = allowed & (steps >= visits[:, None, :] - nearness.earlier_steps)
+        visited = visits < NEVER
+        allowed = visited[:, None, :] & (steps >= visits[:, None, :] - nearness.earlier_steps)
         allowed &= steps <= visits[:, None, :] + nearness.later_steps
+        allowed |= nearness.other_waypoints & ~visited[:, None, :]
         upper[_made(self.variables.covers[~allowed])] = 0.0
         for separation in self._separations:
             if not separation.undecided.any():
