@@ -147,7 +147,16 @@ def test_the_core_needs_neither_torch_nor_matplotlib(metadata):
     requirements = [Requirement(text) for text in metadata.get_all("Requires-Dist") or []]
     core = {_canonical(entry.name) for entry in requirements if entry.marker is None}
     assert "numpy" in core
-    heavy = {"torch", "matplotlib", "stable-baselines3", "ray", "pygame-ce", "pandas"}
+    heavy = {
+        "torch",
+        "matplotlib",
+        "stable-baselines3",
+        "ray",
+        "pygame-ce",
+        "pandas",
+        "pyscipopt",
+        "gurobipy",
+    }
     assert core.isdisjoint(heavy)
 
 
@@ -156,7 +165,8 @@ def test_importing_the_core_loads_no_heavy_package():
         sys.executable,
         "-c",
         "import sys, uas_coverage_env, uas_coverage_env.cli, uas_coverage_baselines\n"
-        "heavy = ('torch', 'matplotlib', 'pygame', 'highspy', 'ray', 'stable_baselines3')\n"
+        "heavy = ('torch', 'matplotlib', 'pygame', 'highspy', 'pyscipopt', 'gurobipy',\n"
+        "    'ray', 'stable_baselines3')\n"
         "sys.stdout.write(' '.join(name for name in heavy if name in sys.modules))",
     )
     assert loaded == ""

@@ -21,7 +21,18 @@ def run(code: str) -> str:
 def test_importing_is_silent_and_pulls_nothing_heavy():
     out = run("import sys, json, uas_coverage_env; print(json.dumps(sorted(sys.modules)))")
     loaded = {name.partition(".")[0] for name in json.loads(out)}
-    heavy = {"highspy", "PIL", "matplotlib", "torch", "pygame", "stable_baselines3", "ray", "typer"}
+    heavy = {
+        "highspy",
+        "PIL",
+        "matplotlib",
+        "torch",
+        "pygame",
+        "stable_baselines3",
+        "ray",
+        "typer",
+        "pyscipopt",
+        "gurobipy",
+    }
     assert not loaded & heavy
     assert not loaded & {"uas_coverage_baselines", "uas_coverage_agents"}
 

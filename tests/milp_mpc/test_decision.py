@@ -185,7 +185,7 @@ def test_where_no_team_holds_who_can_leaves_standby(problem, by_nodes, monkeypat
             names=by_nodes.names[uas : uas + 1],
             **{key: getattr(by_nodes, key)[uas : uas + 1] for key in ("x", "u", "covers")},
         )
-        search.collect([(uas, None)], [alone])
+        search.collect(uas, [alone])
     search.combine([standby_plans(problem, uas, None, 1.0) for uas in range(2)])
     assert search.plan.x == pytest.approx(by_nodes.x)
 

@@ -25,7 +25,7 @@ _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is l
 class Options(MovingHorizonOptions):
     """Options of `milp-mpc-guided`."""
 
-    waypoint_sides: int = Field(default=8, ge=4, le=16, multiple_of=4, description="H_WP")
+    waypoint_sides: int = Field(default=12, ge=4, le=16, multiple_of=4, description="H_WP")
     early_s: float = Field(
         default=0.05,
         ge=0.0,

@@ -88,7 +88,9 @@ class MovingHorizon(ABC, Generic[Chosen]):
         world.reset()
         rehearsal = self.rehearsal()
         rehearsal.reset(scenario, 0)
-        rehearsal.act(world.swarm_state())
+        swarm = world.swarm_state()
+        rehearsal.act(swarm)
+        evasion(rehearsal.problem(swarm), scenario.dt_s)
 
     def reset(self, scenario: Scenario, seed: int) -> None:
         """Start a mission."""

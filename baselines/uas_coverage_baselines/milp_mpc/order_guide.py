@@ -23,8 +23,9 @@ _MOVES_AFTERWARDS = 60_000  # of each decision's
 _FIRST_SEARCHES = 3
 _WORTH_CHANGING_S = 0.5
 _RESERVE_S = 20.0  # flight time to come home with, as the OCP's reserve asks for
-_WAIT_WHEN_LEFT_S = 45.0  # with less than this still to go, blocked waypoints are waited for
-_WAIT_S = 20.0  # how long is then expected
+_WAIT_WHEN_LEFT_S = 60.0  # with less than this still to go, blocked waypoints are waited for
+_WAIT_S = 30.0  # how long is then expected
+_WAITING_M = 100.0  # how far from a blocked waypoint is near enough: what blocks it may set off
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 
 
@@ -65,6 +66,7 @@ class OrderGuide:
         self._radius_m = radius
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
         self._order: Order | None = None
+        self._waits = False  # whether blocked waypoints are waited for, once little else is left
 
     @property
     def order(self) -> Order | None:
@@ -111,7 +113,7 @@ class OrderGuide:
         after = route[K] if len(route) > K else None
         last_s = home[route[K - 1]] if after is None else between[route[K - 1], after]
         aims = self._legs.waypoints_m[route[: K + 1]]
-        radius, lead_s = 0.5 * self._radius_m[route[: K + 1]], self._shape.lead_s
+        radius, lead_s = self._near_enough_m[route[: K + 1]], self._shape.lead_s
         if after is None:  # at home it has to stand still
             aims = np.vstack([aims, self._legs.starts_m[uas]])
             radius, lead_s = np.append(radius, 0.0), 0.0
@@ -140,11 +142,15 @@ class OrderGuide:
         # work, since an order that waits has no reason to be quick with the rest
         wanted, opens = swarm.uncovered.copy(), np.zeros(len(self._weight))
         blocked = list(self._around.blocked_waypoints(swarm))
-        if self._order is None or self._order.seconds.max() > _WAIT_WHEN_LEFT_S:
+        if self._order is not None and self._order.seconds.max() < _WAIT_WHEN_LEFT_S:
+            self._waits = True
+        if not self._waits:
             wanted[blocked] = False
         if not wanted.any():
             wanted = swarm.uncovered
         opens[blocked] = _WAIT_S
+        self._near_enough_m = 0.5 * self._radius_m
+        self._near_enough_m[blocked] = _WAITING_M
         return Task(
             open_waypoints=np.flatnonzero(wanted),
             first_s=first_s,

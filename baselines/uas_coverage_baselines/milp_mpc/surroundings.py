@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks import coverable
+from uas_coverage_baselines.milp_mpc.braking import BRAKING_S
 from uas_coverage_baselines.milp_mpc.energy import dod_per_s, seconds_home
 from uas_coverage_baselines.milp_mpc.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem, Target, Weights
@@ -155,11 +156,12 @@ class Surroundings:
     ) -> PlanningProblem:
         """What is seen now, about the given waypoints, which are the scenario's rows."""
         options, names = self._options, swarm.active
+        obstacles = self._within_reach(swarm)
         rows = [swarm.names.index(name) for name in names]
         x0 = swarm.x[rows]
         uas = [self._uas[name] for name in names]
         radius = np.array([u.radius_m for u in uas])
-        fixed = np.array([o.safe_distance_m for o in self.scenario.obstacles])
+        fixed = np.array([self.scenario.obstacles[o].safe_distance_m for o in obstacles])
         moving = np.array([o.safe_distance_m for o in self.scenario.moving_obstacles])
         vehicles = tuple(self._vehicles[name] for name in names)
         return PlanningProblem(
@@ -173,7 +175,7 @@ class Surroundings:
             horizon=options.horizon,
             fence=self.scenario.fence,
             fence_margin_m=self.scenario.geofence.margin_m + min(options.margin_m, 0.1),
-            obstacles=self._obstacles,
+            obstacles=tuple(self._obstacles[o] for o in obstacles),
             obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
             moving=self._predicted(swarm),
             moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
@@ -193,6 +195,27 @@ class Surroundings:
             obstacle_sides=options.obstacle_sides,
             waypoint_sides=options.waypoint_sides,
         )
+
+    def _within_reach(self, swarm: SwarmState) -> list[int]:
+        """Obstacles that some UAS could come near, within the horizon or braking after it.
+
+        By boxes: whoever flies straight at full speed all the time does not get to the others.
+        """
+        near_m = max(u.radius_m for u in self.scenario.uas) + self._options.margin_m
+        result = []
+        rows = [swarm.names.index(name) for name in swarm.active]
+        speed = [self._vehicles[name].limits.v_xy_max_mps for name in swarm.active]
+        # at most: the corners of the speed's polygon, and what a UAS flies while it brakes
+        way_m = 1.1 * np.array(speed) * (self.horizon_s + BRAKING_S)
+        for o, (obstacle, (_, hull)) in enumerate(
+            zip(self.scenario.obstacles, self._obstacles, strict=True)
+        ):
+            low, high = hull.vertices_m.min(axis=0)[:2], hull.vertices_m.max(axis=0)[:2]
+            here = swarm.x[rows, 0:2]
+            apart = np.linalg.norm(np.maximum(np.maximum(low - here, here - high), 0.0), axis=1)
+            if (apart <= way_m + near_m + obstacle.safe_distance_m).any():
+                result.append(o)
+        return result
 
     def _predicted(self, swarm: SwarmState) -> tuple[MovingHull, ...]:
         steps = np.arange(self._options.horizon + 1)[:, None] * self.dt_s

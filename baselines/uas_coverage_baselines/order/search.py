@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 # what turning at a waypoint costs, in times to fly its radius: a flight that turns cuts through
 # the sphere, but brakes. Calibrated on flights of `milp-mpc-guided` past spheres of 15 m at 12 m/s
 _TURN_DEG = np.array([0.0, 45.0, 90.0, 135.0, 180.0])
-_TURN_RADII = np.array([0.0, 0.2, 0.4, 0.6, 1.2])
+_TURN_RADII = np.array([0.0, -0.3, -0.45, 0.1, 1.5])
 _TURN_STEPS = 256
 _TURN_OF_COSINE = np.interp(
     np.degrees(np.arccos(np.linspace(-1.0, 1.0, _TURN_STEPS + 1))), _TURN_DEG, _TURN_RADII
@@ -46,7 +46,7 @@ class Effort:
     hottest_s: float = 4.0
     coldest_s: float = 0.05
     window: int = 0
-    total_weight: float = 0.25
+    total_weight: float = 0.4
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,8 @@ def improved(task: Task, order: Order, effort: Effort, seed: int) -> Order:
     wanted = np.zeros(W, bool)
     wanted[task.open_waypoints] = True
     for u, route in enumerate((*order.routes, order.left_out)):
-        kept = [w for w in route if wanted[w]]
+        grounded = u < U and task.budget_s[u] == -np.inf
+        kept = [w for w in route if wanted[w] and not grounded]
         wanted[kept] = False
         routes[u, : len(kept)] = kept
         lengths[u] = len(kept)
@@ -191,7 +192,9 @@ def _cost_s(task, seconds, left_out, n_left_out, total_weight):
     longest, cost = 0.0, 0.0
     for u in range(len(seconds)):
         longest = max(longest, seconds[u])
-        cost += total_weight * seconds[u] + _OVERTIME * max(seconds[u] - budget[u], 0.0)
+        cost += total_weight * seconds[u]
+        if seconds[u] > max(budget[u], 0.0):  # who may not fly costs nothing where it stays
+            cost += _OVERTIME * (seconds[u] - budget[u])
     for k in range(n_left_out):
         cost += _LEFT_OUT_S * weight[left_out[k]]
     return cost + longest
@@ -227,6 +230,8 @@ def _insert_missing(task, routes, lengths, missing, total_weight):
                 seconds[u] = old_s
                 if cost < best:
                     best, best_u, best_at, best_s = cost, u, at, new_s
+        if best_u < 0:  # nobody may fly
+            continue
         _put_in(routes[best_u], lengths[best_u], best_at, waypoint)
         lengths[best_u] += 1
         seconds[best_u] = best_s

@@ -31,7 +31,7 @@ class Task:
         neighbours: (W, K) near waypoints of each, nearest first.
         weight: (W,) worth of a waypoint.
         not_before_s: (W,) from now on; 0 where the waypoint can be visited at any time.
-        budget_s: (U,) how long each UAS may fly.
+        budget_s: (U,) how long each UAS may fly; -inf where it does not fly any more (its `idle_s` is 0).
     """
 
     open_waypoints: NDArray[np.int64]

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.milp import ABSENT, Columns, Milp
+from uas_coverage_baselines.milp_mpc.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
 from uas_coverage_env.geometry import closed_cylinder_faces
 
@@ -281,14 +281,4 @@ def from_each_other(problem: PlanningProblem) -> Iterator[Separation]:
         -(behind[first] + ahead[second]),
         ahead[first] + behind[second],
         problem.prune,
-    )
-
-
-def binary_columns(milp: Milp, separation: Separation) -> tuple[Columns, Columns] | None:
-    """(G, N+1, F) `relaxed` and (G, N, F) `crossed` columns; None where all is decided."""
-    if not separation.undecided.any():
-        return None
-    return (
-        milp.columns(f"{separation.name}.relaxed"),
-        milp.columns(f"{separation.name}.crossed"),
     )

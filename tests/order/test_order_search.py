@@ -1,0 +1,223 @@
+"""The order search: what an order must keep, and the optimum where it can be enumerated."""
+
+import math
+from dataclasses import replace
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
+from uas_coverage_baselines.order import search as search_module
+
+SOME = Effort(20_000)
+seeds = st.integers(0, 10_000)
+few = settings(max_examples=15, deadline=None, derandomize=True)
+
+
+def task(seed=0, waypoints=8, uas=2, **changes):
+    """Random places in 300 m; free legs at the Euclidean distance over the speed."""
+    rng = np.random.default_rng(seed)
+    places = np.column_stack([rng.uniform(0.0, 300.0, (waypoints, 2)), np.full(waypoints, -20.0)])
+    here, start = rng.uniform(0.0, 300.0, (2, uas, 2))
+    speed = np.array([12.0, 9.0, 10.0])[:uas]
+    apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
+    made = Task(
+        open_waypoints=np.arange(waypoints),
+        first_s=np.linalg.norm(here[:, None] - places[None, :, :2], axis=2) / speed[:, None],
+        between_s=apart[None] / speed[:, None, None],
+        kind=np.arange(uas),
+        home_s=np.linalg.norm(start[:, None] - places[None, :, :2], axis=2) / speed[:, None] + 4.0,
+        idle_s=np.linalg.norm(here - start, axis=1) / speed,
+        position_m=here,
+        velocity_mps=rng.uniform(-5.0, 5.0, (uas, 2)),
+        speed_mps=speed,
+        acceleration_mps2=np.full(uas, 3.0),
+        start_m=start,
+        waypoints_m=places,
+        turn_s=15.0 / speed[:, None] * np.ones(waypoints),
+        neighbours=np.argsort(apart, axis=1, kind="stable")[:, 1:],
+        weight=np.ones(waypoints),
+        not_before_s=np.zeros(waypoints),
+        budget_s=np.full(uas, 1000.0),
+    )
+    return replace(made, **changes)
+
+
+def turn(a, b, c):
+    """Cost in radii of turning at b, by the search's own table."""
+    inward, onward = np.subtract(b, a), np.subtract(c, b)
+    length = math.hypot(*inward) * math.hypot(*onward)
+    if length < 1e-9:
+        return 0.0
+    angle = math.degrees(math.acos(max(-1.0, min(1.0, float(inward @ onward) / length))))
+    return float(np.interp(angle, search_module._TURN_DEG, search_module._TURN_RADII))
+
+
+def seconds_of(task, u, route):
+    """Flight time of a route, as the docstrings say, in plain Python."""
+    if not len(route):
+        return float(task.idle_s[u])
+    places = [task.position_m[u], *task.waypoints_m[list(route), :2], task.start_m[u]]
+    towards = places[1] - places[0]
+    wanted = task.speed_mps[u] * towards / math.hypot(*towards)
+    lost = task.velocity_mps[u] - wanted
+    time = float(task.first_s[u, route[0]])
+    time += float(lost @ lost) / (2.0 * task.acceleration_mps2[u] * task.speed_mps[u])
+    time = max(time, task.not_before_s[route[0]])
+    for k, w in enumerate(route):
+        time += task.turn_s[u, w] * turn(*places[k : k + 3])
+        if k + 1 < len(route):
+            time += task.between_s[task.kind[u], w, route[k + 1]]
+            time = max(time, task.not_before_s[route[k + 1]])
+    return float(time + task.home_s[u, route[-1]])
+
+
+def cost_of(task, seconds, left_out, total_weight):
+    """What the search minimises, from everybody's seconds."""
+    overtime = sum(max(s - b, 0.0) for s, b in zip(seconds, task.budget_s, strict=True))
+    left = sum(task.weight[w] for w in left_out)
+    return (
+        max(0.0, *seconds)
+        + total_weight * sum(seconds)
+        + search_module._OVERTIME * overtime
+        + search_module._LEFT_OUT_S * left
+    )
+
+
+def cheapest(task, total_weight):
+    """The cost of the best order, all of which are tried; nothing is left out."""
+    n = task.n_waypoints
+    best_s = [{} for _ in range(task.n_uas)]
+    for u, chosen in product(range(task.n_uas), product((False, True), repeat=n)):
+        mine = [w for w in range(n) if chosen[w]]
+        best_s[u][frozenset(mine)] = min(seconds_of(task, u, p) for p in permutations(mine))
+    everything = frozenset(range(n))
+    if task.n_uas == 1:
+        return cost_of(task, [best_s[0][everything]], (), total_weight)
+    return min(
+        cost_of(task, [s, best_s[1][everything - mine]], (), total_weight)
+        for mine, s in best_s[0].items()
+    )
+
+
+def visits(order):
+    return sorted(np.concatenate([*order.routes, order.left_out]).tolist())
+
+
+@few
+@given(seeds, st.integers(1, 30), st.integers(1, 3))
+def test_every_open_waypoint_is_visited_once_or_left_out(seed, waypoints, uas):
+    rng = np.random.default_rng(seed)
+    wanted = np.flatnonzero(rng.random(waypoints) < 0.7)
+    tight = rng.uniform(20.0, 120.0, uas)
+    found = improved(
+        task(seed, waypoints, uas, open_waypoints=wanted, budget_s=tight),
+        no_order(uas),
+        Effort(3000),
+        seed,
+    )
+    assert visits(found) == wanted.tolist()
+
+
+@few
+@given(seeds, st.integers(0, 4000), st.sampled_from([0, 3]))
+def test_an_order_is_never_worse_than_the_one_it_starts_from(seed, moves, window):
+    problem = task(seed, 15)
+    before = improved(problem, no_order(2), Effort(0), 0)
+    after = improved(problem, before, Effort(moves, window=window), seed)
+    assert after.cost_s <= before.cost_s + 1e-9
+
+
+@few
+@given(seeds)
+def test_the_same_arguments_give_the_same_order(seed):
+    problem = task(seed, 20)
+    one, two = (improved(problem, no_order(2), Effort(5000), 7) for _ in range(2))
+    assert [r.tolist() for r in one.routes] == [r.tolist() for r in two.routes]
+    assert one.cost_s == two.cost_s
+
+
+@few
+@given(seeds, st.integers(1, 3))
+def test_seconds_and_cost_are_those_of_the_routes(seed, uas):
+    opens = np.where(np.arange(8) % 3 == 0, 40.0, 0.0)
+    problem = task(seed, 8, uas, not_before_s=opens)
+    found = improved(problem, no_order(uas), Effort(2000), seed)
+    alone = [seconds_of(problem, u, route) for u, route in enumerate(found.routes)]
+    assert found.seconds == pytest.approx(alone, abs=0.2)  # turns are tabulated
+    total = Effort(0).total_weight
+    exact = cost_of(problem, found.seconds, found.left_out, total)
+    assert found.cost_s == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize(("seed", "waypoints", "uas"), [(0, 7, 1), (1, 7, 2), (2, 6, 2)])
+def test_the_search_finds_the_optimum_of_all_orders(seed, waypoints, uas):
+    problem = task(seed, waypoints, uas)
+    effort = Effort(60_000)
+    found = min(improved(problem, no_order(uas), effort, s).cost_s for s in range(3))
+    assert found == pytest.approx(cheapest(problem, effort.total_weight), abs=0.3)
+
+
+@few
+@given(seeds, st.floats(25.0, 35.0))
+def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
+    problem = task(seed, 12)
+    problem = replace(problem, budget_s=np.maximum(budget_s, problem.idle_s))
+    found = improved(problem, no_order(2), SOME, seed)
+    # so little overtime is cheaper than a waypoint; the guide's reserve is far more
+    slight_s = search_module._LEFT_OUT_S / search_module._OVERTIME
+    assert (found.seconds <= problem.budget_s + slight_s).all()
+    assert len(found.left_out)
+
+
+def test_a_uas_that_may_not_fly_gets_nothing():
+    problem = task(3, 10, budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
+    found = improved(problem, no_order(2), SOME, 0)
+    assert len(found.routes[1]) == 0
+    assert sorted(found.routes[0]) == list(range(10))
+
+
+def test_a_lost_uass_waypoints_go_to_the_others():
+    problem = task(3, 10)
+    before = improved(problem, no_order(2), SOME, 0)
+    assert len(before.routes[1])
+    lost = replace(problem, budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
+    after = improved(lost, before, SOME, 0)
+    assert sorted(after.routes[0]) == list(range(10))
+
+
+def test_a_waypoint_that_opens_late_is_waited_for():
+    problem = task(4, 1, 1)
+    opens = 40.0
+    late = replace(problem, not_before_s=np.array([opens]))
+    found = improved(late, no_order(1), Effort(100), 0)
+    back = late.home_s[0, 0] + late.turn_s[0, 0] * turn(
+        late.position_m[0], late.waypoints_m[0, :2], late.start_m[0]
+    )
+    assert found.seconds[0] == pytest.approx(opens + back, abs=0.2)
+
+
+def test_visited_waypoints_vanish_and_new_ones_are_inserted():
+    problem = task(5, 10)
+    before = improved(replace(problem, open_waypoints=np.arange(8)), no_order(2), SOME, 0)
+    now = np.array([1, 2, 4, 5, 7, 8, 9])
+    after = improved(replace(problem, open_waypoints=now), before, Effort(0), 0)
+    assert visits(after) == now.tolist()
+    for old, new in zip(before.routes, after.routes, strict=True):
+        assert [w for w in old if w in now] == [w for w in new if w < 8]
+
+
+def test_with_nothing_open_everybody_goes_home():
+    problem = task(6, 5, open_waypoints=np.zeros(0, np.int64))
+    found = improved(problem, improved(task(6, 5), no_order(2), SOME, 0), SOME, 0)
+    assert visits(found) == []
+    assert found.seconds == pytest.approx(problem.idle_s)
+
+
+def test_one_waypoint_alone_goes_to_somebody():
+    found = improved(task(7, 1), no_order(2), SOME, 0)
+    assert isinstance(found, Order)
+    assert visits(found) == [0]
+    assert not len(found.left_out)
