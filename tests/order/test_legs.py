@@ -121,9 +121,11 @@ def test_a_single_waypoint_has_no_neighbours():
 
 
 def test_every_kind_of_vehicle_has_its_own_times():
-    made = scenario(FIELD, ("s500_v2", "hexacopter", "s500_v2"))
+    heights = [(100.0, 100.0, -5.0), (101.0, 100.0, -55.0)]
+    made = scenario(heights, ("s500_v2", "hexacopter", "s500_v2"), radius_m=4.0)
     legs = Legs(made)
     assert legs.kind.tolist() == [0, 1, 0]
-    quad, hexa = (vehicle.limits.v_xy_max_mps for vehicle in made.vehicles[:2])
-    assert quad != hexa
-    assert legs.between_s[0] * quad == pytest.approx(legs.between_s[1] * hexa)
+    for row, vehicle in enumerate(made.vehicles[:2]):
+        climb_s = 48.0 / vehicle.limits.v_up_max_mps
+        assert legs.between_s[row, 0, 1] == pytest.approx(climb_s)
+    assert legs.home_s[0].tolist() != legs.home_s[1].tolist()

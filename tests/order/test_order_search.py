@@ -161,10 +161,26 @@ def test_the_search_finds_the_optimum_of_all_orders(seed, waypoints, uas):
 
 
 @few
-@given(seeds, st.floats(25.0, 35.0))
+@given(seeds, st.floats(25.0, 45.0))
 def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
-    problem = task(seed, 12)
-    problem = replace(problem, budget_s=np.maximum(budget_s, problem.idle_s))
+    angles = np.arange(8) * np.pi / 4
+    ring = 120.0 * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(8)])
+    apart = np.linalg.norm(ring[:, None] - ring, axis=2)
+    problem = task(
+        seed,
+        8,
+        waypoints_m=ring,
+        position_m=np.zeros((2, 2)),
+        start_m=np.zeros((2, 2)),
+        first_s=np.full((2, 8), 10.0),
+        home_s=np.full((2, 8), 14.0),
+        between_s=np.stack([apart / 12.0] * 2),
+        idle_s=np.zeros(2),
+        velocity_mps=np.zeros((2, 2)),
+        turn_s=np.zeros((2, 8)),
+        neighbours=np.argsort(apart, axis=1, kind="stable")[:, 1:],
+        budget_s=np.full(2, budget_s),
+    )
     found = improved(problem, no_order(2), SOME, seed)
     # so little overtime is cheaper than a waypoint; the guide's reserve is far more
     slight_s = search_module._LEFT_OUT_S / search_module._OVERTIME

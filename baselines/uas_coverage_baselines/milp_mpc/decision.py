@@ -91,7 +91,7 @@ def decide(
             ):
                 search.collect(uas, plans)
         else:
-            found = side_by_side.map(lambda task: search.refined(*task, NARROW), tasks)
+            found = side_by_side.map(lambda task: search.refined(task[0], task[1], NARROW), tasks)
             for (uas, _), plan in zip(tasks, found, strict=True):
                 search.collect(uas, [plan])
         standby = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
@@ -101,7 +101,7 @@ def decide(
             if not search.has_plan(uas)
             for task in _last_resorts(problem, uas, tasks, standby[uas])
         ]
-        found = side_by_side.map(lambda task: search.refined(*task, WIDE), tasks)
+        found = side_by_side.map(lambda task: search.refined(task[0], task[1], WIDE), tasks)
         for (uas, _), plan in zip(tasks, found, strict=True):
             search.collect(uas, [plan])
     search.combine(standby)
@@ -208,10 +208,12 @@ class _Search:
                 break
             flight = own.pop(0) if own else as_flight(self._own[uas].problem, 0, plans[0])
             plan = self.refined(uas, flight, ALONG, left_s)
+            gained = plan is not None and (
+                not plans or plan.objective < plans[0].objective - _WORTH_POLISHING
+            )
             if plan is not None:
-                gained = not plans or plan.objective < plans[0].objective - _WORTH_POLISHING
                 plans = sorted([plan, *plans], key=lambda one: one.objective)
-            if not own and (not plans or (plan is not None and not gained)):
+            if not own and not gained:
                 break
         return plans
 

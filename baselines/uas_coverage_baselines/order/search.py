@@ -293,7 +293,7 @@ def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window,
         kind = rng.random()
         if s != r:
             if kind < 0.6 or r == n_uas or s == n_uas:  # relocate a chain
-                chain = 1 if r == n_uas or s == n_uas else 1 + rng.integers(0, 3)
+                chain = 1 if r == n_uas else 1 + rng.integers(0, 3)
                 chain = min(chain, lengths[r] - i)
                 backward, after = rng.random() < 0.5, rng.integers(0, 2)
                 n_one, n_two = lengths[r] - chain, lengths[s] + chain

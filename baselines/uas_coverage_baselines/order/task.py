@@ -31,7 +31,7 @@ class Task:
         neighbours: (W, K) near waypoints of each, nearest first.
         weight: (W,) worth of a waypoint.
         not_before_s: (W,) from now on; 0 where the waypoint can be visited at any time.
-        budget_s: (U,) how long each UAS may fly; -inf where it does not fly any more (its `idle_s` is 0).
+        budget_s: (U,) how long each UAS may fly; -inf (with `idle_s` 0) where it may not at all.
     """
 
     open_waypoints: NDArray[np.int64]

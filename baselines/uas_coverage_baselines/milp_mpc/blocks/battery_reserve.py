@@ -13,7 +13,7 @@ from uas_coverage_env.vehicle import DELTA_THRUST, DOD, U_TH, LinearModel
 
 FloatArray = NDArray[np.float64]
 _BATTERY = [DOD, U_TH]
-_ALLOWANCE_S = 8.0  # braking to a hover where the plan ends, and turning
+_ALLOWANCE_S = 16.0  # braking to a hover where the plan ends, and turning
 
 
 class BatteryReserve:
