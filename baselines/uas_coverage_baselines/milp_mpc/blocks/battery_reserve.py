@@ -22,8 +22,8 @@ class BatteryReserve:
     The paper bounds DoD by the cutoff and leaves coming home to the return mode's threshold
     (Sec. III-C.6); this is the terminal set that makes DoD_max a constraint. The flight home is
     timed at nearly full speed with a detour, the descent and the landing one after the other
-    (`energy`), the horizontal norm from above by H_P faces (eq. (const_Vec_ub)): a row per face and sense of
-    the climb,
+    (`energy`), the horizontal norm from above by H_P faces (eq. (const_Vec_ub)): a row per face and
+    sense of the climb,
 
         DoD(N) / rate + f · (p(N) - p_home) <= DoD_max / rate - landing - allowance + short,
 
