@@ -112,7 +112,7 @@ def test_the_rows_of_the_terminal_cost(request):
     problem, _ = with_tour(horizon=2, count=2, prune=False)
     milp, _ = written(problem, TimeToGo())
     heading = """
-        Time to go along a tour of two waypoints and home: the distance to the next aim, in
+        Time to go along a tour, faces of eq. (const_Vec_ub): the distance to the next aim, in
         seconds, from where the UAS is one second after the horizon; what follows it as a cost of
         Phi(N); and visits in order.
     """
