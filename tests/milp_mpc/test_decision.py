@@ -178,7 +178,7 @@ def test_who_gets_no_plan_flies_the_rest_of_its_way_out(problem, by_nodes, nothi
 def test_where_no_team_holds_who_can_leaves_standby(problem, by_nodes, monkeypatch):
     monkeypatch.setattr(decision, "teams", lambda problem, pools, keep: [])
     search = decision._Search(problem, BY_NODES, time.perf_counter())
-    search.formulate()
+    search.formulate(range(2))
     for uas in range(2):
         alone = dataclasses.replace(
             by_nodes,

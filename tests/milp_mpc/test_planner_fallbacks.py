@@ -257,9 +257,9 @@ def test_a_decision_is_told_what_is_left_of_the_way_out_and_when_its_time_began(
 ):
     told = []
 
-    def decide(problem, *rest, out, began):
+    def decide(problem, *rest, out, began, turns):
         told.append((problem, out, began))
-        return decide_in_earnest(problem, *rest, out=out, began=began)
+        return decide_in_earnest(problem, *rest, out=out, began=began, turns=turns)
 
     monkeypatch.setattr(planner_module, "decide", decide)
     world, made = World(garden), planner(garden)

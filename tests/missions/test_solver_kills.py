@@ -151,3 +151,49 @@ def test_without_time_everybody_hovers_at_the_start(tmp_path, town):
     assert all(decision.fallback for decision in flight.decisions)
     starts = flight.x[0, :, :3]
     assert np.abs(flight.x[:, :, :3] - starts).max() < 0.2
+
+
+def with_little_charge(scenario, seconds):
+    """The scenario with batteries for about so many seconds of flight."""
+    data = scenario.model_dump(by_alias=True)
+    for uas in data["uas"]:
+        uas["dod_max"] = 1.0 - uas["soc_0"] + 0.00085 * seconds
+    return type(scenario).model_validate(data)
+
+
+@pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
+@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
+def test_where_the_solver_is_dead_for_good_everybody_comes_home(
+    monkeypatch, tmp_path, town, planner, dynamics
+):
+    short = with_little_charge(town, 110.0)
+    dead = {step: FAILURES["no solution"] for step in range(14, 400)}
+    killed = Killed(load_planner(planner, QUICK), dead, monkeypatch)
+    flight = rollout(short, killed, dynamics=dynamics)
+    flight.save(tmp_path / "flight")
+    tolerance = {} if dynamics == "lpv" else {"plan_tolerance_m": 1.0}
+    report = independent_check.check(tmp_path / "flight", **tolerance)
+    assert report.problems == []
+    assert report.breaches == 0
+    assert report.all_home
+    assert all(decision.fallback for decision in flight.decisions[14:])
+    away_m = np.linalg.norm(flight.x[14, :, :3] - flight.x[0, :, :3], axis=1)
+    assert away_m.max() > 20.0, "a flight that stays at home proves nothing"
+
+
+@pytest.mark.parametrize("kind", [RuntimeError, MemoryError])
+def test_a_solver_that_raises_does_not_end_the_flight(monkeypatch, tmp_path, town, kind):
+    def raising(*args):
+        raise kind("out of order")
+
+    def broken(*args, **limits):
+        with monkeypatch.context() as patched:
+            patched.setattr(highs.highspy.Highs, "run", raising)
+            return solve(*args, **limits)
+
+    solve = highs.solve
+    failures = {step: broken for step in range(60) if step % 6 in (3, 4)}
+    planner = Killed(load_planner("milp-mpc", QUICK), failures, monkeypatch)
+    flight = rollout(town, planner, max_steps=15)
+    judged(flight, tmp_path / "flight")
+    assert [decision.fallback for decision in flight.decisions] == planner.failed

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import typer
 
-from uas_coverage_env.cli import planners, run, scenarios
+from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
+from uas_coverage_env.cli.outside import add_outside_commands
 from uas_coverage_env.flight import PlannerError
 from uas_coverage_env.strict_toml import InputError
 
@@ -35,8 +36,12 @@ def describe(context: typer.Context) -> None:
 
 
 app.command("run")(run.run)
+app.command("compare")(compare.compare)
 app.command("planners")(planners.planners)
+app.command("replay")(replay.replay)
+app.command("figure")(figure.figure)
 app.add_typer(scenarios.app, name="scenarios")
+add_outside_commands(app)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,5 +1,6 @@
 """`uas-coverage run`: fly one mission and keep it."""
 
+import re
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
@@ -66,7 +67,9 @@ def run(
     """
     mission = loaded(scenario)
     player = load_planner(planner, _options(option or ()))
-    directory = out or _free_directory(f"{mission.name}-{planner}-{seed}")
+    # KIND:ARGUMENT may hold a path
+    player_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")
+    directory = out or _free_directory(f"{mission.name}-{player_name}-{seed}")
     check_directory(directory, overwrite=overwrite)
 
     screen = console()

@@ -2,6 +2,7 @@
 
 from uas_coverage_env.env.actions import ACTION_NAMES, HOME_CHOICE
 from uas_coverage_env.env.aec import env, raw_env
+from uas_coverage_env.env.batch import CoverageBatch
 from uas_coverage_env.env.layout import (
     K_WAYPOINTS,
     OBSERVATION_LAYOUT,
@@ -10,11 +11,13 @@ from uas_coverage_env.env.layout import (
     observation_bounds,
     observation_columns,
 )
+from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.env.parallel import CoverageParallelEnv
+from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
 from uas_coverage_env.env.rewards import REWARD_TERMS, rewards_table
 from uas_coverage_env.env.single import CoverageSwarmEnv
-from uas_coverage_env.env.vector import vector_env
+from uas_coverage_env.env.vector import CoverageVectorEnv
 
 __all__ = [
     "ACTION_NAMES",
@@ -25,8 +28,12 @@ __all__ = [
     "OBSERVATION_SIZE",
     "PETTINGZOO_ID",
     "REWARD_TERMS",
+    "CoverageBatch",
     "CoverageParallelEnv",
     "CoverageSwarmEnv",
+    "CoverageVectorEnv",
+    "Observer",
+    "ScenarioPool",
     "env",
     "layout_table",
     "observation_bounds",
@@ -34,5 +41,4 @@ __all__ = [
     "raw_env",
     "register_environments",
     "rewards_table",
-    "vector_env",
 ]

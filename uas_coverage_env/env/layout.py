@@ -38,6 +38,17 @@ CROWD = 8
 MARGIN = 0.3
 """Scale of energy margins, as depth of discharge."""
 
+SCALES = {
+    "nearby_m": NEARBY_M,
+    "ray_m": RAY_M,
+    "height_m": HEIGHT_M,
+    "far_m": FAR_M,
+    "crowd_m": CROWD_M,
+    "crowd": float(CROWD),
+    "margin": MARGIN,
+}
+"""All of the scales above by name: a policy that was trained with others sees another world."""
+
 
 @dataclass(frozen=True)
 class Feature:

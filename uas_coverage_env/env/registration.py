@@ -20,7 +20,7 @@ def register_environments() -> None:
         gymnasium.register(
             GYMNASIUM_ID,
             entry_point="uas_coverage_env.env:CoverageSwarmEnv",
-            vector_entry_point="uas_coverage_env.env:vector_env",
+            vector_entry_point="uas_coverage_env.env:CoverageVectorEnv",
         )
     if hasattr(pettingzoo, "register"):
         if PETTINGZOO_ID not in pettingzoo.parallel_registry:

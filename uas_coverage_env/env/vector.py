@@ -1,26 +1,332 @@
-"""Many single-agent environments in one object (Gymnasium)."""
+"""Many missions as one environment: one agent per mission flies its whole swarm (Gymnasium)."""
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from gymnasium.vector import SyncVectorEnv
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
 
-from uas_coverage_env.env.single import CoverageSwarmEnv
+from uas_coverage_env.env.batch import CoverageBatch, masks_of
+from uas_coverage_env.env.batch_kernel import SWARM_COVERED
+from uas_coverage_env.env.kernel import CONTACT, ENERGY, FILTERED, RETURNING, STATUS
+from uas_coverage_env.env.layout import observation_bounds
+from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.screen import RENDER_FPS, Screen
+from uas_coverage_env.scenario import Scenario
+
+_MODES = {
+    AutoresetMode.NEXT_STEP: "next_step",
+    AutoresetMode.SAME_STEP: "same_step",
+    AutoresetMode.DISABLED: "disabled",
+}
+_OF_EACH_MISSION = ("action_masks", "scenario", "swarm_state")
+
+Arrays = tuple[
+    NDArray[np.float32],
+    NDArray[np.float64],
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+    dict[str, Any],
+]
 
 
-def vector_env(num_envs: int = 1, **settings: Any) -> SyncVectorEnv:
-    """Copies of `CoverageSwarmEnv`, stepped one after the other.
+class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
+    """`num_envs` missions of `CoverageSwarmEnv`, flown by one compiled call.
 
-    A version that steps all copies in one compiled loop will take its place; spaces, order and
-    results stay.
+    Spaces, order, observations, rewards, terminations and truncations are those of
+    `SyncVectorEnv` over copies of `CoverageSwarmEnv`, bit for bit.
+
+    Scenarios:
+        `scenario` may be a sequence of scenarios, each with any number of UAS, waypoints and
+        obstacles. Every mission begins with a draw from it that depends on the seed of its
+        sub-environment and its number since then alone; `infos["scenario"]` says which it is.
+        `reset(options={"scenario": indices})` flies these instead. Where fleets differ, the single
+        spaces have room for the largest: the observation of a UAS that a mission does not have is
+        zero, and its part of an action has no effect.
+
+    Autoreset:
+        `autoreset_mode` as Gymnasium defines it: `NEXT_STEP` (default), `SAME_STEP` (`final_obs`
+        and `final_info` in the infos), `DISABLED` (`reset(options={"reset_mask": mask})`; a step
+        with a mission that has ended raises `ResetNeeded`).
+
+    Infos:
+        Arrays with the number of the sub-environment as first axis, each with its mask `_name`:
+        `reward_terms` (a dictionary of these), `covered` and `energy_Wh` of the swarm, `scenario`,
+        `action_mask` with the waypoint action; and of all UAS (num_envs, U): `status` (index in
+        `world.STATUS_NAMES`, -1 where a mission has no such UAS), `contact` (index in
+        `world.CONTACT_NAMES`), `returning`, and `filtered` with the safety filter.
 
     Args:
         num_envs: How many.
-        **settings: See `CoverageSwarmEnv`.
+        scenario: A scenario, its name or file, or a sequence of these.
+        action: See `CoverageSwarmEnv`, also the next five.
+        dynamics: "lpv" or "nonlinear".
+        return_mode: Bring every UAS home in time.
+        safety_filter: Keep commands clear of harm.
+        reward_weights: Reward term -> weight.
+        max_cycles: Time limit of the missions in steps.
+        autoreset_mode: An `AutoresetMode`, or its value.
+        threads: How many of numba's threads share the missions, see `CoverageBatch`.
+        copy: Whether observations are arrays of their own. False: they are overwritten by the step
+            after the next, which spares a copy.
+        render_mode: None or "rgb_array".
 
     Raises:
-        ValueError: There would be none.
+        ValueError: An argument is none of what is allowed; says what is.
     """
-    whole = isinstance(num_envs, int) and not isinstance(num_envs, bool)
-    if not whole or num_envs < 1:
-        raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
-    return SyncVectorEnv([lambda: CoverageSwarmEnv(**settings)] * num_envs)
+
+    metadata: dict[str, Any] = {  # noqa: RUF012  # as Gymnasium declares it
+        "render_modes": ["rgb_array"],
+        "render_fps": RENDER_FPS,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
+        *,
+        action: str = "velocity",
+        dynamics: str = "lpv",
+        return_mode: bool = False,
+        safety_filter: bool = False,
+        reward_weights: Mapping[str, float] | None = None,
+        max_cycles: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int = 1,
+        copy: bool = True,
+        render_mode: str | None = None,
+    ) -> None:
+        mode = AutoresetMode(autoreset_mode)
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode is {render_mode!r}; it is None or 'rgb_array'")
+        self._batch = CoverageBatch(
+            num_envs,
+            scenario,
+            action=action,
+            dynamics=dynamics,
+            return_mode=return_mode,
+            safety_filter=safety_filter,
+            reward_weights=reward_weights,
+            max_cycles=max_cycles,
+            autoreset=_MODES[mode],
+            threads=threads,
+        )
+        self.metadata = {**self.metadata, "autoreset_mode": mode}
+        self.num_envs = self._batch.num_lanes
+        self.render_mode = render_mode
+        self.copy = copy
+        self._same_step = mode == AutoresetMode.SAME_STEP
+        self._all = np.ones(self.num_envs, dtype=np.bool_)
+        self._all.flags.writeable = False
+        self._screens: list[Screen] = []
+        self._drawn_mission = np.full(self.num_envs, -1)
+        self._attributes: dict[str, tuple[Any, ...]] = {}
+        n_uas = self._batch.n_uas
+        low, high = (np.tile(bounds, n_uas) for bounds in observation_bounds())
+        self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
+        self.single_action_space = self._batch.actions.joint_space(n_uas)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def batch(self) -> CoverageBatch:
+        """What flies: states, reports and scenarios as arrays."""
+        return self._batch
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin new missions.
+
+        Args:
+            seed: A number s seeds sub-environment i with s + i; or one seed for each, None where
+                it goes on drawing as it did. Only the draw of scenarios is random.
+            options: `reset_mask`, (num_envs,) of bool, which to begin anew; `scenario`, (num_envs,)
+                indices of the scenarios to fly. Others are ignored.
+
+        Raises:
+            ValueError: An argument is wrong.
+        """
+        if isinstance(seed, int):
+            super().reset(seed=seed)
+        options = options or {}
+        mask = options.get("reset_mask")
+        if mask is None:
+            mask = self._all
+        elif not isinstance(mask, np.ndarray) or not mask.any():
+            raise ValueError(f"reset_mask is {mask!r}; give an array with one true value at least")
+        observation = self._batch.reset(seed, mask=mask, scenarios=options.get("scenario"))
+        self._drawn_mission[mask] = -1
+        self._watch()
+        lanes = self._batch.lanes
+        return self._shown(observation), self._infos(
+            lanes.report, lanes.swarm, lanes.candidates, mask
+        )
+
+    def step(self, actions: NDArray[Any]) -> Arrays:
+        """Fly every mission for one step.
+
+        Args:
+            actions: Of `action_space`.
+
+        Raises:
+            ValueError: An action is invalid; names sub-environment (lane), UAS and value. Nothing
+                has changed.
+            ResetNeeded: `reset` was not called before, or not after a mission ended (`DISABLED`).
+        """
+        observation = self._batch.step(actions)
+        self._watch()
+        lanes = self._batch.lanes
+        infos = self._infos(lanes.report, lanes.swarm, lanes.candidates, self._all)
+        ended = lanes.terminated | lanes.truncated
+        rewards = _row_sums(lanes.swarm)
+        if self._same_step and ended.any():
+            rewards[ended] = _row_sums(lanes.final_swarm[ended])
+            self._add_final(infos, ended)
+        return (
+            self._shown(observation),
+            rewards,
+            lanes.terminated.copy(),
+            lanes.truncated.copy(),
+            infos,
+        )
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """(num_envs, U · choices) the choices that exist now.
+
+        Raises:
+            ValueError: The action is not "waypoint".
+        """
+        if not self._batch.chooses:
+            raise ValueError('only action="waypoint" has masks; the others are continuous')
+        return self._batch.action_masks().reshape(self.num_envs, -1)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """One picture of each mission with "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        return tuple(
+            screen.render(self._batch.swarm_state(lane))
+            for lane, screen in enumerate(self._screens)
+        )
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """What every sub-environment answers, a tuple.
+
+        Args:
+            name: `scenario`, `action_masks`, `swarm_state`, what was set, or what all share.
+            *args: For a function.
+            **kwargs: For a function.
+
+        Raises:
+            AttributeError: There is nothing of this name.
+        """
+        if name in self._attributes:
+            return self._attributes[name]
+        if name in _OF_EACH_MISSION:
+            answer = {
+                "action_masks": lambda: tuple(self.action_masks()),
+                "scenario": lambda: tuple(map(self._batch.scenario_of, range(self.num_envs))),
+                "swarm_state": lambda: tuple(map(self._batch.swarm_state, range(self.num_envs))),
+            }[name]
+            return answer(*args, **kwargs)
+        return (getattr(self, name),) * self.num_envs
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """See `call`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Give every sub-environment an attribute for `get_attr`: a list has one value for each.
+
+        Raises:
+            ValueError: The name belongs to all of them, or the number of values is wrong.
+        """
+        if name in _OF_EACH_MISSION or hasattr(self, name):
+            raise ValueError(f"{name} is shared by all missions; make another environment")
+        if not isinstance(values, list | tuple):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise ValueError(f"{len(values)} values of {name} for {self.num_envs} environments")
+        self._attributes[name] = tuple(values)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Nothing is held that would have to be given back."""
+
+    def _shown(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        flat = observation.reshape(self.num_envs, -1)
+        return flat.copy() if self.copy else flat
+
+    def _infos(
+        self,
+        report: NDArray[np.float64],
+        swarm: NDArray[np.float64],
+        candidates: NDArray[np.int64],
+        mask: NDArray[np.bool_],
+    ) -> dict[str, Any]:
+        """Infos with their masks; zero where the mask is not set."""
+        if not mask.all():
+            report, swarm = report * mask[:, None, None], swarm * mask[:, None]
+        else:
+            swarm = swarm.copy()
+        terms: dict[str, Any] = {}
+        for column, name in enumerate(REWARD_TERMS):
+            terms[name] = swarm[:, column]
+            terms[f"_{name}"] = mask
+        infos = {
+            "reward_terms": terms,
+            "covered": swarm[:, SWARM_COVERED].astype(np.int64),
+            "energy_Wh": swarm[:, ENERGY],
+            "scenario": self._batch.lanes.scenario * mask,
+            "status": report[:, :, STATUS].astype(np.int64),
+            "contact": report[:, :, CONTACT].astype(np.int64),
+            "returning": report[:, :, RETURNING] > 0.0,
+        }
+        if self._batch.filters:
+            infos["filtered"] = report[:, :, FILTERED] > 0.0
+        if self._batch.chooses:
+            masks = masks_of(candidates).reshape(self.num_envs, -1)
+            infos["action_mask"] = (masks & mask[:, None]).astype(np.int8)
+        infos.update({f"_{name}": mask for name in infos})
+        return infos
+
+    def _add_final(self, infos: dict[str, Any], ended: NDArray[np.bool_]) -> None:
+        lanes = self._batch.lanes
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for lane in np.flatnonzero(ended):
+            final_obs[lane] = lanes.final_observation[lane].ravel().copy()
+        infos["final_obs"], infos["_final_obs"] = final_obs, ended
+        infos["final_info"] = self._infos(
+            lanes.final_report, lanes.final_swarm, lanes.final_candidates, ended
+        )
+        infos["_final_info"] = ended
+
+    def _watch(self) -> None:
+        """Remember where the UAS are, for pictures with their paths."""
+        if self.render_mode is None:
+            return
+        batch = self._batch
+        if not self._screens:
+            self._screens = [Screen(batch.scenario_of(0), self.render_mode)] * self.num_envs
+        for lane in range(self.num_envs):
+            if self._drawn_mission[lane] != batch.lanes.mission[lane]:
+                self._drawn_mission[lane] = batch.lanes.mission[lane]
+                self._screens[lane] = Screen(batch.scenario_of(lane), self.render_mode)
+            n_uas = len(batch.scenario_of(lane).uas)
+            self._screens[lane].see(batch.worlds.x[lane, :n_uas, :3])
+
+
+def _row_sums(swarm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rewards: the terms of each row added from left to right, as a single mission does it."""
+    rewards = np.zeros(len(swarm))
+    for term in range(len(REWARD_TERMS)):
+        rewards += swarm[:, term]
+    return rewards

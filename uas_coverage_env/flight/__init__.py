@@ -1,8 +1,15 @@
 """What is kept of a flight: planners by name, the rollout, its record, measures and directory."""
 
 from uas_coverage_env.flight.directory import check_directory
-from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home, summary
-from uas_coverage_env.flight.picture import draw_flight, flight_picture
+from uas_coverage_env.flight.metrics import (
+    accomplished,
+    coverage,
+    covered_at,
+    energy_Wh,
+    home,
+    summary,
+)
+from uas_coverage_env.flight.picture import draw_flight, flight_picture, flight_pictures
 from uas_coverage_env.flight.planner import (
     Assistants,
     AssistedOptions,
@@ -38,10 +45,12 @@ __all__ = [
     "accomplished",
     "check_directory",
     "coverage",
+    "covered_at",
     "describe_planners",
     "draw_flight",
     "energy_Wh",
     "flight_picture",
+    "flight_pictures",
     "home",
     "load_planner",
     "planner_names",

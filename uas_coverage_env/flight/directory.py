@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import io
 import json
+import math
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -133,10 +134,10 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     last = np.zeros(len(index), np.int64)
     for row in rows:
         k, i = _step(row[0], scenario), index[row[1]]
-        x[k, i] = [float(value) for value in row[2 : 2 + N_STATES]]
-        voltage_V[k, i], current_A[k, i] = float(row[-9]), float(row[-8])
+        x[k, i] = [_number(value) for value in row[2 : 2 + N_STATES]]
+        voltage_V[k, i], current_A[k, i] = _number(row[-9]), _number(row[-8])
         mode[k, i] = MODES.index(row[-7])
-        u[k, i] = [float(value) for value in row[first_input : first_input + N_INPUTS]]
+        u[k, i] = [_number(value) for value in row[first_input : first_input + N_INPUTS]]
         covered[k] = int(row[-1])
         last[i] = k
     for i, k in enumerate(last):  # after the end of a UAS its last sample is repeated
@@ -157,7 +158,7 @@ def _moving_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
 
 def _moving_array(text: str) -> NDArray[np.float64]:
     rows = _rows(text, MOVING_COLUMNS)
-    return np.array([[float(value) for value in row[2:]] for row in rows])
+    return np.array([[_number(value) for value in row[2:]] for row in rows])
 
 
 def _plan_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
@@ -169,7 +170,12 @@ def _plan_array(text: str, scenario: Scenario) -> NDArray[np.void]:
     index = {uas.name: i for i, uas in enumerate(scenario.uas)}
     return np.array(
         [
-            (_step(time, scenario), index[name], int(n), tuple(float(value) for value in position))
+            (
+                _step(time, scenario),
+                index[name],
+                int(n),
+                tuple(_number(value) for value in position),
+            )
             for time, name, n, *position in _rows(text, PLAN_COLUMNS)
         ],
         dtype=PLAN_DTYPE,
@@ -215,6 +221,13 @@ def _summary_fields(text: str) -> dict[str, Any]:
 
 def _step(time_s: str, scenario: Scenario) -> int:
     return round(float(time_s) / scenario.dt_s)
+
+
+def _number(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is not finite")
+    return number
 
 
 def _json(data: Any) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LANDED, Flight
+from uas_coverage_env.flight.record import LANDED, LOST, Flight
 
 _J_PER_WH = 3600.0
 
@@ -13,6 +13,19 @@ _J_PER_WH = 3600.0
 def coverage(flight: Flight) -> float:
     """Fraction of the waypoints that the swarm has covered, 0..1."""
     return float(flight.covered[-1] / len(flight.scenario.waypoints))
+
+
+def covered_at(flight: Flight) -> NDArray[np.int64]:
+    """(W,) the sample in which each waypoint was covered; T (one past the last) where never."""
+    positions_m = flight.x[:, :, 0:3]
+    alive = flight.mode < LOST
+    result = np.full(len(flight.scenario.waypoints), len(positions_m))
+    for w, waypoint in enumerate(flight.scenario.waypoints):
+        away_m = np.linalg.norm(positions_m - np.array(waypoint.position_m), axis=2)
+        within = ((away_m <= waypoint.radius_m) & alive).any(axis=1)
+        if within.any():
+            result[w] = within.argmax()
+    return result
 
 
 def energy_Wh(flight: Flight) -> NDArray[np.float64]:

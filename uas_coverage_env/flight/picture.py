@@ -1,11 +1,13 @@
 """The picture of a flight: the map at a sample, with everything flown until then."""
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import picture
+from uas_coverage_env.draw import Picture
+from uas_coverage_env.flight.metrics import covered_at
 from uas_coverage_env.flight.record import LANDED, LOST, Flight
 from uas_coverage_env.world import FLYING, SwarmState
 from uas_coverage_env.world import LANDED as HAS_LANDED
@@ -34,24 +36,30 @@ def flight_picture(
     now = last if step is None else step
     if not 0 <= now <= last:
         raise ValueError(f"step is {step}; the flight has samples 0 to {last}")
-    status = np.full(len(flight.names), FLYING)
-    status[flight.mode[now] == LANDED] = HAS_LANDED
-    status[flight.mode[now] == LOST] = IS_LOST
-    swarm = SwarmState(
-        time_s=now * flight.scenario.dt_s,
-        step=now,
-        names=flight.names,
-        x=flight.x[now],
-        status=status,
-        uncovered=_uncovered(flight, now),
-        home_m=flight.x[0, :, 0:3],
-        moving_position_m=flight.moving_position_m[now],
-        moving_velocity_mps=np.zeros_like(flight.moving_position_m[now]),
-    )
-    paths = flight.x[: now + 1, :, 0:3]
-    return picture(
-        flight.scenario, swarm, paths_m=paths, planned_m=_planned(flight, now), size_px=size_px
-    )
+    return next(flight_pictures(flight, [now], size_px))
+
+
+def flight_pictures(
+    flight: Flight, steps: Iterable[int], size_px: int = _SIZE_PX
+) -> Iterator[NDArray[np.uint8]]:
+    """The maps at several samples, as `flight_picture`; the background is drawn only once.
+
+    Args:
+        flight: the flight.
+        steps: numbers of the samples, each from 0 to `flight.steps`.
+        size_px: side of the square pictures.
+
+    Yields:
+        (size_px, size_px, 3) red, green, blue.
+    """
+    pictures = Picture(flight.scenario, size_px=size_px)
+    covered = covered_at(flight)
+    for now in steps:
+        yield pictures.draw(
+            _swarm(flight, now, uncovered=covered > now),
+            paths_m=flight.x[: now + 1, :, 0:3],
+            planned_m=_planned(flight, now),
+        )
 
 
 def draw_flight(flight: Flight, path: str | Path, step: int | None = None) -> None:
@@ -61,15 +69,22 @@ def draw_flight(flight: Flight, path: str | Path, step: int | None = None) -> No
     Image.fromarray(flight_picture(flight, step)).save(path)
 
 
-def _uncovered(flight: Flight, now: int) -> NDArray[np.bool_]:
-    """(W,) waypoints that no flying UAS has been within reach of until then."""
-    positions = flight.x[: now + 1, :, 0:3]
-    alive = flight.mode[: now + 1] < LOST
-    result = []
-    for waypoint in flight.scenario.waypoints:
-        away = np.linalg.norm(positions - np.array(waypoint.position_m), axis=2)
-        result.append(not bool(((away <= waypoint.radius_m) & alive).any()))
-    return np.array(result)
+def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState:
+    status = np.full(len(flight.names), FLYING)
+    status[flight.mode[now] == LANDED] = HAS_LANDED
+    status[flight.mode[now] == LOST] = IS_LOST
+    return SwarmState(
+        time_s=now * flight.scenario.dt_s,
+        step=now,
+        names=flight.names,
+        x=flight.x[now],
+        reference_mps=np.zeros((len(flight.names), 2)),
+        status=status,
+        uncovered=uncovered,
+        home_m=flight.x[0, :, 0:3],
+        moving_position_m=flight.moving_position_m[now],
+        moving_velocity_mps=np.zeros_like(flight.moving_position_m[now]),
+    )
 
 
 def _planned(flight: Flight, now: int) -> dict[str, NDArray[np.float64]]:

@@ -46,7 +46,8 @@ class Planner(Protocol):
         `options`: the pydantic model it was made with; goes into the record.
 
     A planner that is found by name (entry-point group `uas_coverage.planners`) is a class with an
-    attribute `Options` (see `PlannerOptions`), made as `PlannerClass(options)`.
+    attribute `Options` (see `PlannerOptions`), made as `PlannerClass(options)`; for KIND:ARGUMENT
+    see `registry`.
     """
 
     def reset(self, scenario: Scenario, seed: int) -> None:

@@ -1,4 +1,10 @@
-"""Planners by name: whatever announces itself in the entry-point group `uas_coverage.planners`."""
+"""Planners by name: whatever announces itself in one of two entry-point groups.
+
+`uas_coverage.planners`: a name is one planner, a class made as `PlannerClass(options)`.
+`uas_coverage.planner_kinds`: a name is a kind of which there are many, flown as `KIND:ARGUMENT`;
+    a class made as `PlannerClass(options, argument)`, with a text `argument` on the class that
+    names its argument and on the planner that holds it.
+"""
 
 import sys
 from collections.abc import Mapping
@@ -14,6 +20,7 @@ from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.strict_toml import InputError
 
 GROUP = "uas_coverage.planners"
+KINDS = "uas_coverage.planner_kinds"
 
 
 @dataclass(frozen=True)
@@ -37,41 +44,50 @@ class PlannerDescription:
 
 
 def planner_names() -> tuple[str, ...]:
-    """The names of all planners that are installed."""
-    return tuple(sorted(_installed()))
+    """The names of all planners that are installed; kinds, which need an argument, not."""
+    return tuple(sorted(_installed(GROUP)))
 
 
 def load_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner:
     """Make a planner by name.
 
     Args:
-        name: One of `planner_names()`.
+        name: One of `planner_names()`, or KIND:ARGUMENT.
         options: Option -> value; text is read as the type of the option.
 
     Raises:
-        InputError: Unknown name, unknown option, or a value that does not fit; one line.
+        InputError: Unknown name, unknown option, a value that does not fit, or an argument that
+            the kind refuses; one line.
     """
-    installed = _installed()
-    if name not in installed:
-        raise InputError(f"unknown planner {name!r}; allowed: {', '.join(planner_names())}")
+    kind, colon, argument = name.partition(":")
+    installed = _installed(KINDS if colon else GROUP)
+    if kind not in installed or (colon and not argument):
+        allowed = ", ".join((*planner_names(), *_kind_names()))
+        raise InputError(f"unknown planner {name!r}; allowed: {allowed}")
     try:
-        planner_class = installed[name].load()
+        planner_class = installed[kind].load()
     except (ImportError, AttributeError) as error:
         raise InputError(f"planner {name!r} cannot be loaded: {error}") from error
-    return planner_class(_checked_options(name, planner_class.Options, options or {}))
+    checked = _checked_options(name, planner_class.Options, options or {})
+    return planner_class(checked, argument) if colon else planner_class(checked)
 
 
 def describe_planners() -> tuple[PlannerDescription, ...]:
-    """All planners with their options, in the order of their names."""
-    return tuple(_description(name, entry) for name, entry in sorted(_installed().items()))
+    """All planners with their options, in the order of their names; then the kinds."""
+    return tuple(
+        _description(name, entry)
+        for group in (GROUP, KINDS)
+        for name, entry in sorted(_installed(group).items())
+    )
 
 
 def name_of(planner: Planner) -> str:
     """The name under which the class of a planner is installed, else the name of the class."""
-    for name, entry in _installed().items():
-        # a planner at hand has its module loaded; loading the other planners would be a waste
-        if getattr(sys.modules.get(entry.module), entry.attr, None) is type(planner):
-            return name
+    for group in (GROUP, KINDS):
+        for name, entry in _installed(group).items():
+            # a planner at hand has its module loaded; loading the others would be a waste
+            if getattr(sys.modules.get(entry.module), entry.attr, None) is type(planner):
+                return f"{name}:{getattr(planner, 'argument', '')}" if group == KINDS else name
     return type(planner).__name__
 
 
@@ -81,8 +97,12 @@ def options_of(planner: Planner) -> dict[str, Any]:
     return options.model_dump(mode="json") if isinstance(options, BaseModel) else {}
 
 
-def _installed() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+def _installed(group: str) -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=group) if entry.group == group}
+
+
+def _kind_names() -> tuple[str, ...]:
+    return tuple(f"{name}:..." for name in sorted(_installed(KINDS)))
 
 
 def _checked_options(name: str, model: type[BaseModel], given: Mapping[str, Any]) -> BaseModel:
@@ -110,6 +130,8 @@ def _description(name: str, entry: EntryPoint) -> PlannerDescription:
         planner_class = entry.load()
     except (ImportError, AttributeError) as error:
         return PlannerDescription(name, "", missing=" ".join(str(error).split()))
+    if entry.group == KINDS:
+        name = f"{name}:{planner_class.argument}"
     summary = (planner_class.__doc__ or "").strip().partition("\n")[0]
     fields = planner_class.Options.model_fields
     return PlannerDescription(

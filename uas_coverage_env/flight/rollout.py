@@ -5,7 +5,7 @@ import platform
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Command, Dynamics, SwarmState, Velocity, World, pack
 
 _RECORDED_PACKAGES = ("uas-coverage-env", "numpy", "scipy", "numba", "highspy")
+_RECORDED_WHERE_INSTALLED = ("pyscipopt", "gurobipy")
 
 
 @dataclass(frozen=True)
@@ -156,4 +157,7 @@ def _decide(
 
 def _versions() -> dict[str, str]:
     packages = {name: version(name) for name in _RECORDED_PACKAGES}
+    for name in _RECORDED_WHERE_INSTALLED:
+        with contextlib.suppress(PackageNotFoundError):
+            packages[name] = version(name)
     return {**packages, "python": platform.python_version()}

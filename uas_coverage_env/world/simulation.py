@@ -168,6 +168,7 @@ class World:
             step=step,
             names=self.names,
             x=state.x.copy(),
+            reference_mps=state.reference.copy(),
             status=state.status.copy(),
             uncovered=state.uncovered.copy(),
             home_m=self.arena.uas["home_m"].copy(),

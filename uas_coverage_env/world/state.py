@@ -44,6 +44,7 @@ class SwarmState:
         step: Number of the sample.
         names: (U,) names of the UAS.
         x: (U, 14) states, in the order of `vehicle.layout`.
+        reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST.
         uncovered: (W,) waypoint still to be covered.
         home_m: (U, 3) [m] the starts.
@@ -55,6 +56,7 @@ class SwarmState:
     step: int
     names: tuple[str, ...]
     x: NDArray[np.float64]
+    reference_mps: NDArray[np.float64]
     status: NDArray[np.int64]
     uncovered: NDArray[np.bool_]
     home_m: NDArray[np.float64]

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks.battery_reserve import short_s
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.verify import first_trouble, trouble_between
 from uas_coverage_env.vehicle import (
     compile_vehicle,
     lpv_step,
@@ -43,32 +43,84 @@ BRAKING_S = 14.0
 
 
 def way_out(problem: PlanningProblem, plan: Plan, dt_s: float) -> Plan | None:
-    """The plan followed as long as possible and then a braking flight; None where all fail.
+    """Everybody's plan followed as long as possible and then a braking flight; None where all fail.
 
     It is clear of everything, and from its hover everybody's charge suffices to come home: of
-    those it suffices for now.
+    those it suffices for now. One after the other follows its plan as long as it is clear of the
+    ways out before it; where so there is none for somebody, all follow theirs equally long.
     """
-    in_time = [uas for uas, x in enumerate(problem.x0) if short_s(problem, uas, x) <= 0.0]
-    braking_steps = int(np.ceil(BRAKING_S / dt_s))
-    longer = replace(problem, moving=prolonged(problem, plan.u.shape[1] + braking_steps))
-    records = [compile_vehicle(vehicle, dt_s)[()] for vehicle in problem.vehicles]
-    for followed in range(plan.u.shape[1], 0, -1):
-        tails = [
-            brake(records[row], plan.x[plan.of(name), followed], braking_steps)
-            for row, name in enumerate(problem.names)
-        ]
-        rows = [plan.of(name) for name in problem.names]
-        x = np.concatenate([plan.x[rows, : followed + 1], np.array([t[0] for t in tails])], axis=1)
-        u = np.concatenate([plan.u[rows, :followed], np.array([t[1] for t in tails])], axis=1)
-        covers = np.zeros((len(rows), u.shape[1], plan.covers.shape[2]), bool)
-        covers[:, :followed] = plan.covers[rows, :followed]
-        result = Plan(problem.names, x, u, covers, plan.objective, -np.inf)
-        ends = result.x[:, -1]
-        if any(short_s(problem, uas, ends[uas], allowance=False) > 0.0 for uas in in_time):
-            continue
-        if first_trouble(longer, result) is None:
+    steps = plan.u.shape[1] + int(np.ceil(BRAKING_S / dt_s))
+    exits = _Exits(problem, plan, dt_s, steps)
+    longest = exits.one_after_the_other()
+    for followed in [longest, *([n] * problem.n_uas for n in range(plan.u.shape[1], 0, -1))]:
+        if followed is not None and (result := exits.together(followed)) is not None:
             return result
     return None
+
+
+class _Exits:
+    """What everybody flies that follows a plan for some steps and brakes then."""
+
+    def __init__(self, problem: PlanningProblem, plan: Plan, dt_s: float, steps: int) -> None:
+        self._problem, self._plan, self._steps = problem, plan, steps
+        self._braking_steps = steps - plan.u.shape[1]
+        self._longer = replace(problem, moving=prolonged(problem, steps))
+        self._records = [compile_vehicle(vehicle, dt_s)[()] for vehicle in problem.vehicles]
+        everyone = range(problem.n_uas)
+        self._alone = [self._longer.only(uas) for uas in everyone]
+        self._in_time = [short_s(problem, uas, problem.x0[uas]) <= 0.0 for uas in everyone]
+
+    def one_after_the_other(self) -> list[int] | None:
+        """How long each follows its plan: as long as it is clear of those before it."""
+        paths: list[FloatArray] = []
+        followed: list[int] = []
+        for uas in range(self._problem.n_uas):
+            for n in range(self._plan.u.shape[1], 0, -1):
+                x, u = self._flown(uas, n, self._steps)
+                if self._fails_alone(uas, x, u, n) or any(
+                    trouble_between(self._problem, uas, other, x[:, :3], path) is not None
+                    for other, path in enumerate(paths)
+                ):
+                    continue
+                paths.append(x[:, :3])
+                followed.append(n)
+                break
+            else:
+                return None
+        return followed
+
+    def together(self, followed: list[int]) -> Plan | None:
+        """The flights of all, where nothing is wrong with them."""
+        plan, steps = self._plan, max(followed) + self._braking_steps
+        flown = [self._flown(uas, n, steps) for uas, n in enumerate(followed)]
+        if not all(self._comes_home(uas, x[-1]) for uas, (x, _) in enumerate(flown)):
+            return None
+        covers = np.zeros((len(flown), steps, plan.covers.shape[2]), bool)
+        for uas, (name, n) in enumerate(zip(self._problem.names, followed, strict=True)):
+            covers[uas, :n] = plan.covers[plan.of(name), :n]
+        x, u = (np.array([flight[k] for flight in flown]) for k in range(2))
+        result = Plan(self._problem.names, x, u, covers, plan.objective, -np.inf)
+        return result if first_trouble(self._longer, result) is None else None
+
+    def _flown(self, uas: int, followed: int, steps: int) -> tuple[FloatArray, FloatArray]:
+        """States (steps+1, 14) and inputs (steps, 5) of one UAS."""
+        row = self._plan.of(self._problem.names[uas])
+        x, u = self._plan.x[row, : followed + 1], self._plan.u[row, :followed]
+        states, inputs = brake(self._records[uas], x[-1], steps - followed)
+        return np.vstack([x, states]), np.vstack([u, inputs])
+
+    def _fails_alone(self, uas: int, x: FloatArray, u: FloatArray, followed: int) -> bool:
+        end = followed + self._braking_steps
+        alone = Plan(
+            *(self._alone[uas].names, x[None, : end + 1], u[None, :end]),
+            *(np.zeros((1, end, 0), bool), 0.0, -np.inf),
+        )
+        comes_home = self._comes_home(uas, x[end])
+        return not comes_home or first_trouble(self._alone[uas], alone) is not None
+
+    def _comes_home(self, uas: int, x: FloatArray) -> bool:
+        late = short_s(self._problem, uas, x, allowance=False) > 0.0
+        return not (late and self._in_time[uas])
 
 
 def still_holds(problem: PlanningProblem, out: Plan) -> bool:

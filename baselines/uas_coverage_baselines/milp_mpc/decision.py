@@ -11,7 +11,7 @@ it with the time that is left, for the bound and what it still finds.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -21,8 +21,15 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.construction import Flight, flights, target_cost, teams
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.program import ALONG, NARROW, NEVER, WIDE, Nearness, Program
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
+from uas_coverage_baselines.milp_mpc.solvers import (
+    Solution,
+    SolverError,
+    SolverLimits,
+    Start,
+    solver_named,
+)
 from uas_coverage_baselines.milp_mpc.standby import as_flight, standby_plans, visits
+from uas_coverage_baselines.milp_mpc.turns import Turns
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +45,7 @@ class Effort:
         deterministic: limits by nodes instead of the clock, so that the same state gives the
             same plan on any machine.
         teams: how many constructed teams are refined.
+        at_once: how many UAS are planned for, at most; the others go on with what they have.
         solver: one of `SOLVERS`.
     """
 
@@ -45,6 +53,7 @@ class Effort:
     threads: int = 2
     deterministic: bool = False
     teams: int = 6
+    at_once: int = 64
     solver: str = "highs"
 
 
@@ -52,7 +61,9 @@ _RESERVE = 0.15  # share of the time limit kept for verification and whatever is
 _RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
 _STARTS, _POLISHES = 2, 3  # programs along a UAS's tour: around flights, then around the best
 _WORTH_POLISHING = 0.05
-_WORTHWHILE_S = 0.12  # less time than this is not worth starting a solve
+_WORTH_STARTING_S = 0.05  # less time than this gives no first plan
+_WORTHWHILE_S = 0.12  # nor this a better one
+_TURN_S = 0.15  # of one thread: with less for each, some wait for the next decision
 _TEAMS_VERIFIED = 6
 _RESTRICTED_NODES = 60
 _ALONE_NODES = 30
@@ -66,8 +77,9 @@ def decide(
     *,
     out: Plan | None = None,
     began: float | None = None,
+    turns: Turns | None = None,
 ) -> Plan | None:
-    """The best plan found, verified by our own arithmetic; None where no program has a solution.
+    """The best plan found, verified by our own arithmetic; None where nobody has a new one.
 
     Args:
         problem: the decision to make.
@@ -76,30 +88,42 @@ def decide(
         effort: how much work it may take.
         out: what is left of the last way out, beginning now.
         began: `time.perf_counter()` at which the decision's time began to count; now where None.
+        turns: who was planned for when; where None nobody has been.
     """
     search = _Search(problem, effort, time.perf_counter() if began is None else began)
     everyone = range(problem.n_uas)
+    left = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
+    standby = [search.safe(uas, plans) for uas, plans in enumerate(left)]
+    goes_on = [len(left[u]) > 1 and any(p is left[u][0] for p in standby[u]) for u in everyone]
+    turn = search.turn(turns or Turns(), [uas for uas in everyone if not goes_on[uas]])
     with ThreadPoolExecutor(effort.threads) as side_by_side:  # kernels and solver free the GIL
-        constructing = [side_by_side.submit(flights, problem, uas, dt_s) for uas in everyone]
-        search.formulate()
-        pools = [constructed.result() for constructed in constructing]
-        tasks = _unique_tasks(problem, previous, teams(problem, pools, effort.teams), dt_s)
+        constructing = {uas: side_by_side.submit(flights, problem, uas, dt_s) for uas in turn}
+        search.formulate(turn)
+        pools = [
+            constructing[uas].result()
+            if uas in turn
+            else [as_flight(problem, uas, left[uas][0])]
+            for uas in everyone
+        ]
+        tasks = [
+            task
+            for task in _unique_tasks(problem, previous, teams(problem, pools, effort.teams), dt_s)
+            if task[0] in turn
+        ]
         if problem.tours:
-            per_uas_s = search.time_left_s() * effort.threads / problem.n_uas
-            for uas, plans in enumerate(
-                side_by_side.map(lambda uas: search.polished(uas, tasks, per_uas_s), everyone)
-            ):
+            per_uas_s = search.time_left_s() * effort.threads / len(turn)
+            polished = side_by_side.map(lambda uas: search.polished(uas, tasks, per_uas_s), turn)
+            for uas, plans in zip(turn, polished, strict=True):
                 search.collect(uas, plans)
         else:
             found = side_by_side.map(lambda task: search.refined(task[0], task[1], NARROW), tasks)
             for (uas, _), plan in zip(tasks, found, strict=True):
                 search.collect(uas, [plan])
-        standby = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
         tasks = [
             task
-            for uas in everyone
+            for uas in turn
             if not search.has_plan(uas)
-            for task in _last_resorts(problem, uas, tasks, standby[uas])
+            for task in _last_resorts(problem, uas, tasks, left[uas])
         ]
         found = side_by_side.map(lambda task: search.refined(task[0], task[1], WIDE), tasks)
         for (uas, _), plan in zip(tasks, found, strict=True):
@@ -145,17 +169,29 @@ class _Search:
     def __init__(self, problem: PlanningProblem, effort: Effort, began: float) -> None:
         self.problem, self.effort, self._began = problem, effort, began
         self._solve = solver_named(effort.solver)
-        self._own: list[Program] = []
+        self._alone = [problem.only(uas) for uas in range(problem.n_uas)]
+        self._own: dict[int, Program] = {}
         self._formulating_s = 0.0
         self._plans: list[list[Plan]] = [[] for _ in range(problem.n_uas)]
         self._best: Plan | None = None
         self._bound = -np.inf
 
-    def formulate(self) -> None:
-        """Write each UAS's own program."""
+    def formulate(self, turn: Sequence[int]) -> None:
+        """Write the own programs of those whose turn it is."""
         before = time.perf_counter()
-        self._own = [Program(self.problem.only(uas)) for uas in range(self.problem.n_uas)]
+        self._own = {uas: Program(self._alone[uas]) for uas in turn}
         self._formulating_s = time.perf_counter() - before
+
+    def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
+        """Those of a UAS's plans that are clear of everything but the other UAS."""
+        return [plan for plan in plans if first_trouble(self._alone[uas], plan) is None]
+
+    def turn(self, turns: Turns, urgent: Collection[int]) -> list[int]:
+        """Who is planned for: everybody where the time suffices."""
+        most = min(self.problem.n_uas, self.effort.at_once)
+        if not self.effort.deterministic:
+            most = min(most, int(self.effort.threads * self.time_left_s() / _TURN_S))
+        return turns.take(self.problem.names, urgent, max(most, 1))
 
     def has_plan(self, uas: int) -> bool:
         """Whether a program has given the UAS a plan."""
@@ -163,8 +199,8 @@ class _Search:
 
     @property
     def plan(self) -> Plan | None:
-        """The best verified plan, with the bound that was proven."""
-        if self._best is None:
+        """The best verified plan, with the bound that was proven; None where nobody has a new one."""
+        if self._best is None or not self._best.renewed:
             return None
         return replace(self._best, bound=min(self._bound, self._best.objective))
 
@@ -172,11 +208,11 @@ class _Search:
         self, uas: int, flight: Flight, nearness: Nearness, at_most_s: float = np.inf
     ) -> Plan | None:
         """Solve a UAS's own OCP restricted to what lies near a flight."""
-        if not self._has_time(_WORTHWHILE_S):
+        if not self._has_time(_WORTH_STARTING_S):
             return None
         program = self._own[uas]
         path, visit = flight.positions_m[None], flight.visit[None]
-        lower, upper = program.near(path, visit, nearness)
+        bounds = program.near(path, visit, nearness)
         start = program.start(path, visit)
         share_s = self.effort.time_limit_s * (1.0 if nearness is ALONG else _RESTRICTED_SHARE)
         limits = SolverLimits(
@@ -188,8 +224,8 @@ class _Search:
         )
         if self.effort.deterministic:
             limits = replace(limits, time_s=None, nodes=_RESTRICTED_NODES)
-        solution = self._solve(program.built, limits, start=start, lower=lower, upper=upper)
-        return None if solution.values is None else program.plan(solution)
+        solution = self._solved(program, limits, start, bounds)
+        return None if solution is None or solution.values is None else program.plan(solution)
 
     def polished(
         self, uas: int, tasks: Sequence[tuple[int, Flight]], at_most_s: float
@@ -200,13 +236,19 @@ class _Search:
         second; around its solution other sides come near, until nothing is gained.
         """
         until = time.perf_counter() + at_most_s
-        own = [flight for other, flight in tasks if other == uas][:_STARTS]
+        # what is left of a plan that sets off late sets off later each time it is planned anew: of
+        # two flights the one that gets farther is first, since time may be up before the other's
+        own = sorted(
+            [flight for other, flight in tasks if other == uas][:_STARTS],
+            key=lambda flight: flight.target_cost + flight.too_close_m,
+        )
         plans: list[Plan] = []
         for _ in range(_STARTS + _POLISHES):
             left_s = until - time.perf_counter()
-            if not self.effort.deterministic and left_s < _WORTHWHILE_S:
+            enough_s = _WORTHWHILE_S if plans else _WORTH_STARTING_S
+            if not self.effort.deterministic and left_s < enough_s:
                 break
-            flight = own.pop(0) if own else as_flight(self._own[uas].problem, 0, plans[0])
+            flight = own.pop(0) if own else as_flight(self._alone[uas], 0, plans[0])
             plan = self.refined(uas, flight, ALONG, left_s)
             gained = plan is not None and (
                 not plans or plan.objective < plans[0].objective - _WORTH_POLISHING
@@ -220,7 +262,7 @@ class _Search:
     def collect(self, uas: int, plans: Sequence[Plan | None]) -> None:
         """Keep the plans found for a UAS."""
         for plan in plans:
-            if plan is not None and first_trouble(self._own[uas].problem, plan) is None:
+            if plan is not None and first_trouble(self._alone[uas], plan) is None:
                 self._plans[uas].append(plan)
 
     def combine(self, standby: Sequence[Sequence[Plan]]) -> None:
@@ -231,11 +273,7 @@ class _Search:
         """
         if not any(self._plans):
             return
-        safe = [
-            [plan for plan in plans if first_trouble(self._own[uas].problem, plan) is None]
-            for uas, plans in enumerate(standby)
-        ]
-        choices = [plans + spare for plans, spare in zip(self._plans, safe, strict=True)]
+        choices = [[*plans, *spare] for plans, spare in zip(self._plans, standby, strict=True)]
         if not all(choices):
             return
         pools = [
@@ -248,21 +286,30 @@ class _Search:
             for flight, plan in zip(pool, plans, strict=True)
         }
         for team in teams(self.problem, pools, keep=_TEAMS_VERIFIED):
-            self._offer(_joined(self.problem, [of_flight[id(flight)] for flight in team]))
+            self._offer(self._joined([of_flight[id(flight)] for flight in team]))
             if self._best is not None:
                 return
-        if all(safe):
-            self._one_after_the_other([plans[0] for plans in safe])
+        if all(standby):
+            self._one_after_the_other([plans[0] for plans in standby])
 
     def _one_after_the_other(self, team: list[Plan]) -> None:
         """From a team on standby towards one with plans, while it holds as a whole."""
         for uas, plans in enumerate(self._plans):
             for plan in sorted(plans, key=lambda one: one.objective):
                 trial = [*team[:uas], plan, *team[uas + 1 :]]
-                if first_trouble(self.problem, _joined(self.problem, trial)) is None:
+                if first_trouble(self.problem, self._joined(trial)) is None:
                     team = trial
                     break
-        self._offer(_joined(self.problem, team))
+        self._offer(self._joined(team))
+
+    def _joined(self, plans: list[Plan]) -> Plan:
+        """One plan of all, which says who has a new one."""
+        renewed = tuple(
+            name
+            for name, plan, own in zip(self.problem.names, plans, self._plans, strict=True)
+            if any(plan is one for one in own)
+        )
+        return replace(_joined(self.problem, plans), renewed=renewed)
 
     def improve(self) -> None:
         """The whole OCP from the best plan so far, with the time that is left.
@@ -271,7 +318,7 @@ class _Search:
         that a deterministic decision goes without it, and without a bound.
         """
         deterministic, alone = self.effort.deterministic, self.problem.n_uas == 1
-        if deterministic and not alone:
+        if (deterministic and not alone) or len(self._own) < self.problem.n_uas:
             return
         # the whole program takes about as long to write as everybody's own together
         if not self._has_time(_WORTHWHILE_S + (0.0 if alone else 1.5 * self._formulating_s)):
@@ -283,10 +330,25 @@ class _Search:
         limits = SolverLimits(time_s=max(self.time_left_s(), 0.01))
         if deterministic:
             limits = SolverLimits(nodes=_ALONE_NODES, relative_gap=0.01, heuristics=False)
-        solution = self._solve(program.built, limits, start=start)
-        self._bound = solution.bound
-        if solution.values is not None:
-            self._offer(program.plan(solution))
+        solution = self._solved(program, limits, start)
+        if solution is not None:
+            self._bound = solution.bound
+            if solution.values is not None:
+                self._offer(replace(program.plan(solution), renewed=self.problem.names))
+
+    def _solved(
+        self,
+        program: Program,
+        limits: SolverLimits,
+        start: Start | None,
+        bounds: tuple[FloatArray, FloatArray] | None = None,
+    ) -> Solution | None:
+        """What the solver says; None where it fails, which ends no flight."""
+        lower, upper = (None, None) if bounds is None else bounds
+        try:
+            return self._solve(program.built, limits, start=start, lower=lower, upper=upper)
+        except SolverError:
+            return None
 
     def _offer(self, plan: Plan) -> None:
         """Keep a plan that is better than the best and whose geometry holds."""

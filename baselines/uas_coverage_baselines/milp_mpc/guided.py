@@ -59,7 +59,8 @@ class MilpMpcGuided(MovingHorizon[Options]):
         """
         super().reset(scenario, seed)
         self._around = Surroundings(scenario, self.options)
-        self._guide = OrderGuide(scenario, self._around, TourShape())
+        decision_s = self.options.threads * self.options.time_limit_s
+        self._guide = OrderGuide(scenario, self._around, TourShape(), decision_s)
         world = World(scenario)
         world.reset()
         self._guide.begin(world.swarm_state(), seed)

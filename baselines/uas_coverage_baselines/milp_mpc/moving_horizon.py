@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -12,8 +13,10 @@ from pydantic import Field, field_validator
 from uas_coverage_baselines.milp_mpc.braking import still_holds, way_out
 from uas_coverage_baselines.milp_mpc.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.evasion import evasion
+from uas_coverage_baselines.milp_mpc.homing import WayHome
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.solvers import solver_named
+from uas_coverage_baselines.milp_mpc.turns import Turns
 from uas_coverage_env.flight import Decision, PlannerOptions
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
@@ -49,6 +52,12 @@ class MovingHorizonOptions(PlannerOptions):
     )
     teams: int = Field(
         default=6, ge=1, le=20, description="constructed teams whose flights are refined"
+    )
+    at_once: int = Field(
+        default=64,
+        ge=1,
+        le=64,
+        description="UAS planned anew in a decision, at most; the others go on with their plans",
     )
 
     @field_validator("solver")
@@ -90,26 +99,44 @@ class MovingHorizon(ABC, Generic[Chosen]):
         rehearsal.reset(scenario, 0)
         swarm = world.swarm_state()
         rehearsal.act(swarm)
-        evasion(rehearsal.problem(swarm), scenario.dt_s)
+        problem = rehearsal.problem(swarm)
+        evasion(problem, scenario.dt_s)
+        last = dataclasses.replace(swarm, step=scenario.max_steps)
+        rehearsal._way_home.turned_home(problem, last, None, ())
 
     def reset(self, scenario: Scenario, seed: int) -> None:
         """Start a mission."""
         self.dt_s = scenario.dt_s
         self.plan = self._way_out = None
+        self._turns = Turns()
+        self._way_home = WayHome(scenario, self.options.margin_m)
+        self._homing = frozenset[str]()  # who flies home since its charge runs short
         self.last_decision = None
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Decide for every active UAS: one step of Algorithm 1."""
         if not swarm.active:
             return {}
-        began, fallback = time.perf_counter(), False
+        began, fallback, self._homing = time.perf_counter(), False, frozenset[str]()
         problem = self.problem(swarm)
-        plan = decide(problem, self.plan, self.dt_s, self._effort(), out=self._way_out, began=began)
+        plan = decide(
+            problem,
+            self.plan,
+            self.dt_s,
+            self._effort(),
+            out=self._way_out,
+            began=began,
+            turns=self._turns,
+        )
         out = None if plan is None else way_out(problem, plan, self.dt_s)
         if plan is None or out is None:
             plan, out, fallback = self._way_out, self._way_out, True
         if plan is None or out is None or (fallback and not still_holds(problem, out)):
             plan = out = evasion(problem, self.dt_s)
+        renewed = () if fallback or plan is None else plan.renewed
+        turned = self._way_home.turned_home(problem, swarm, out, renewed)
+        if turned is not None:
+            (plan, self._homing), out = turned, turned[0]
         if plan is None or out is None:
             return self._hover(swarm)
         self.plan, self._way_out = plan.advanced(), out.advanced()
@@ -123,6 +150,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
             threads=self.options.threads,
             deterministic=self.options.deterministic,
             teams=self.options.teams,
+            at_once=self.options.at_once,
             solver=self.options.solver,
         )
 
@@ -133,7 +161,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
             float(wrench[TAU_X]),
             float(wrench[TAU_Y]),
             float(wrench[TAU_Z]),
-            mode=self.mode(name),
+            mode="return" if name in self._homing else self.mode(name),
         )
 
     def _hover(self, swarm: SwarmState) -> dict[str, Command]:

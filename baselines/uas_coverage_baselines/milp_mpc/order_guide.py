@@ -19,7 +19,8 @@ FloatArray = NDArray[np.float64]
 _LANDING_S = 4.0  # coming to rest above the start
 _MOVES_PER_WAYPOINT = 40_000  # of the first search, before take-off
 _MOVES_AT_MOST = 4_000_000
-_MOVES_AFTERWARDS = 60_000  # of each decision's
+_MOVES_AFTERWARDS = 60_000  # of each decision's, at most
+_MOVES_PER_S = 30_000  # of the decision's time limit, over all threads
 _FIRST_SEARCHES = 3
 _WORTH_CHANGING_S = 0.5
 _RESERVE_S = 25.0  # flight time to come home with, as the OCP's reserve asks for
@@ -51,8 +52,15 @@ class OrderGuide:
     flight that takes longer are all seen in the state, and a better order is taken when it comes.
     """
 
-    def __init__(self, scenario: Scenario, around: Surroundings, shape: TourShape) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        around: Surroundings,
+        shape: TourShape,
+        decision_s: float = np.inf,
+    ) -> None:
         self._around, self._shape = around, shape
+        self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(scenario)
         self._names = tuple(uas.name for uas in scenario.uas)
         limits = [vehicle.limits for vehicle in scenario.vehicles]
@@ -87,7 +95,7 @@ class OrderGuide:
         """Bring the order up to date with what is seen now."""
         previous = self._order or no_order(len(self._names))
         task = self._task(swarm)
-        effort = Effort(_MOVES_AFTERWARDS, hottest_s=1.5, window=24)
+        effort = Effort(self._moves, hottest_s=1.5, window=24)
         kept = improved(task, previous, Effort(0), 0)
         better = improved(task, kept, effort, swarm.step)
         worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S

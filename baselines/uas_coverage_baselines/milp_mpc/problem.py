@@ -6,7 +6,7 @@ Operation modes are data before the OCP (Sec. III-C.6): a landed UAS is absent, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -93,6 +93,38 @@ class MovingHull:
 
 
 @dataclass(frozen=True)
+class Hulls:
+    """The faces of all fixed obstacles in one array.
+
+    Attributes:
+        normals: (F, 3).
+        offsets_m: (F,).
+        first: (O,) each obstacle's first face.
+    """
+
+    normals: FloatArray
+    offsets_m: FloatArray
+    first: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, hulls: Sequence[ConvexPolytope]) -> Hulls:
+        """Stacked in the given order."""
+        counts = np.array([hull.n_faces for hull in hulls], np.int64)
+        return cls(
+            np.concatenate([np.zeros((0, 3)), *(hull.normals for hull in hulls)]),
+            np.concatenate([np.zeros(0), *(hull.offsets_m for hull in hulls)]),
+            np.cumsum(counts) - counts,
+        )
+
+    def apart_m(self, path: FloatArray) -> FloatArray:
+        """(O,) by how much the best single face of each obstacle separates a whole path from it."""
+        if not len(self.first):
+            return np.zeros(0)
+        beyond = (self.normals @ path.T + self.offsets_m[:, None]).min(axis=1)
+        return np.maximum.reduceat(beyond, self.first)
+
+
+@dataclass(frozen=True)
 class PlanningProblem:
     """One decision.
 
@@ -121,7 +153,7 @@ class PlanningProblem:
             where nobody has one.
         dt_s: sampling time.
         weights: see `Weights`.
-        physical_sides: H_P.
+        physical_sides: H_P, a multiple of 4.
         obstacle_sides: H_O.
         waypoint_sides: H_WP.
         prune: whether reachable sets drop what cannot matter; False keeps every row and column,
@@ -156,6 +188,11 @@ class PlanningProblem:
     waypoint_sides: int = 4
     prune: bool = True
 
+    def __post_init__(self) -> None:
+        # tilt and the way it moves a UAS are turned by a quarter against each other
+        if self.physical_sides < 4 or self.physical_sides % 4:
+            raise ValueError(f"physical_sides = {self.physical_sides}: give a multiple of 4")
+
     @property
     def n_uas(self) -> int:
         """U."""
@@ -179,7 +216,16 @@ class PlanningProblem:
     @cached_property
     def reach(self) -> Reach:
         """Supersets of the positions each UAS can have at each step."""
-        return Reach.of(self.x0, self.vehicles, self.models, self.horizon, self.fence, self.prune)
+        return Reach.of(
+            *(self.x0, self.vehicles, self.models, self.horizon, self.fence),
+            prune=self.prune,
+            sides=self.physical_sides,
+        )
+
+    @cached_property
+    def hulls(self) -> Hulls:
+        """The fixed obstacles' faces."""
+        return Hulls.of([hull for _, hull in self.obstacles])
 
     def limit(self, name: str) -> FloatArray:
         """(U,) one of the vehicles' limits by its field name."""
@@ -246,6 +292,7 @@ class Plan:
         covers: (U, n, K) True where a waypoint is planned to be covered, K all of the scenario's.
         objective: J without what the plan cannot influence.
         bound: proven lower bound of the best objective; -inf where none.
+        renewed: the UAS whose part of it is newly planned; the others go on as before.
     """
 
     names: tuple[str, ...]
@@ -254,6 +301,7 @@ class Plan:
     covers: NDArray[np.bool_]
     objective: float
     bound: float
+    renewed: tuple[str, ...] = ()
 
     def of(self, name: str) -> int:
         """Row of a UAS."""

@@ -62,9 +62,12 @@ class Reach:
         horizon: int,
         fence: ConvexPolytope,
         prune: bool = True,
+        sides: int = 8,
     ) -> Reach:
-        """Reachable sets from the states `x0` (U, 14)."""
-        chains = tuple(_Chain.of(v, m, horizon) for v, m in zip(vehicles, models, strict=True))
+        """Reachable sets from the states `x0` (U, 14), norms being limited by `sides` faces."""
+        chains = tuple(
+            _Chain.of(v, m, horizon, sides) for v, m in zip(vehicles, models, strict=True)
+        )
         vertical = np.array(
             [_vertical(x, v, m, horizon) for x, v, m in zip(x0, vehicles, models, strict=True)]
         )
@@ -152,7 +155,7 @@ class _Chain:
     climb_limits_mps: tuple[float, float]  # down, up
 
     @classmethod
-    def of(cls, vehicle: VehicleParams, model: LinearModel, horizon: int) -> _Chain:
+    def of(cls, vehicle: VehicleParams, model: LinearModel, horizon: int, sides: int) -> _Chain:
         index = [X, VX, THETA, WY]
         sign = np.array([1.0, 1.0, -1.0, -1.0])  # tilt forward is negative pitch
         a = model.A[np.ix_(index, index)] * np.outer(sign, sign)
@@ -160,7 +163,7 @@ class _Chain:
         b = model.B[index, TAU_Y] * sign * -inertia[1]
         limits = vehicle.limits
         alpha = np.full(2, limits.angular_acceleration_xy_max_radps2)
-        polygon = _polygon(8)
+        polygon = _polygon(sides)
         return cls(
             a,
             b,

@@ -6,8 +6,10 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     TOLERANCE,
     Solution,
     Solve,
+    SolverError,
     SolverLimits,
     SolveStatus,
+    Start,
 )
 from uas_coverage_env.strict_toml import InputError
 
@@ -43,6 +45,8 @@ __all__ = [
     "Solution",
     "Solve",
     "SolveStatus",
+    "SolverError",
     "SolverLimits",
+    "Start",
     "solver_named",
 ]

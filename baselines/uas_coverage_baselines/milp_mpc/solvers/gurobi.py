@@ -22,6 +22,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Claim,
     FloatArray,
     Solution,
+    SolverError,
     SolverLimits,
     Start,
     confirmed,
@@ -63,7 +64,7 @@ def solve(
             claim = _claim(model, columns)
     except gurobipy.GurobiError as error:
         if error.errno not in _LICENCE_ERRORS:
-            raise
+            raise SolverError(f"Gurobi: {error}") from error
         raise InputError(
             f"solver 'gurobi': {error} (this program has {len(milp.cost)} columns and "
             f"{len(milp.row_lower)} rows); take another solver or another licence"

@@ -17,6 +17,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Claim,
     FloatArray,
     Solution,
+    SolverError,
     SolverLimits,
     Start,
     confirmed,
@@ -41,10 +42,15 @@ def solve(
     solver = highspy.Highs()
     for option, value in _options(limits).items():
         solver.setOptionValue(option, value)
-    solver.passModel(_model(milp, lower, upper, free_integers))
-    if start is not None and free_integers.any():
-        solver.setSolution(len(start[0]), start[0].astype(np.int32), start[1])
-    solver.run()
+    try:
+        passed = solver.passModel(_model(milp, lower, upper, free_integers))
+        if passed == highspy.HighsStatus.kError:
+            raise SolverError("HiGHS refuses the program")
+        if start is not None and free_integers.any():
+            solver.setSolution(len(start[0]), start[0].astype(np.int32), start[1])
+        solver.run()
+    except (RuntimeError, MemoryError) as error:  # what its C++ exceptions become
+        raise SolverError(f"HiGHS: {error}") from error
     status, info = solver.getModelStatus(), solver.getInfo()
     optimal = status == highspy.HighsModelStatus.kOptimal
     bound = -np.inf

@@ -20,6 +20,10 @@ FloatArray = NDArray[np.float64]
 Start = tuple[NDArray[np.int64], FloatArray]
 """A point to start from, as (columns, values); columns left out are the solver's to complete."""
 
+class SolverError(Exception):
+    """The solver failed where it should have solved: this solve gives nothing."""
+
+
 TOLERANCE = 2e-6
 """Largest violation of a row that counts as none: sums of rounded terms."""
 SOLVER_TOLERANCE = 1e-7
@@ -104,6 +108,7 @@ class Solve(Protocol):
 
         Raises:
             InputError: the solver's licence does not allow this program; one line.
+            SolverError: the solver raised something of its own.
         """
         ...
 

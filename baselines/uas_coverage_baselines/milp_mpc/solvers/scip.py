@@ -18,6 +18,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Claim,
     FloatArray,
     Solution,
+    SolverError,
     SolverLimits,
     Start,
     confirmed,
@@ -36,6 +37,22 @@ def solve(
     began = time.perf_counter()
     lower = milp.lower if lower is None else lower
     upper = milp.upper if upper is None else upper
+    try:
+        claim = _claim(milp, limits, start, lower, upper, began)
+    except Exception as error:  # PySCIPOpt's errors have no narrower type
+        raise SolverError(f"SCIP: {error}") from error
+    return confirmed(claim, milp, lower, upper, time.perf_counter() - began)
+
+
+def _claim(
+    milp: BuiltMilp,
+    limits: SolverLimits,
+    start: Start | None,
+    lower: FloatArray,
+    upper: FloatArray,
+    began: float,
+) -> Claim:
+    """What SCIP says of the program."""
     model = pyscipopt.Model()
     model.hideOutput()
     columns = _model(model, milp, lower, upper)
@@ -55,8 +72,7 @@ def solve(
     status, bound = model.getStatus(), model.getDualbound()
     if abs(bound) >= model.infinity():
         bound = float(np.copysign(np.inf, bound))
-    claim = Claim(values, bound, status in ("optimal", "gaplimit"), status == "infeasible")
-    return confirmed(claim, milp, lower, upper, time.perf_counter() - began)
+    return Claim(values, bound, status in ("optimal", "gaplimit"), status == "infeasible")
 
 
 def _parameters(limits: SolverLimits, elapsed_s: float) -> dict[str, bool | int | float]:

@@ -1,0 +1,73 @@
+"""A policy as a planner: `--planner policy:DIR`."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+from uas_coverage_agents.policy.directory import Policy, load_policy
+from uas_coverage_agents.velocity.pilot import VelocityPilot
+from uas_coverage_agents.waypoint.pilot import WaypointPilot
+from uas_coverage_env.flight import AssistedOptions
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.world import Command, SwarmState
+
+
+class Pilot(Protocol):
+    """Flies a swarm with a policy of its interface; a planner without options."""
+
+    def warm_up(self, scenario: Scenario) -> None:
+        """Compile what needs compiling."""
+        ...
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Start a new mission."""
+        ...
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Give each active UAS its command."""
+        ...
+
+
+PILOTS: dict[str, Callable[[Policy], Pilot]] = {
+    "velocity": VelocityPilot,
+    "waypoint": WaypointPilot,
+}
+"""Interface of a policy -> who flies it; raises a ValueError that says why it cannot."""
+
+
+class PolicyPlanner:
+    """Flies a trained policy: a directory with `policy.json` and `policy.safetensors`.
+
+    Args:
+        options: The assistants that fly along.
+        argument: The directory.
+
+    Raises:
+        InputError: The directory holds no policy that can be flown; names file and field.
+    """
+
+    Options = AssistedOptions
+    argument = "DIR"
+
+    def __init__(self, options: AssistedOptions | None, argument: str | Path) -> None:
+        self.options = options or AssistedOptions()
+        self.assistants = self.options.assistants
+        self.argument = str(argument)
+        self.policy = load_policy(argument)
+        try:
+            self._pilot = PILOTS[self.policy.description.interface](self.policy)
+        except ValueError as error:
+            raise InputError(f"{self.argument}: cannot be flown: {error}") from error
+
+    def warm_up(self, scenario: Scenario) -> None:
+        """Compile what needs compiling."""
+        self._pilot.warm_up(scenario)
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Start a new mission."""
+        self._pilot.reset(scenario, seed)
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Let the policy decide."""
+        return self._pilot.act(swarm)

@@ -1,0 +1,232 @@
+"""`uas-coverage train`: train a policy, or go on with its training."""
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+from rich.table import Table
+
+from uas_coverage_agents.policy import Policy
+from uas_coverage_agents.policy.directory import write_atomically
+from uas_coverage_agents.training.config import load_config, published_names
+from uas_coverage_env.strict_toml import InputError
+
+if TYPE_CHECKING:
+    from uas_coverage_agents.training.loop import Order, TrainingProgress
+
+ORDER = "order.json"
+
+_FAILED = 1
+_SECONDS_BETWEEN_LINES = 10.0
+_OURS = (ORDER, "checkpoints", "tensorboard", "learning_curve.csv", "learning_curve.png", "policy")
+
+
+def train(
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            metavar="ALGORITHM",
+            help=f"One of {', '.join(published_names())}, or a configuration of your own (.toml).",
+        ),
+    ],
+    scenario: Annotated[
+        str | None,
+        typer.Option(help="`generated`, or a scenario; default: as the configuration says."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; default: trainings/ALGORITHM-SEED.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of network, lots and scenarios.")] = 0,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps of lanes to learn from; repeats exactly.")
+    ] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="Stop by the clock instead of by the steps.")
+    ] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; may be repeated."),
+    ] = None,
+    missions: Annotated[
+        int, typer.Option(min=1, max=100, help="Unseen missions that score the policy.")
+    ] = 100,
+    checkpoint_s: Annotated[
+        float, typer.Option(min=0.0, help="Seconds between two checkpoints.")
+    ] = 60.0,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Throw away the training in --out, start anew.")
+    ] = False,
+    zip_file: Annotated[
+        Path | None,
+        typer.Option("--from", help="Do not train: turn this Stable-Baselines3 zip into a policy."),
+    ] = None,
+    trust_pickle: Annotated[
+        bool, typer.Option("--trust-pickle", help="For --from: the zip is from someone you trust.")
+    ] = False,
+) -> None:
+    """Train a policy; the same command again goes on where a killed one stopped.
+
+    Leaves checkpoints, tensorboard logs, a learning curve and, in the end, `policy/` in --out; fly
+    it with `run SCENARIO --planner policy:OUT/policy`.
+    """
+    if steps is not None and minutes is not None:
+        raise InputError("--steps and --minutes: give one of them")
+    changes = [*(change or ()), *([f"steps={steps}"] if steps is not None else ())]
+    config = load_config(algorithm, scenario=scenario, changes=changes)
+    if zip_file is not None and not trust_pickle:
+        raise InputError(
+            f"{zip_file}: a Stable-Baselines3 zip holds pickles, which can execute anything; "
+            f"add --trust-pickle if you trust who made it"
+        )
+    loop, filelock = _learn_extra()
+    name = Path(algorithm).stem
+    order = loop.Order(name, config, seed, minutes, missions, checkpoint_s)
+    directory = out or Path("trainings") / f"{name}-{seed}"
+    screen = Console(highlight=False, soft_wrap=True)
+    _check_directory(directory, order, overwrite=overwrite)
+    try:
+        with filelock.FileLock(directory / ".lock", timeout=0), _shown(screen) as on_progress:
+            if overwrite:
+                _throw_away(directory)
+            _note(directory, order, screen)
+            if zip_file is not None:
+                policy = loop.import_zip(order, zip_file, directory)
+            else:
+                policy = loop.train(order, directory, on_progress)
+    except filelock.Timeout:
+        raise InputError(f"{directory}: another training is at work there") from None
+    except KeyboardInterrupt:
+        screen.print("stopped by hand; the same command goes on from the last checkpoint")
+        raise typer.Exit(_FAILED) from None
+    _report(screen, policy, directory)
+
+
+def _learn_extra() -> tuple[Any, Any]:
+    """The modules that need the extra `learn`."""
+    try:
+        import filelock
+
+        from uas_coverage_agents.training import loop
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("uas_coverage"):
+            raise  # ours is always there
+        raise InputError(
+            f"training needs the package {error.name}, which is not installed: "
+            f"python -m pip install 'uas-coverage-env[learn]'"
+        ) from error
+    return loop, filelock
+
+
+def _record(order: "Order") -> dict[str, Any]:
+    """What has to be the same for a training to go on."""
+    return {
+        "name": order.name,
+        "seed": order.seed,
+        "minutes": order.minutes,
+        "missions": order.missions,
+        "config": order.config.model_dump(mode="json"),
+    }
+
+
+def _check_directory(directory: Path, order: "Order", *, overwrite: bool) -> None:
+    """Refuse to mix a training with something else."""
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"{directory}: is a file; give a folder")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        names = {path.name for path in directory.iterdir()} - {".lock"}
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
+    if names and ORDER not in names:
+        raise InputError(f"{directory}: is not empty and holds no training; give another --out")
+    if not names or overwrite:
+        return
+    try:
+        there = json.loads((directory / ORDER).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        there = None
+    if there != json.loads(json.dumps(_record(order))):
+        raise InputError(
+            f"{directory}: holds a training with other settings; give another --out, or start "
+            f"anew with --overwrite"
+        )
+
+
+def _throw_away(directory: Path) -> None:
+    """Remove what a training has left, and nothing else."""
+    for name in _OURS:
+        path = directory / name
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _note(directory: Path, order: "Order", screen: Console) -> None:
+    path = directory / ORDER
+    if path.exists():
+        screen.print(f"{directory}: going on with the training there", markup=False)
+        return
+    write_atomically(path, json.dumps(_record(order), indent=1).encode())
+
+
+@contextmanager
+def _shown(screen: Console) -> Iterator[Callable[["TrainingProgress"], object]]:
+    """Show how it goes: a bar that moves on a terminal, a line now and then elsewhere."""
+    screen.print("preparing scenarios (a minute more where kernels have to be compiled)")
+    started: list[tuple[float, float]] = []
+    said = [-_SECONDS_BETWEEN_LINES]
+
+    def line(progress: "TrainingProgress") -> str:
+        now = time.monotonic()
+        if not started:
+            started.append((now, progress.share))
+        since, share = started[0]
+        parts = [f"{progress.steps / 1e6:.2f} million steps"]
+        if (point := progress.point) is not None:
+            parts.append(
+                f"covers {point.coverage:.1%}, all home {point.all_home:.0%}, "
+                f"{point.energy_Wh:.1f} Wh in {point.flight_steps:.0f} steps"
+            )
+        if progress.share > share:
+            left_s = (now - since) * (1.0 - progress.share) / (progress.share - share)
+            parts.append(f"{left_s / 60:.1f} min left")
+        return "; ".join(parts)
+
+    if not screen.is_terminal:
+
+        def say(progress: "TrainingProgress") -> None:
+            text, now = line(progress), time.monotonic()
+            if now - said[0] >= _SECONDS_BETWEEN_LINES or progress.share == 1.0:
+                screen.print(f"{progress.share:.0%}  {text}", markup=False)
+                said[0] = now
+
+        yield say
+        return
+    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=screen) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda progress: bar.update(
+            task, completed=progress.share, description=line(progress)
+        )
+
+
+def _report(screen: Console, policy: Policy, directory: Path) -> None:
+    score, training = policy.description.score, policy.description.training
+    if score is not None:
+        table = Table("unseen missions", "mean", "95 % interval", box=None)
+        for name, measure in score.measures.items():
+            table.add_row(name, f"{measure.mean:.3f}", f"{measure.low:.3f} .. {measure.high:.3f}")
+        screen.print(table)
+    screen.print(
+        f"{training.steps} steps, {training.process_s:.0f} s of processor time, "
+        f"{training.wall_s:.0f} s; fly it with --planner policy:{directory / 'policy'}",
+        markup=False,
+    )

@@ -1,0 +1,177 @@
+"""How a learner is trained, as a small file: one TOML per published run, checked strictly."""
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from uas_coverage_agents.policy import ScenarioFamily
+from uas_coverage_agents.velocity.settings import VelocitySettings
+from uas_coverage_agents.waypoint.settings import WaypointSettings
+from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.strict_toml import InputError, StrictModel, parse, read_toml
+
+PUBLISHED = Path(__file__).parents[1] / "configs"
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+Count = Annotated[int, Field(ge=1)]
+
+
+class PpoSettings(StrictModel):
+    """Proximal policy optimisation, as Stable-Baselines3 has it.
+
+    Attributes:
+        algorithm: "ppo"; "maskable-ppo" where the action has a mask.
+        rollout_steps: Steps of every lane between two updates.
+        batch_size: Samples of a gradient step.
+        epochs: Passes over the samples of a rollout.
+        learning_rate: At the start.
+        final_share: What part of the learning rate is left in the end; it falls linearly.
+        gamma: Discount of a decision.
+        gae_lambda: Of the generalised advantage estimate.
+        clip: Of the probability ratio.
+        entropy: Weight of the entropy in the loss.
+    """
+
+    algorithm: Literal["ppo", "maskable-ppo"]
+    rollout_steps: Count = 128
+    batch_size: Count = 2048
+    epochs: Count = 4
+    learning_rate: Positive = 4e-4
+    final_share: Share = 0.1
+    gamma: Share = 0.99
+    gae_lambda: Share = 0.95
+    clip: Positive = 0.2
+    entropy: Annotated[float, Field(ge=0.0)] = 0.0
+
+
+class SacSettings(StrictModel):
+    """Soft actor-critic, as Stable-Baselines3 has it.
+
+    Attributes:
+        algorithm: "sac".
+        buffer_size: Samples that are remembered.
+        first_samples: Samples before the first update.
+        batch_size: Samples of a gradient step.
+        updates_per_step: Gradient steps for a step of all lanes.
+        learning_rate: At the start.
+        final_share: See `PpoSettings`.
+        gamma: Discount of a decision.
+    """
+
+    algorithm: Literal["sac"]
+    buffer_size: Annotated[int, Field(ge=1000, le=2_000_000)] = 100_000
+    first_samples: Count = 5000
+    batch_size: Count = 512
+    updates_per_step: Count = 2
+    learning_rate: Positive = 5e-4
+    final_share: Share = 0.1
+    gamma: Share = 0.99
+
+
+class TrainingScenarios(StrictModel):
+    """What is flown while learning.
+
+    Attributes:
+        family: Generated towns, or one scenario.
+        pool: How many different towns; each episode draws one of them.
+    """
+
+    family: ScenarioFamily
+    pool: Annotated[int, Field(ge=1, le=10_000)] = 128
+
+
+class TrainingConfig(StrictModel):
+    """One training.
+
+    Attributes:
+        summary: What it is, in a line.
+        steps: Of all lanes together, those that wait for the others included.
+        lanes: Missions flown at the same time; a lane of the learner is one UAS of one of them
+            (velocities) or the whole team (waypoints).
+        scenarios: Where.
+        learning: How the network is improved.
+        player: What it reads, what it commands, and what it is paid for.
+    """
+
+    summary: str
+    steps: Count
+    lanes: Annotated[int, Field(ge=1, le=65_536)]
+    scenarios: TrainingScenarios
+    learning: Annotated[PpoSettings | SacSettings, Field(discriminator="algorithm")]
+    player: Annotated[VelocitySettings | WaypointSettings, Field(discriminator="interface")]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        masked = self.player.interface == "waypoint"
+        if masked != (self.learning.algorithm == "maskable-ppo"):
+            raise ValueError(
+                f"learning.algorithm is {self.learning.algorithm!r}, but player.interface is "
+                f"{self.player.interface!r}; waypoints need maskable-ppo, velocities ppo or sac"
+            )
+        return self
+
+
+def published_names() -> tuple[str, ...]:
+    """Names of the configurations that come with the package."""
+    return tuple(sorted(path.stem for path in PUBLISHED.glob("*.toml")))
+
+
+def load_config(
+    name_or_path: str, *, scenario: str | None = None, changes: Sequence[str] = ()
+) -> TrainingConfig:
+    """Read a configuration.
+
+    Args:
+        name_or_path: One of `published_names()`, or the path of a TOML file.
+        scenario: Train on this one instead: "generated", or what `load_scenario` takes.
+        changes: `key=value` pairs, the key as in `learning.gamma`, the value as in TOML.
+
+    Raises:
+        InputError: There is none such, or something in it is wrong; one line.
+    """
+    if name_or_path in published_names():
+        path = PUBLISHED / f"{name_or_path}.toml"
+    elif name_or_path.endswith(".toml"):
+        path = Path(name_or_path)
+    else:
+        names = ", ".join(published_names())
+        raise InputError(
+            f"unknown algorithm {name_or_path[:80]!r}; take {names}, or the path of a .toml file"
+        )
+    config = read_toml(path, TrainingConfig)
+    if scenario is None and not changes:
+        return config
+    data = config.model_dump(mode="json")
+    if scenario is not None and scenario != data["scenarios"]["family"]["name"]:
+        if scenario == "generated":
+            raise InputError(f"{path}: trains on {data['scenarios']['family']['name']}, no towns")
+        load_scenario(scenario)  # refuses now what could not be flown later
+        data["scenarios"]["family"] = {"name": scenario}
+    for change in changes:
+        _set(data, change)
+    return parse(data, TrainingConfig, f"{path} with your --set and --scenario")
+
+
+def _set(data: dict[str, Any], change: str) -> None:
+    """Put one `key=value` into the nested tables."""
+    key, separator, text = (part.strip() for part in change.partition("="))
+    if not separator or not key:
+        raise InputError(f"--set {change!r}: should be KEY=VALUE, as in learning.gamma=0.99")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError):
+        value = text  # a plain word is text
+    *tables, last = key.split(".")
+    table = data
+    for name in tables:
+        inner = table.get(name)
+        if not isinstance(inner, dict):
+            raise InputError(f"--set {change!r}: there is no table {name!r}")
+        table = inner
+    if last not in table:
+        raise InputError(f"--set {change!r}: there is no {last!r}; there are {', '.join(table)}")
+    table[last] = value

@@ -1,0 +1,133 @@
+"""A training as plain arrays and back: model, optimisers, random numbers and lanes.
+
+Stable-Baselines3 saves models by pickle; here only tensors and numbers are kept, so that reading a
+checkpoint can execute nothing.
+"""
+
+from collections.abc import Iterator
+from typing import Any, cast
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.vec_env import VecEnv
+
+from uas_coverage_agents.training.learner import Lanes
+from uas_coverage_env.strict_toml import InputError
+
+Arrays = dict[str, NDArray[np.generic]]
+
+_REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def frozen(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
+    """Everything that decides how the training goes on, in arrays of its own.
+
+    To be called between two updates: what a rollout has collected so far is not kept.
+    """
+    arrays = {name: tensor.detach().cpu().numpy().copy() for name, tensor in _tensors(model)}
+    # Stable-Baselines3 draws from the global generators
+    numbers = np.random.get_state(legacy=False)  # noqa: NPY002
+    arrays["random/torch"] = torch.get_rng_state().numpy().copy()
+    arrays["random/numpy"] = np.array(numbers["state"]["key"])
+    arrays["random/numpy.place"] = np.array([numbers["state"]["pos"], numbers["has_gauss"]])
+    arrays["random/numpy.gauss"] = np.array([numbers["gauss"]])
+    arrays["last/observation"] = np.array(model._last_obs)
+    arrays["last/episode_starts"] = np.array(model._last_episode_starts)
+    arrays["last/counters"] = np.array([model.num_timesteps, model._n_updates, model._episode_num])
+    for name, array in cast(Lanes, lanes).state_dict().items():
+        arrays[f"lanes/{name}"] = np.array(array)
+    if isinstance(model, OffPolicyAlgorithm):
+        buffer = cast(Any, model.replay_buffer)
+        filled = buffer.buffer_size if buffer.full else buffer.pos
+        arrays["memory/place"] = np.array([buffer.pos, buffer.full])
+        for name in _REMEMBERED:
+            arrays[f"memory/{name}"] = getattr(buffer, name)[:filled].copy()
+    return arrays
+
+
+def thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+    """Put a freshly made model and its lanes where they were when `frozen` was called.
+
+    Raises:
+        InputError: The arrays are those of another model.
+    """
+    try:
+        _thaw(arrays, model, lanes)
+    except (KeyError, ValueError, IndexError, RuntimeError, TypeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(
+            f"the checkpoint does not fit this version ({reason}); start anew with --overwrite"
+        ) from error
+
+
+def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+    with torch.no_grad():
+        _make_optimiser_state(arrays, model)
+        for name, tensor in _tensors(model):
+            array = arrays[name]
+            if array.shape != tuple(tensor.shape):
+                raise ValueError(f"{name} has shape {array.shape}, not {tuple(tensor.shape)}")
+            tensor.copy_(torch.from_numpy(array.copy()))
+    torch.set_rng_state(torch.from_numpy(arrays["random/torch"].copy()))
+    pos, has_gauss = arrays["random/numpy.place"].tolist()
+    np.random.set_state(  # noqa: NPY002
+        {
+            "bit_generator": "MT19937",
+            "state": {"key": arrays["random/numpy"], "pos": pos},
+            "has_gauss": has_gauss,
+            "gauss": arrays["random/numpy.gauss"].item(),
+        }
+    )
+    model._last_obs = arrays["last/observation"].copy()
+    model._last_episode_starts = arrays["last/episode_starts"].copy()
+    steps, updates, episodes = arrays["last/counters"].tolist()
+    model.num_timesteps, model._n_updates, model._episode_num = steps, updates, episodes
+    state = {name[6:]: array for name, array in arrays.items() if name.startswith("lanes/")}
+    cast(Lanes, lanes).load_state_dict(state)
+    if isinstance(model, OffPolicyAlgorithm):
+        buffer = cast(Any, model.replay_buffer)
+        pos, full = arrays["memory/place"].tolist()
+        buffer.pos, buffer.full = pos, bool(full)
+        model._last_original_obs = model._last_obs
+        for name in _REMEMBERED:
+            getattr(buffer, name)[: len(arrays[f"memory/{name}"])] = arrays[f"memory/{name}"]
+
+
+def _optimisers(model: BaseAlgorithm) -> Iterator[tuple[str, torch.optim.Optimizer]]:
+    for owner in ("policy", "actor", "critic"):
+        optimiser = getattr(getattr(model, owner, None), "optimizer", None)
+        if isinstance(optimiser, torch.optim.Optimizer):
+            yield owner, optimiser
+    optimiser = getattr(model, "ent_coef_optimizer", None)
+    if isinstance(optimiser, torch.optim.Optimizer):
+        yield "entropy", optimiser
+
+
+def _tensors(model: BaseAlgorithm) -> Iterator[tuple[str, torch.Tensor]]:
+    """All tensors that training changes, by name, the same in every process."""
+    for name, tensor in model.policy.state_dict(keep_vars=True).items():
+        yield f"policy/{name}", tensor
+    log_entropy = getattr(model, "log_ent_coef", None)
+    if isinstance(log_entropy, torch.Tensor):
+        yield "entropy/log", log_entropy
+    for owner, optimiser in _optimisers(model):
+        parameters = [p for group in optimiser.param_groups for p in group["params"]]
+        for number, parameter in enumerate(parameters):
+            for name, value in sorted(optimiser.state.get(parameter, {}).items()):
+                yield f"optimiser/{owner}/{number}/{name}", value
+
+
+def _make_optimiser_state(arrays: Arrays, model: BaseAlgorithm) -> None:
+    """Give each optimiser room for what it remembered; a new one remembers nothing."""
+    for owner, optimiser in _optimisers(model):
+        parameters = [p for group in optimiser.param_groups for p in group["params"]]
+        for number, parameter in enumerate(parameters):
+            start = f"optimiser/{owner}/{number}/"
+            optimiser.state[parameter] = {
+                name[len(start) :]: torch.from_numpy(array.copy())
+                for name, array in arrays.items()
+                if name.startswith(start)
+            }

@@ -1,0 +1,185 @@
+"""The training loop: learn, look how it flies, put it aside, go on; the same for all learners."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+
+from uas_coverage_agents.policy import Policy
+from uas_coverage_agents.training import curve
+from uas_coverage_agents.training.checkpoint import (
+    Checkpoint,
+    CurvePoint,
+    Standing,
+    newest_checkpoint,
+    write_checkpoint,
+)
+from uas_coverage_agents.training.freeze import frozen, thaw
+from uas_coverage_agents.training.scenarios import validation_scenarios
+from uas_coverage_agents.training.score import MEASURES
+from uas_coverage_agents.training.trainee import Order, Trainee
+
+__all__ = ["Order", "TrainingProgress", "import_zip", "train"]
+
+CHECKPOINTS = "checkpoints"
+POLICY = "policy"
+
+_CURVE_POINTS = 10
+_CURVE_MISSIONS = 12
+_NO_END = 2**62
+
+
+@dataclass(frozen=True)
+class TrainingProgress:
+    """Where a training stands.
+
+    Attributes:
+        share: Of the whole, 0 to 1.
+        steps: Steps learned from.
+        point: The latest point of the learning curve.
+    """
+
+    share: float
+    steps: int
+    point: CurvePoint | None
+
+
+def train(
+    order: Order,
+    directory: Path,
+    on_progress: Callable[[TrainingProgress], object] = lambda _: None,
+) -> Policy:
+    """Train a policy, or go on with its training; leaves everything in the directory.
+
+    `checkpoints/`, `tensorboard/`, `learning_curve.csv` and `.png`, and in the end `policy/`.
+
+    Args:
+        order: What to train.
+        directory: Where; a checkpoint in it is gone on from.
+        on_progress: Told now and then.
+
+    Raises:
+        InputError: The checkpoints there cannot be read or are those of another network.
+    """
+    trainee = Trainee.untrained(order)
+    before = newest_checkpoint(directory / CHECKPOINTS)
+    if before is not None:
+        thaw(before.tensors, trainee.model, trainee.lanes)
+    watch = _Watch(trainee, directory, before.standing if before else None, on_progress)
+    if before is None or not before.standing.done:
+        model = trainee.model
+        model.lr_schedule = watch.learning_rate
+        model.set_logger(configure(str(directory / "tensorboard"), ["tensorboard"]))
+        end = order.config.steps if order.minutes is None else _NO_END
+        if end > model.num_timesteps:
+            model.learn(end - model.num_timesteps, callback=watch, reset_num_timesteps=False)
+        watch.finish()
+    trainee.lanes.close()
+    return trainee.publish(directory / POLICY)
+
+
+def import_zip(order: Order, zip_file: Path, directory: Path) -> Policy:
+    """Turn a model that Stable-Baselines3 has saved into a policy, scored like a trained one.
+
+    Raises:
+        InputError: The file is no such zip, or holds another network.
+    """
+    trainee = Trainee.untrained(order)
+    trainee.read_zip(zip_file)
+    return trainee.publish(directory / POLICY)
+
+
+class _Watch(BaseCallback):
+    """Looks up between two updates: the only moments at which a training can be put aside."""
+
+    def __init__(
+        self,
+        trainee: Trainee,
+        directory: Path,
+        standing: Standing | None,
+        on_progress: Callable[[TrainingProgress], object],
+    ) -> None:
+        super().__init__()
+        self._trainee, self._directory, self._on_progress = trainee, directory, on_progress
+        order = trainee.order
+        self._points = list(standing.curve) if standing else []
+        self._process_before_s = (standing.process_s if standing else 0.0) - time.process_time()
+        self._wall_before_s = (standing.wall_s if standing else 0.0) - time.monotonic()
+        self._saved_at_s = time.monotonic()
+        self._scenarios = validation_scenarios(
+            order.config.scenarios.family, min(order.missions, _CURVE_MISSIONS)
+        )
+        self._share = 0.0
+        self._look_at_the_clock()
+
+    def learning_rate(self, _: float) -> float:
+        """Falls linearly with what is done of the training."""
+        learning = self._trainee.order.config.learning
+        left = learning.final_share + (1.0 - learning.final_share) * (1.0 - self._share)
+        return learning.learning_rate * left
+
+    def finish(self) -> None:
+        """The training is complete."""
+        self._look_at_the_clock()
+        self._share = 1.0
+        self._fly()
+        self._save(done=True)
+        self._tell()
+
+    def _on_rollout_start(self) -> None:
+        self._look_at_the_clock()
+        order = self._trainee.order
+        if order.minutes is None:
+            self._share = min(1.0, self.model.num_timesteps / order.config.steps)
+        else:
+            self._share = min(1.0, self._trainee.wall_s / (60.0 * order.minutes))
+        if self._share * _CURVE_POINTS >= len(self._points):
+            self._fly()
+        if time.monotonic() - self._saved_at_s >= order.checkpoint_s:
+            self._save(done=False)
+        self._tell()
+
+    def _on_step(self) -> bool:
+        # the clock is looked at before a rollout, so that none is thrown away
+        return self._trainee.order.minutes is None or self._share < 1.0
+
+    def _look_at_the_clock(self) -> None:
+        self._trainee.process_s = self._process_before_s + time.process_time()
+        self._trainee.wall_s = self._wall_before_s + time.monotonic()
+
+    def _tell(self) -> None:
+        point = self._points[-1] if self._points else None
+        self._on_progress(TrainingProgress(self._share, self.model.num_timesteps, point))
+
+    def _save(self, *, done: bool) -> None:
+        """Put the training aside."""
+        standing = Standing(
+            steps=self.model.num_timesteps,
+            updates=self.model._n_updates,
+            process_s=self._trainee.process_s,
+            wall_s=self._trainee.wall_s,
+            done=done,
+            curve=tuple(self._points),
+        )
+        checkpoint = Checkpoint(standing, frozen(self.model, self._trainee.lanes))
+        write_checkpoint(self._directory / CHECKPOINTS, checkpoint)
+        self._saved_at_s = time.monotonic()
+
+    def _fly(self) -> None:
+        """Fly some validation missions for the learning curve; draws no lots of the training."""
+        results = self._trainee.flights(self._scenarios)
+        means = dict(zip(MEASURES, results.mean(axis=0).tolist(), strict=True))
+        self._points.append(
+            CurvePoint(
+                steps=self.model.num_timesteps,
+                process_s=self._trainee.process_s,
+                wall_s=self._trainee.wall_s,
+                **means,
+            )
+        )
+        for name, mean in means.items():
+            self.logger.record(f"validation/{name}", mean)
+        curve.write(self._points, self._directory)

@@ -1,0 +1,256 @@
+"""Missions as Stable-Baselines3 wants them: every UAS of every mission is a lane of one `VecEnv`.
+
+All UAS share one policy. Wrappers around a PettingZoo environment do the same, but cannot be seeded
+and never say that an episode was cut, so that the value of its last state is lost.
+"""
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+
+from uas_coverage_env.env import CoverageBatch, observation_bounds
+from uas_coverage_env.env.kernel import STATUS
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import FLYING
+
+
+class CoverageVecEnv(VecEnv):
+    """`num_missions` missions of U UAS each: lane m · U + i is UAS i of mission m.
+
+    Episodes of a lane:
+        The episode of a UAS ends when it has landed or is lost (terminated), or when the mission is
+        cut while it flies (truncated: `infos[lane]["TimeLimit.truncated"]` is True, and learners
+        add the value of what comes after). In both cases `dones` is True, and the info has
+        `terminal_observation` and, as `Monitor` would write it, `episode` (return, length, time).
+
+        A UAS that has ended before its mission waits: its reward is 0, its observation stays, its
+        actions have no effect, and `alive` is False. A mission begins anew in the step in which it
+        ends; then `dones` is True for those who waited, too, so that nothing is carried over from
+        the mission before, but there is no `episode` to count. The same holds for UAS that the
+        scenario of a mission does not have, where scenarios of different fleets are mixed; their
+        observation is zero.
+
+    Seeds:
+        `seed(s)` seeds the draw of scenarios of mission m with s + m, at the next reset; the
+        missions themselves hold nothing random.
+
+    Observations are overwritten in the step after the next; Stable-Baselines3 has copied them by
+    then.
+
+    Args:
+        num_missions: How many.
+        scenario: A scenario, its name or file, or a sequence of these to draw from.
+        action: A name of `uas_coverage_env.env.ACTION_NAMES`.
+        **settings: See `uas_coverage_env.env.CoverageBatch`: dynamics, return_mode, safety_filter,
+            reward_weights, max_cycles.
+
+    Attributes:
+        batch: What flies.
+        num_missions: As given.
+        n_uas: U, of the largest fleet.
+
+    Raises:
+        ValueError: An argument is none of what is allowed.
+    """
+
+    def __init__(
+        self,
+        num_missions: int,
+        scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
+        *,
+        action: str = "velocity",
+        **settings: Any,
+    ) -> None:
+        self.batch = CoverageBatch(
+            num_missions, scenario, action=action, autoreset="same_step", **settings
+        )
+        self.num_missions = self.batch.num_lanes
+        self.n_uas = self.batch.n_uas
+        shape = (self.num_missions, self.n_uas)
+        self._returns = np.zeros(shape)
+        self._lengths = np.zeros(shape, dtype=np.int64)
+        self._actions: NDArray[Any] = np.zeros(0)
+        self._begun_s = time.perf_counter()
+        self._attributes: dict[str, list[Any]] = {}
+        low, high = observation_bounds()
+        super().__init__(
+            self.num_missions * self.n_uas,
+            spaces.Box(low, high, dtype=np.float32),
+            self.batch.actions.space(),
+        )
+
+    @property
+    def alive(self) -> NDArray[np.bool_]:
+        """(num_envs,) whose UAS flies now, and so acts in the coming step."""
+        return self.batch.flying.reshape(-1)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed the draw of scenarios at the next reset; None: with a number of no meaning."""
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**32))
+        self._seeds = [int(seed) + lane // self.n_uas for lane in range(self.num_envs)]
+        return self._seeds
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin new missions in all lanes."""
+        seeds = self._seeds[:: self.n_uas]
+        observation = self.batch.reset(seeds)
+        self._reset_seeds()
+        self._reset_options()
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
+        return self._flat(observation)
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Take the actions of all lanes, (num_envs, size), or (num_envs,) choices."""
+        self._actions = actions
+
+    def step_wait(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Fly all missions for one step.
+
+        Raises:
+            ValueError: An action is not finite or of a wrong shape; nothing has changed.
+        """
+        batch = self.batch
+        flew = batch.flying
+        observation = batch.step(self._actions.reshape(self.num_missions, -1))
+        lanes = batch.lanes
+        over = (lanes.terminated | lanes.truncated)[:, None]
+        # of a mission that is over, the world shows the next one already
+        flies = np.where(over, lanes.final_report[:, :, STATUS] == FLYING, batch.flying)
+        ended = (flew & ~flies) | over
+        self._returns += lanes.rewards
+        self._lengths += flew
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if ended.any():
+            for lane, i in np.argwhere(ended).tolist():
+                info = infos[lane * self.n_uas + i]
+                last = lanes.final_observation if over[lane, 0] else observation
+                info["terminal_observation"] = last[lane, i].copy()
+                info["TimeLimit.truncated"] = bool(flies[lane, i])
+                if flew[lane, i]:
+                    info["episode"] = self._episode(lane, i)
+            self._returns[ended] = 0.0
+            self._lengths[ended] = 0
+        rewards = lanes.rewards.astype(np.float32).reshape(-1)
+        return self._flat(observation), rewards, ended.reshape(-1), infos
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """(num_envs, choices) which choices exist now, for sb3-contrib's MaskablePPO.
+
+        Raises:
+            AttributeError: The action is not "waypoint".
+        """
+        self._check_choices()
+        masks = self.batch.action_masks()
+        return masks.reshape(self.num_envs, -1)
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """All that changes from step to step, in arrays: enough to go on bit for bit."""
+        return {
+            **self.batch.state_dict(),
+            "episode_returns": self._returns.copy(),
+            "episode_lengths": self._lengths.copy(),
+        }
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """Go on where an environment of the same arguments was.
+
+        Returns:
+            The observations of all lanes, as the latest step or reset gave them.
+
+        Raises:
+            ValueError: An array is missing, surplus, or of another shape or dtype.
+        """
+        own = {"episode_returns": self._returns, "episode_lengths": self._lengths}
+        for name, array in own.items():
+            if name not in state or np.shape(state[name]) != array.shape:
+                raise ValueError(f"{name} is missing, or not of shape {array.shape}")
+        self.batch.load_state_dict({k: v for k, v in state.items() if k not in own})
+        for name, array in own.items():
+            array[:] = state[name]
+        return self._flat(self.batch.observation)
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute of some lanes: `scenario`, `alive`, one that was set, or a common one.
+
+        Raises:
+            AttributeError: There is no such attribute.
+        """
+        lanes = list(self._get_indices(indices))
+        if attr_name in self._attributes:
+            return [self._attributes[attr_name][lane] for lane in lanes]
+        if attr_name == "scenario":
+            return [self.batch.scenario_of(lane // self.n_uas) for lane in lanes]
+        if attr_name == "alive":
+            alive = self.alive.tolist()
+            return [alive[lane] for lane in lanes]
+        if attr_name == "render_mode":
+            return [None] * len(lanes)
+        if attr_name == "action_masks":
+            self._check_choices()
+        value = getattr(self, attr_name)
+        return [value] * len(lanes)
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Give some lanes an attribute for `get_attr`; it has no effect on the missions.
+
+        Raises:
+            AttributeError: The name is one of the environment's own, which all lanes share.
+        """
+        if attr_name == "scenario" or hasattr(self, attr_name):
+            raise AttributeError(f"{attr_name} belongs to all lanes; make another environment")
+        values = self._attributes.setdefault(attr_name, [None] * self.num_envs)
+        for lane in self._get_indices(indices):
+            values[lane] = value
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method for some lanes: `action_masks` is the only one.
+
+        Raises:
+            AttributeError: There is no such method.
+        """
+        if method_name != "action_masks":
+            raise AttributeError(f"lanes have no method {method_name!r}; they have action_masks")
+        masks = self.action_masks(*method_args, **method_kwargs)
+        return [masks[lane] for lane in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
+        """Whether lanes have what a wrapper adds: episodes are told as `Monitor` tells them."""
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
+
+    def close(self) -> None:
+        """Nothing is held that would have to be given back."""
+
+    def _flat(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        return observation.reshape(self.num_envs, -1)
+
+    def _episode(self, lane: int, i: int) -> dict[str, float]:
+        return {
+            "r": float(self._returns[lane, i]),
+            "l": int(self._lengths[lane, i]),
+            "t": time.perf_counter() - self._begun_s,
+        }
+
+    def _check_choices(self) -> None:
+        if not self.batch.chooses:
+            raise AttributeError('only action="waypoint" has masks; the others are continuous')
+
+    def _get_indices(self, indices: VecEnvIndices) -> Iterable[int]:
+        return super()._get_indices(indices)

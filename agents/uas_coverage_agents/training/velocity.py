@@ -1,0 +1,193 @@
+"""Learning to command velocities: one network for every UAS, by PPO or SAC."""
+
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.buffers import RolloutBuffer
+from stable_baselines3.common.type_aliases import RolloutBufferSamples
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+from uas_coverage_agents.policy import Mlp, Network, Observation
+from uas_coverage_agents.training.config import SacSettings, TrainingConfig
+from uas_coverage_agents.training.scenarios import training_scenarios
+from uas_coverage_agents.training.vec_env import CoverageVecEnv
+from uas_coverage_agents.velocity.pilot import OUTPUTS, observation
+from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
+from uas_coverage_env.env.layout import NEARBY_M
+
+_FLYING = int(observation_columns("own", "flying")[0, 0])
+_RETURNING = int(observation_columns("own", "returning")[0, 0])
+_NEAREST_VALID = int(observation_columns("waypoints", "valid")[0, 0])
+_NEAREST_CLOSENESS = int(observation_columns("waypoints", "closeness")[0, 0])
+
+_PITCH_M = 68.0
+"""About as far apart as neighbouring waypoints of generated towns are [m]."""
+
+
+class VelocityLanes(VecEnvWrapper):
+    """The lanes of UAS as a learner should see them.
+
+    A UAS decides while it flies and return mode has not taken it over. The lane of one that does
+    not decide shows zeros and pays nothing, and the takeover ends its episode: what the autopilot
+    does is neither its merit nor its fault. The end of the time is part of the mission and ends the
+    episode as well.
+
+    Added to the reward is a potential that changes no optimal policy (Ng, Harada, Russell 1999):
+    gamma · potential' - potential, the potential being minus the distance to the nearest open
+    waypoint, zero where the episode has ended.
+
+    Args:
+        lanes: Of the environment.
+        nearing: Weight of the potential per 68 m.
+        gamma: Discount.
+    """
+
+    def __init__(self, lanes: VecEnv, nearing: float, gamma: float) -> None:
+        super().__init__(lanes)
+        self._nearing, self._gamma = nearing, gamma
+        self._decides = np.zeros(self.num_envs, dtype=np.bool_)
+        self._potential = np.zeros(self.num_envs)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin a mission in every lane."""
+        return self._seen(np.asarray(self.venv.reset()))
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Fly one step."""
+        view, rewards, ended, infos = self.venv.step_wait()
+        decided, potential = self._decides, self._potential
+        view = self._seen(np.asarray(view))
+        ended = ended | (decided & ~self._decides)
+        ahead = np.where(ended, 0.0, self._gamma * self._potential)
+        rewards = np.where(decided, rewards + ahead - potential, 0.0)
+        for lane in np.flatnonzero(ended):
+            infos[lane]["TimeLimit.truncated"] = False
+        return view, rewards.astype(np.float32), ended, infos
+
+    def state_dict(self) -> dict[str, NDArray[np.generic]]:
+        """See `Lanes`; what is kept here follows from it."""
+        lanes: Any = self.venv
+        return lanes.state_dict()
+
+    def load_state_dict(self, state: dict[str, NDArray[np.generic]]) -> None:
+        """See `Lanes`."""
+        lanes: Any = self.venv
+        self._seen(lanes.load_state_dict(state))
+
+    def _seen(self, view: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Note who decides now and how near everybody is; the view without the others."""
+        self._decides = (view[:, _FLYING] > 0.0) & (view[:, _RETURNING] == 0.0)
+        closeness = np.maximum(view[:, _NEAREST_CLOSENESS], 1e-3)
+        distance_m = np.where(view[:, _NEAREST_VALID] > 0.0, NEARBY_M * (1 / closeness - 1), 0.0)
+        self._potential = np.where(self._decides, -self._nearing * distance_m / _PITCH_M, 0.0)
+        return np.where(self._decides[:, None], view, np.float32(0.0))
+
+
+class DecidingRollouts(RolloutBuffer):
+    """The samples of a rollout without those in which nothing was decided."""
+
+    def get(self, batch_size: int | None = None) -> Iterator[RolloutBufferSamples]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Batches of samples in random order; a small rest is left out."""
+        if not self.generator_ready:
+            names = ("observations", "actions", "values", "log_probs", "advantages", "returns")
+            for name in names:
+                setattr(self, name, self.swap_and_flatten(getattr(self, name)))
+            self.generator_ready = True
+        decided = np.flatnonzero(self.observations[:, _FLYING] > 0.0)
+        samples = np.random.permutation(decided)  # noqa: NPY002  # as the base class draws
+        size = batch_size or len(samples)
+        for start in range(0, max(1, len(samples) - size // 2), size):
+            yield self._get_samples(samples[start : start + size])
+
+
+class VelocityLearner:
+    """See `Learner`."""
+
+    def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
+        """The environment to learn in."""
+        player = config.player
+        lanes = CoverageVecEnv(
+            config.lanes,
+            training_scenarios(config.scenarios, seed),
+            return_mode=player.return_mode,
+            safety_filter=player.safety_filter,
+            reward_weights=player.rewards,
+        )
+        lanes.seed(seed)
+        return VelocityLanes(lanes, player.nearing, config.learning.gamma)
+
+    def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
+        """The untrained model."""
+        player, learning = config.player, config.learning
+        activation = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[player.activation]
+        network: dict[str, Any] = {"net_arch": list(player.hidden), "activation_fn": activation}
+        if isinstance(learning, SacSettings):
+            return SAC(
+                "MlpPolicy",
+                lanes,
+                learning_rate=learning.learning_rate,
+                buffer_size=learning.buffer_size,
+                learning_starts=learning.first_samples,
+                batch_size=learning.batch_size,
+                gradient_steps=learning.updates_per_step,
+                gamma=learning.gamma,
+                policy_kwargs=network,
+                device="cpu",
+                seed=seed,
+            )
+        with warnings.catch_warnings():
+            # of a rest that is no whole batch: `DecidingRollouts` leaves it out
+            warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
+            return PPO(
+                "MlpPolicy",
+                lanes,
+                learning_rate=learning.learning_rate,
+                n_steps=learning.rollout_steps,
+                batch_size=learning.batch_size,
+                n_epochs=learning.epochs,
+                gamma=learning.gamma,
+                gae_lambda=learning.gae_lambda,
+                clip_range=learning.clip,
+                ent_coef=learning.entropy,
+                rollout_buffer_class=DecidingRollouts,
+                policy_kwargs={**network, "log_std_init": float(np.log(player.first_deviation))},
+                device="cpu",
+                seed=seed,
+            )
+
+    def export(self, model: BaseAlgorithm) -> tuple[Network, dict[str, NDArray[np.float32]]]:
+        """The network that gives the mean action, and its weights."""
+        parts = _actor(model)
+        modules = [part for part in parts if isinstance(part, torch.nn.Linear)]
+        tensors = {}
+        for k, module in enumerate(modules):
+            tensors[f"layers.{k}.weight"] = module.weight.detach().numpy().copy()
+            tensors[f"layers.{k}.bias"] = module.bias.detach().numpy().copy()
+        relu = any(isinstance(part, torch.nn.ReLU) for part in parts)
+        network = Mlp(
+            inputs=OBSERVATION_SIZE,
+            hidden=tuple(module.out_features for module in modules[:-1]),
+            outputs=OUTPUTS,
+            activation="relu" if relu else "tanh",
+            squash=isinstance(model, SAC),
+        )
+        return network, tensors
+
+    def observation(self, config: TrainingConfig) -> Observation:
+        """What that network reads."""
+        return observation()
+
+
+def _actor(model: BaseAlgorithm) -> list[torch.nn.Module]:
+    """The layers from observation to mean action, in order."""
+    policy: Any = model.policy
+    if isinstance(model, SAC):
+        return [*policy.actor.latent_pi, policy.actor.mu]
+    return [*policy.mlp_extractor.policy_net, policy.action_net]

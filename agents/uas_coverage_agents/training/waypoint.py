@@ -1,0 +1,66 @@
+"""Learning to choose waypoints: one network for every UAS, by PPO with masked choices."""
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from sb3_contrib import MaskablePPO
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv
+
+from uas_coverage_agents.policy import Network, Observation
+from uas_coverage_agents.training.config import PpoSettings, TrainingConfig
+from uas_coverage_agents.training.pointer import PointerPolicy
+from uas_coverage_agents.training.scenarios import training_scenarios
+from uas_coverage_agents.training.waypoint_env import WaypointVecEnv
+from uas_coverage_agents.waypoint.pilot import network, observation
+from uas_coverage_agents.waypoint.scenarios import with_moving_obstacles
+from uas_coverage_agents.waypoint.settings import WaypointSettings
+
+
+class WaypointLearner:
+    """See `Learner`."""
+
+    def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
+        """Teams on the scenarios of the configuration, some of them with moving obstacles."""
+        player = _player(config)
+        scenarios = training_scenarios(config.scenarios, seed)
+        lots = np.random.default_rng([seed, len(scenarios)])
+        moving = lots.random(len(scenarios)) < player.moving_share
+        scenarios = [
+            with_moving_obstacles(scenario, seed * len(scenarios) + number) if moves else scenario
+            for number, (scenario, moves) in enumerate(zip(scenarios, moving, strict=True))
+        ]
+        return WaypointVecEnv(scenarios, player, config.lanes, seed)
+
+    def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
+        """A model that takes the nearest waypoint at first."""
+        player, learning = _player(config), cast(PpoSettings, config.learning)
+        return MaskablePPO(
+            PointerPolicy,
+            lanes,
+            learning_rate=learning.learning_rate,
+            n_steps=learning.rollout_steps,
+            batch_size=learning.batch_size,
+            n_epochs=learning.epochs,
+            gamma=learning.gamma,
+            gae_lambda=learning.gae_lambda,
+            clip_range=learning.clip,
+            ent_coef=learning.entropy,
+            policy_kwargs={"pointer": network(player.hidden, player.prior)},
+            device="cpu",
+            seed=seed,
+        )
+
+    def export(self, model: BaseAlgorithm) -> tuple[Network, dict[str, NDArray[np.float32]]]:
+        """The pointer network and its weights."""
+        policy = cast(PointerPolicy, model.policy)
+        return policy.pointer, policy.tensors()
+
+    def observation(self, config: TrainingConfig) -> Observation:
+        """What that network reads."""
+        return observation()
+
+
+def _player(config: TrainingConfig) -> WaypointSettings:
+    return cast(WaypointSettings, config.player)

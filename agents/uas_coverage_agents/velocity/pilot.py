@@ -1,0 +1,60 @@
+"""Flies with a policy that commands velocities."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.directory import Policy
+from uas_coverage_env.env import Observer
+from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.layout import OBSERVATION_LAYOUT, SCALES
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Command, SwarmState, Velocity, World
+
+LAYOUT = "uas_coverage_v0"
+OUTPUTS = 3
+
+
+def observation() -> Observation:
+    """What the policy reads: the observation of the environment, as it is."""
+    return Observation.of(LAYOUT, OBSERVATION_LAYOUT, SCALES)
+
+
+class VelocityPilot:
+    """Every UAS on its own, with the same network: its observation in, its velocity out.
+
+    Raises:
+        ValueError: The policy was trained on another observation, or gives other outputs.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        description = policy.description
+        if description.observation != observation():
+            raise ValueError("its observation is not that of this version; train it anew")
+        if description.network.outputs != OUTPUTS:
+            raise ValueError(f"network.outputs is {description.network.outputs}, not {OUTPUTS}")
+        self._policy = policy
+
+    def warm_up(self, scenario: Scenario) -> None:
+        """Compile the observation."""
+        Observer(scenario).observe(World(scenario).swarm_state())
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Start a new mission; nothing is drawn."""
+        self._observer = Observer(scenario)
+        ranges = actions_of("velocity", scenario).ranges
+        self._middle = ranges["middle"][:, :OUTPUTS]
+        self._below = self._middle - ranges["lowest"][:, :OUTPUTS]
+        self._above = ranges["highest"][:, :OUTPUTS] - self._middle
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """The mean action of the policy, scaled to the vehicle as the environment does."""
+        outputs = self._policy.forward(self._observer.observe(swarm))
+        shares = np.clip(outputs, -1.0, 1.0)
+        values = self._middle + shares * np.where(shares < 0.0, self._below, self._above)
+        return {
+            name: Velocity(float(north_mps), float(east_mps), float(altitude_m))
+            for name, (north_mps, east_mps, altitude_m) in zip(swarm.names, values, strict=True)
+            if name in swarm.active
+        }

@@ -1,0 +1,185 @@
+"""Flies with a policy that chooses waypoints."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.directory import Policy
+from uas_coverage_agents.policy.pointer import Pointer
+from uas_coverage_agents.waypoint.layout import (
+    CANDIDATE,
+    CRUISE_SHARE,
+    LAYOUT,
+    N_CANDIDATE,
+    N_TEAM,
+    OBSERVATION_SIZE,
+    TEAM,
+    WAY,
+    K,
+)
+from uas_coverage_agents.waypoint.legs import legs_of
+from uas_coverage_agents.waypoint.look import NO_TARGET
+from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
+from uas_coverage_agents.waypoint.search import Desk, improve, no_plan, planned
+from uas_coverage_agents.waypoint.team import NOBODY, choose, next_to_decide
+from uas_coverage_env.flight import Assistants
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    HOME,
+    OUTCOME_DTYPE,
+    Command,
+    GoTo,
+    SwarmState,
+    Velocity,
+    World,
+    WorldState,
+    build_arena,
+)
+
+
+def network(hidden: int, prior: float) -> Pointer:
+    """The network that reads `observation()`."""
+    return Pointer(
+        inputs=OBSERVATION_SIZE,
+        outputs=K + 1,
+        team=N_TEAM,
+        candidates=K,
+        features=N_CANDIDATE,
+        way=WAY,
+        hidden=hidden,
+        prior=prior,
+    )
+
+
+def observation() -> Observation:
+    """What the policy reads."""
+    return Observation.of(LAYOUT, (TEAM, CANDIDATE), {"cruise_share": CRUISE_SHARE})
+
+
+_NOWHERE = np.zeros((1, 0, 3))
+
+
+class WaypointPilot:
+    """Every UAS chooses with the same network where to fly next; the world flies it there.
+
+    Args:
+        policy: Of the interface "waypoint".
+        assistants: The assistants of the world that fly along.
+        simulations: Missions simulated before a decision; 0: the network decides alone.
+
+    Raises:
+        ValueError: The policy was trained on another observation, or has another network.
+    """
+
+    def __init__(
+        self, policy: Policy, assistants: Assistants | None = None, simulations: int = 0
+    ) -> None:
+        described = policy.description
+        if described.observation != observation():
+            raise ValueError("its observation is not that of this version; train it anew")
+        if not isinstance(described.network, Pointer):
+            raise ValueError(f"network.kind is {described.network.kind!r}, not 'pointer'")
+        if described.network != network(described.network.hidden, described.network.prior):
+            raise ValueError("its network does not fit to its observation; train it anew")
+        self._weights = weights_of(described.network, policy.tensors)
+        self._assistants = assistants or Assistants(return_mode=True, safety_filter=True)
+        self._simulations = simulations
+
+    def warm_up(self, scenario: Scenario) -> None:
+        """Compile all that decides."""
+        self.reset(scenario, 0)
+        self.act(World(scenario).swarm_state())
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Start a new mission; simulations draw from the seed."""
+        # what moving obstacles are going to do is for nobody to know
+        arena = build_arena(scenario)
+        self._moving = arena.moving
+        self._still = arena._replace(
+            moving=arena.moving[:0], moving_path_m=_NOWHERE, moving_velocity_mps=_NOWHERE
+        )
+        self._legs = legs_of(self._still)
+        self._departed = np.zeros(len(scenario.uas), dtype=np.bool_)
+        n_uas, n_waypoints = len(scenario.uas), len(scenario.waypoints)
+        self._targets = np.full(n_uas, NO_TARGET)
+        self._returning = np.zeros(n_uas, dtype=np.bool_)
+        self._blocked = np.zeros(n_waypoints, dtype=np.bool_)
+        self._desk = Desk(
+            commands=np.zeros(n_uas, dtype=COMMAND_DTYPE),
+            outcome=np.zeros(n_uas, dtype=OUTCOME_DTYPE),
+            candidates=np.full(K, -1),
+            legal=np.zeros(K + 1, dtype=np.bool_),
+            observation=np.zeros(OBSERVATION_SIZE, dtype=np.float32),
+            scores=np.zeros(K + 1),
+        )
+        self._plan, self._trial, self._best = (no_plan(n_uas, n_waypoints) for _ in range(3))
+        self._rng = np.random.default_rng(seed)
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Keep the targets that are still good, and choose those that are missing."""
+        self._decide(swarm)
+        return {
+            name: self._command(int(self._targets[i]), -float(swarm.x[i, Z]))
+            for i, name in enumerate(swarm.names)
+            if name in swarm.active
+        }
+
+    @staticmethod
+    def _command(target: int, altitude_m: float) -> Command:
+        if target == NO_TARGET:  # return mode has taken over before there was one
+            return Velocity(0.0, 0.0, altitude_m, mode="return")
+        return GoTo(None) if target == HOME else GoTo(target, mode="covering")
+
+    def _decide(self, swarm: SwarmState) -> None:
+        """Let everybody choose who needs a target now."""
+        arena = self._still._replace(
+            moving=self._moving,
+            moving_path_m=swarm.moving_position_m[None].copy(),
+            moving_velocity_mps=swarm.moving_velocity_mps[None].copy(),
+        )
+        state = self._state(swarm)
+        desk = self._desk
+        looked_ahead = self._simulations == 0
+        while True:
+            i = next_to_decide(
+                arena, self._legs, state, self._assistants.return_mode, self._blocked,
+                self._targets, desk.candidates, desk.legal, desk.observation,
+            )  # fmt: skip
+            if i == NOBODY:
+                break
+            choice = best_choice(self._weights, desk.observation, desk.legal, desk.scores)
+            if not looked_ahead:
+                self._look_ahead(state)
+                looked_ahead = True
+            follow = planned(
+                state.uncovered, self._plan, self._plan.following, i, desk.candidates, desk.legal
+            )
+            choose(self._targets, desk.candidates, i, choice if follow < 0 else follow)
+        self._returning[:] = state.returning
+
+    def _look_ahead(self, state: WorldState) -> None:
+        """Make the plan better; the observation on the desk is lost."""
+        kept = (self._desk.candidates.copy(), self._desk.legal.copy())
+        improve(
+            self._still, self._legs, self._weights, state, self._targets, self._blocked,
+            self._assistants.return_mode, self._assistants.safety_filter, self._plan,
+            self._simulations, self._desk, self._rng, self._trial, self._best,
+        )  # fmt: skip
+        self._plan, self._best = self._best, self._plan
+        self._desk.candidates[:], self._desk.legal[:] = kept
+
+    def _state(self, swarm: SwarmState) -> WorldState:
+        away_m = np.linalg.norm(swarm.x[:, [X, Y, Z]] - swarm.home_m, axis=1)
+        self._departed |= away_m > self._still.rules["landing_distance_m"][0]
+        return WorldState(
+            x=swarm.x.copy(),
+            reference=swarm.reference_mps.copy(),
+            status=swarm.status.copy(),
+            departed=self._departed.copy(),
+            returning=self._returning.copy(),
+            uncovered=swarm.uncovered.copy(),
+            step=np.array([swarm.step]),
+        )

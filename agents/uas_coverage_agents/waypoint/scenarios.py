@@ -1,0 +1,52 @@
+"""Moving obstacles for generated towns, which have none."""
+
+import numpy as np
+
+from uas_coverage_env.scenario import MovingObstacle, Scenario, ScheduledVelocity
+
+_SAFE_DISTANCE_M = (3.0, 25.0)
+_DEPARTURE_S = (20.0, 200.0)
+_SPEED_MPS = (0.5, 3.0)
+_FREE_WEST_M = 100.0
+"""The west belongs to the starts [m]."""
+
+
+def with_moving_obstacles(scenario: Scenario, seed: int) -> Scenario:
+    """The scenario with one or two obstacles that are parked and leave, or cross it slowly."""
+    lots = np.random.default_rng(seed)
+    corners_m = np.array(scenario.geofence.vertices_m)
+    moving = tuple(
+        _moving_obstacle(lots, f"moving_{m + 1}", corners_m.min(axis=0), corners_m.max(axis=0))
+        for m in range(int(lots.integers(1, 3)))
+    )
+    return scenario.model_copy(update={"moving_obstacles": moving})
+
+
+def _moving_obstacle(
+    lots: np.random.Generator, name: str, low_m: np.ndarray, high_m: np.ndarray
+) -> MovingObstacle:
+    west_m = min(low_m[1] + _FREE_WEST_M, high_m[1])
+    start_m = lots.uniform((low_m[0], west_m), high_m[:2])
+    if lots.random() < 0.5:
+        leaves_s = float(lots.uniform(*_DEPARTURE_S))
+        pieces = (
+            (0.0, (0.0, 0.0, 0.0)),
+            (leaves_s, (0.0, 0.0, -3.0)),
+            (leaves_s + 6.0, (0.0, 15.0, -2.0)),
+            (leaves_s + 66.0, (0.0, 0.0, 0.0)),
+        )
+    else:
+        heading = float(lots.uniform(0.0, 2.0 * np.pi))
+        speed_mps = float(lots.uniform(*_SPEED_MPS))
+        pieces = ((0.0, (speed_mps * np.cos(heading), speed_mps * np.sin(heading), 0.0)),)
+    return MovingObstacle(
+        name=name,
+        radius_m=8.0,
+        height_m=float(lots.uniform(6.0, 30.0)),
+        safe_distance_m=float(lots.uniform(*_SAFE_DISTANCE_M)),
+        start_m=(float(start_m[0]), float(start_m[1]), -5.0),
+        schedule=tuple(
+            ScheduledVelocity(from_s=from_s, velocity_mps=velocity_mps)
+            for from_s, velocity_mps in pieces
+        ),
+    )

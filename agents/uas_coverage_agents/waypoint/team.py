@@ -1,0 +1,181 @@
+"""A team from decision to decision: who needs a target, and the flight until somebody does."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from uas_coverage_agents.waypoint.layout import HOME_CHOICE
+from uas_coverage_agents.waypoint.look import (
+    NO_TARGET,
+    allowed,
+    claimed_by_mates,
+    covers,
+    look,
+)
+from uas_coverage_env.vehicle import Z
+from uas_coverage_env.world import (
+    FLYING,
+    GO_TO,
+    HOME,
+    VELOCITY,
+    advance,
+    has_to_return,
+)
+
+NOBODY = -1
+
+ENERGY, TIME, FILTERED, LOST_UAS, NOT_HOME, LEFT = range(6)
+"""Columns of an account: energy of all [Wh], time while anybody flew [s], steps of single UAS in
+which the filter changed the command; at the end: UAS lost, UAS in the air, waypoints left."""
+
+ACCOUNT_SIZE = LEFT + 1
+
+
+@njit(cache=True, error_model="numpy")
+def find_blocked(arena, step, blocked):
+    """Mark in `blocked` (W,) the waypoints that moving obstacles keep everybody out of now."""
+    blocked[:] = False
+    sample = min(step, arena.moving_path_m.shape[0] - 1)
+    radius_m = 0.0
+    for i in range(arena.uas.shape[0]):
+        radius_m = max(radius_m, arena.uas[i].radius_m)
+    for m in range(arena.moving.shape[0]):
+        moving = arena.moving[m]
+        centre_m = arena.moving_path_m[sample, m]
+        keep_m = moving.safe_distance_m + radius_m
+        for w in range(blocked.shape[0]):
+            at_m = arena.waypoints[w].position_m
+            beside_m = math.hypot(at_m[0] - centre_m[0], at_m[1] - centre_m[1])
+            if (
+                beside_m < moving.radius_m + keep_m
+                and abs(at_m[2] - centre_m[2]) < moving.half_height_m + keep_m
+            ):
+                blocked[w] = True
+
+
+@njit(cache=True, error_model="numpy")
+def _needs_target(state, blocked, claimed, may, targets, i):
+    """Whether a covering UAS has none, or waits for a moving obstacle while there is other work."""
+    w = targets[i]
+    if w < 0 or not state.uncovered[w]:
+        return True
+    if not blocked[w]:
+        return False
+    claimed_by_mates(state, targets, i, claimed)
+    allowed(state, blocked, claimed, may)
+    return (may & ~blocked).any()
+
+
+@njit(cache=True, error_model="numpy")
+def choose(targets, candidates, i, choice):
+    """Note the choice of UAS i."""
+    targets[i] = HOME if choice == HOME_CHOICE else candidates[choice]
+
+
+@njit(cache=True, error_model="numpy")
+def next_to_decide(
+    arena, legs, state, return_mode, blocked, targets, candidates, legal, observation
+):
+    """The first UAS that has a choice to make now; the others keep or get their targets.
+
+    Args:
+        arena: The arena. Where it has no moving obstacles, `blocked` stays as it is.
+        legs: `Legs`.
+        state: The state of the world; `returning` is set a moment before the world would.
+        return_mode: Whether the world brings UAS home in time.
+        blocked: (W,) see `find_blocked`; written.
+        targets: (U,) where each flies to; written.
+        candidates: (K,) see `look`; written.
+        legal: (K+1,) see `look`; written.
+        observation: (OBSERVATION_SIZE,) see `look`; written.
+
+    Returns:
+        Index of the UAS, or NOBODY.
+    """
+    if arena.moving.shape[0] > 0:
+        find_blocked(arena, state.step[0], blocked)
+    n_uas = targets.shape[0]
+    for i in range(n_uas):
+        if state.status[i] == FLYING and return_mode and not state.returning[i]:
+            state.returning[i] = has_to_return(arena, state, i)
+    done = not state.uncovered.any()
+    claimed = np.empty(blocked.shape[0], dtype=np.bool_)
+    may = np.empty(blocked.shape[0], dtype=np.bool_)
+    for i in range(n_uas):
+        if not covers(state, targets, i):
+            continue
+        if done:
+            targets[i] = HOME
+        elif _needs_target(state, blocked, claimed, may, targets, i):
+            targets[i] = NO_TARGET
+            n_legal = look(arena, legs, state, blocked, targets, i, candidates, legal, observation)
+            if n_legal > 1:
+                return i
+            choose(targets, candidates, i, legal.argmax())
+    return NOBODY
+
+
+@njit(cache=True, error_model="numpy")
+def write_commands(state, targets, commands):
+    """The commands that fly every UAS to its target."""
+    for i in range(targets.shape[0]):
+        command = commands[i]
+        command.values[:] = 0.0
+        command.returning = targets[i] == HOME
+        if targets[i] == NO_TARGET:  # on its way home already, or nothing to fly
+            command.kind = VELOCITY
+            command.values[2] = -state.x[i, Z]
+        else:
+            command.kind = GO_TO
+            command.values[0] = targets[i]
+
+
+@njit(cache=True, error_model="numpy")
+def is_over(arena, state):
+    """Whether nobody flies any more, or the time is up."""
+    return state.step[0] >= arena.rules[0].max_steps or not (state.status == FLYING).any()
+
+
+@njit(cache=True, error_model="numpy")
+def fly_on(
+    arena, legs, state, nonlinear, return_mode, safety_filter, blocked, targets, commands,
+    outcome, candidates, legal, observation, account,
+):  # fmt: skip
+    """Fly until somebody has a choice to make, or the mission is over.
+
+    Args:
+        arena: See `next_to_decide`.
+        legs: See `next_to_decide`.
+        state: Written.
+        nonlinear: See `world.advance`.
+        return_mode: See `world.advance`.
+        safety_filter: See `world.advance`.
+        blocked: See `next_to_decide`.
+        targets: See `next_to_decide`.
+        commands: (U,) of COMMAND_DTYPE; written.
+        outcome: (U,) of OUTCOME_DTYPE; written.
+        candidates: See `next_to_decide`.
+        legal: See `next_to_decide`.
+        observation: See `next_to_decide`.
+        account: (ACCOUNT_SIZE,) what the flight took is added.
+
+    Returns:
+        Index of the UAS that decides, or NOBODY where the mission is over.
+    """
+    while not is_over(arena, state):
+        i = next_to_decide(
+            arena, legs, state, return_mode, blocked, targets, candidates, legal, observation
+        )
+        if i != NOBODY:
+            return i
+        write_commands(state, targets, commands)
+        advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome)
+        account[TIME] += arena.rules[0].dt_s
+        for j in range(targets.shape[0]):
+            account[ENERGY] += outcome[j].energy_Wh
+            account[FILTERED] += outcome[j].filtered
+            account[LOST_UAS] += outcome[j].contact != 0
+    account[NOT_HOME] = (state.status == FLYING).sum()
+    account[LEFT] = state.uncovered.sum()
+    return NOBODY

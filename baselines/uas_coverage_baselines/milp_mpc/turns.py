@@ -1,0 +1,35 @@
+"""Who is planned for in a decision, where there is no time for everybody.
+
+Many UAS share the time of one decision. Who is not planned for goes on along its last verified plan
+and the way out of it, around which the others plan; so a plan lasts several decisions, and nobody
+waits for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+
+class Turns:
+    """Whose turn it is to be planned for, where the time does not suffice for everybody."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, int] = {}
+        self._decision = 0
+
+    def take(self, names: Sequence[str], urgent: Collection[int], most: int) -> list[int]:
+        """Rows of those planned for now: the urgent ones, then who has waited longest.
+
+        Args:
+            names: the active UAS.
+            urgent: rows of those that have nothing safe to go on with.
+            most: how many.
+        """
+        self._decision += 1
+        waited = sorted(
+            range(len(names)),
+            key=lambda row: (row not in urgent, self._last.get(names[row], 0)),
+        )
+        taken = waited[:most]
+        self._last.update((names[row], self._decision) for row in taken)
+        return taken

@@ -1,0 +1,232 @@
+"""The planner `tour`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from uas_coverage_baselines.tour.flight_plan import (
+    LEGS,
+    SAFE_BELOW_S,
+    SLOWER,
+    Task,
+    brake_seconds,
+    empty_plan,
+    improve,
+)
+from uas_coverage_baselines.tour.schedule import Schedule, View
+from uas_coverage_env.flight import AssistedOptions
+from uas_coverage_env.flight.planner import Decision
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    FLYING,
+    Command,
+    GoTo,
+    SwarmState,
+    Velocity,
+    World,
+    build_arena,
+    has_to_return,
+    initial_state,
+)
+
+FloatArray = NDArray[np.float64]
+_HORIZON_S = 20.0
+_STEPS_AT_MOST = 60
+_COVERED_WITHIN_M = 0.3  # nearer than the radius by this, or by a fiftieth of it
+_NEAR = 0.7  # share of the radius at which the leg to a waypoint is expected to end
+_WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
+_PER_WAYPOINT_S = 2.0  # what a turn takes beyond that: there is no gain in putting one off
+_MOVING_MARGIN_M = 6.0
+_SURPRISE_MPS = 0.3  # a velocity off by this was flown by somebody else: the filter, return mode
+
+
+class TourOptions(AssistedOptions):
+    """Options of `tour`."""
+
+    return_mode: bool = Field(
+        default=False,
+        description="let the world fly it home; else it flies home itself, by the same rule",
+    )
+    moves: int = Field(default=2_000_000, ge=0, description="changes tried by the order search")
+    changes: int = Field(default=400, ge=0, description="changes tried of each flight plan")
+
+
+class Tour:
+    """Flies a global order of the waypoints, each UAS its own route, with plans of 20 s.
+
+    Before take-off simulated annealing gives every UAS a route (`schedule`); on events the order
+    is searched again. At every step each UAS's commands for the coming seconds are improved in
+    simulation (`flight_plan`), and the first is flown. There is no clock in any of it: the same
+    seed flies the same mission.
+    """
+
+    Options = TourOptions
+
+    def __init__(self, options: TourOptions | None = None) -> None:
+        self.options = options or TourOptions()
+        self.assistants = self.options.assistants
+        self.last_decision: Decision | None = None
+
+    def warm_up(self, scenario: Scenario) -> None:
+        """Compile everything."""
+        quick = Tour(TourOptions(moves=10, changes=1))
+        quick.reset(scenario, 0)
+        quick.act(World(scenario).swarm_state())
+
+    def reset(self, scenario: Scenario, seed: int) -> None:
+        """Search the order from the starts."""
+        still = build_arena(scenario.model_copy(update={"moving_obstacles": ()}))
+        # the schedule of moving obstacles is not for players: row 0 is where they are seen
+        n_moving = len(scenario.moving_obstacles)
+        self._arena = still._replace(
+            moving=build_arena(scenario).moving,
+            moving_path_m=np.zeros((1, n_moving, 3)),
+            moving_velocity_mps=np.zeros((1, n_moving, 3)),
+        )
+        self._scenario = scenario
+        n_uas = len(scenario.uas)
+        self._n_steps = min(max(round(_HORIZON_S / scenario.dt_s), 1), _STEPS_AT_MOST)
+        self._rng = np.random.default_rng([seed, n_uas])
+        self._command = np.zeros(1, dtype=COMMAND_DTYPE)[0]
+        self._plans = [empty_plan(self._n_steps) for _ in range(n_uas)]
+        self._trial = empty_plan(self._n_steps)
+        self._is_flown = np.zeros(n_uas, np.bool_)
+        self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
+        self._reference_mps = np.zeros((n_uas, 2))
+        self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
+        self._returns = np.zeros(n_uas, np.bool_)
+        self._state = initial_state(scenario)
+        self._keep_out_m = np.array(
+            [
+                (o.radius_m + o.safe_distance_m, o.height_m / 2 + o.safe_distance_m)
+                for o in scenario.moving_obstacles
+            ]
+        ).reshape(-1, 2) + (max(u.radius_m for u in scenario.uas) + _MOVING_MARGIN_M)
+        self._radius_m = self._arena.waypoints["radius_m"].copy()
+        self._schedule = Schedule(scenario, self._arena, self.options.moves)
+        self._seed = seed
+        self._begun = False
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Plan for each flying UAS, in order, and fly the first command of each plan."""
+        self._arena.moving_path_m[0] = swarm.moving_position_m
+        self._arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
+        view = self._view(swarm)
+        if self._begun:
+            self._schedule.update(view)
+        else:
+            self._schedule.begin(view, self._seed)
+            self._begun = True
+        others_m = self._where_others_go(view)
+        commands: dict[str, Command] = {}
+        predicted_m: dict[str, FloatArray] = {}
+        for i in np.flatnonzero(view.flies):
+            name = self._scenario.uas[i].name
+            commands[name] = self._fly(i, view, others_m)
+            predicted_m[name] = others_m[i].copy()
+        self.last_decision = Decision(predicted_m)
+        return commands
+
+    def _fly(self, i: int, view: View, others_m: FloatArray) -> Command:
+        task = self._task(i, view)
+        plan, x = self._plans[i], view.x[i]
+        n_kept = self._catch_up(i, x, task.route)
+        seconds = improve(
+            self._arena, i, task, x, self._reference_mps[i], others_m, plan, self._trial,
+            n_kept, self.options.changes, self._rng, self._command,
+        )  # fmt: skip
+        others_m[i] = plan.path_m
+        mode = "covering" if len(task.route) else "return"
+        self._is_flown[i] = seconds < SAFE_BELOW_S
+        if not self._is_flown[i]:
+            target = int(task.route[0]) if len(task.route) else None
+            return GoTo(target, mode)
+        north_mps, east_mps, altitude_m = plan.commands[0].tolist()
+        return Velocity(north_mps, east_mps, altitude_m, mode)
+
+    def _task(self, i: int, view: View) -> Task:
+        schedule = self._schedule
+        route = schedule.order.routes[i]
+        if self._returns[i]:
+            route = route[:0]
+        radius_m, blocked = self._radius_m[route], view.blocked[route]
+        within_m = radius_m - np.minimum(_COVERED_WITHIN_M, radius_m / 50.0)
+        return Task(
+            np.ascontiguousarray(route),
+            np.where(blocked, -1.0, within_m),
+            np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),
+            schedule.rest_s(i, SLOWER, _PER_WAYPOINT_S) if len(route) else np.zeros(1),
+            schedule.acceleration_mps2[i],
+            self._brake_s[i],
+            _MOVING_MARGIN_M,
+        )
+
+    def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64]) -> int:
+        """Move what is left of the plan one step on; how many of its legs still hold."""
+        plan = self._plans[i]
+        expected = plan.x[1]
+        as_planned = self._is_flown[i] and np.abs(expected[3:6] - x[3:6]).max() < _SURPRISE_MPS
+        self._reference_mps[i] = plan.reference[1] if as_planned else x[3:5]
+        plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
+        plan.push[-1], plan.share[-1] = 0.0, 1.0
+        if not as_planned:
+            plan.push[:], plan.share[:] = 0.0, 1.0
+        before = self._aimed_at[i]
+        self._aimed_at[i] = route[:LEGS]
+        if not len(route) or not len(before):
+            return 0
+        # what was aimed at before and is still ahead
+        found = np.flatnonzero(before == route[0])
+        if not len(found):
+            return 0
+        gone = int(found[0])
+        for values in (plan.aim_m, plan.early_m):
+            values[: LEGS - gone] = values[gone:].copy()
+        still = before[gone:]
+        n_same = min(len(still), len(route))
+        same = still[:n_same] == route[:n_same]
+        return n_same if same.all() else int(same.argmin())
+
+    def _where_others_go(self, view: View) -> FloatArray:
+        """(U, N+1, 3) [m] as planned before, one step on; NaN where nobody flies."""
+        paths_m = np.full((len(view.x), self._n_steps + 1, 3), np.nan)
+        for i in np.flatnonzero(view.flies):
+            path_m = self._plans[i].path_m
+            paths_m[i, :-1] = path_m[1:]
+            paths_m[i, -1] = path_m[-1]
+            # where it is now is known
+            if not self._begun or np.linalg.norm(paths_m[i, 0] - view.x[i, :3]) > 1.0:
+                paths_m[i] = view.x[i, :3]
+        return paths_m
+
+    def _view(self, swarm: SwarmState) -> View:
+        names = [swarm.names.index(uas.name) for uas in self._scenario.uas]
+        x, flies = swarm.x[names], swarm.status[names] == FLYING
+        self._state.x[:] = x
+        self._state.uncovered[:] = swarm.uncovered
+        self._state.step[0] = swarm.step
+        for i in np.flatnonzero(flies & ~self._returns):
+            self._returns[i] = has_to_return(self._arena, self._state, i)
+        return View(
+            x=x,
+            may_work=flies & ~self._returns,
+            flies=flies,
+            uncovered=swarm.uncovered,
+            blocked=self._blocked(swarm),
+            time_s=swarm.time_s,
+        )
+
+    def _blocked(self, swarm: SwarmState) -> NDArray[np.bool_]:
+        """(W,) whether a moving obstacle keeps everybody from covering the waypoint, now."""
+        away_m = np.abs(self._arena.waypoints["position_m"][:, None] - swarm.moving_position_m)
+        reach_m = 0.8 * self._radius_m[:, None]
+        beside_m = np.hypot(away_m[..., 0], away_m[..., 1])
+        inside = (beside_m < self._keep_out_m[:, 0] - reach_m) & (
+            away_m[..., 2] < self._keep_out_m[:, 1] - reach_m
+        )
+        return np.asarray(inside.any(axis=1))

@@ -1,0 +1,35 @@
+import numpy as np
+import pytest
+
+from uas_coverage_env import generate_scenario, load_scenario
+from uas_coverage_env.env import CoverageParallelEnv, Observer, observation_columns
+from uas_coverage_env.world import FLYING
+
+RETURNING = observation_columns("own", "returning").ravel()
+
+
+@pytest.mark.parametrize("assisted", [False, True])
+@pytest.mark.parametrize("name", ["village", "generated"])
+def test_a_player_sees_what_a_learner_sees(name, assisted):
+    scenario = (
+        load_scenario(name)
+        if name == "village"
+        else generate_scenario(900_500, n_uas=3, n_waypoints=9, n_obstacles=5)
+    )
+    env = CoverageParallelEnv(scenario, return_mode=assisted, safety_filter=assisted)
+    env.reset(seed=0)
+    episode = env._episode
+    observer = Observer(scenario)
+    lots = np.random.default_rng(4)
+    held = {}
+    for k in range(120):
+        swarm = episode.swarm_state()
+        seen = observer.observe(swarm)
+        decides = (swarm.status == FLYING) & (episode.observation[:, RETURNING[0]] == 0.0)
+        assert np.array_equal(seen[decides], episode.observation[decides])
+        if not env.agents:
+            break
+        if k % 5 == 0:
+            held = {agent: lots.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents}
+        env.step({agent: held[agent] for agent in env.agents})
+    assert k > 10

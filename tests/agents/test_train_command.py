@@ -1,0 +1,252 @@
+import csv
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import filelock
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+from uas_coverage_agents.policy import load_policy
+from uas_coverage_agents.training import command
+from uas_coverage_agents.training.config import load_config
+from uas_coverage_agents.training.freeze import frozen, thaw
+from uas_coverage_agents.training.trainee import Order, Trainee
+
+from uas_coverage_env.cli import main
+from uas_coverage_env.strict_toml import InputError
+
+TINY = str(Path(__file__).with_name("tiny.toml"))
+
+
+def train(directory, *arguments: str) -> int:
+    return main(["train", TINY, "--missions", "1", "--out", str(directory), *arguments])
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A training that nobody disturbed."""
+    directory = tmp_path_factory.mktemp("trained") / "run"
+    assert train(directory) == 0
+    return directory
+
+
+def refusal(capsys, *arguments: str) -> str:
+    assert main(["train", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    return err
+
+
+def test_a_training_leaves_a_policy_a_curve_and_its_logs(trained):
+    policy = load_policy(trained / "policy")
+    assert policy.description.interface == "velocity"
+    assert policy.description.training.algorithm == "tiny"
+    assert policy.description.training.steps >= 1024
+    assert policy.description.score.missions == 1
+    rows = read_curve(trained)
+    assert len(rows) >= 5
+    assert int(rows[0]["steps"]) == 0
+    assert int(rows[-1]["steps"]) == policy.description.training.steps
+    assert (trained / "learning_curve.png").read_bytes().startswith(b"\x89PNG")
+    assert list((trained / "tensorboard").iterdir())
+    assert len(list((trained / "checkpoints").glob("*.json"))) <= 2
+    assert not list(trained.rglob("*.zip"))
+    assert not list(trained.rglob("*.pkl"))
+
+
+def test_a_killed_training_goes_on_to_the_same_weights(trained, tmp_path, capsys):
+    script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
+    command_line = [sys.executable, "-c", script, "train", TINY]
+    directory = tmp_path / "killed"
+    process = subprocess.Popen(
+        [*command_line, "--missions", "1", "--out", str(directory), "--checkpoint-s", "0"],
+        stdout=subprocess.DEVNULL,
+    )
+    while not (directory / "checkpoints" / "000003.json").exists():
+        assert process.poll() is None, "it should be at work still"
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert not (directory / "policy").exists()
+    assert train(directory) == 0
+    assert "going on with the training there" in capsys.readouterr().out
+    killed, undisturbed = load_policy(directory / "policy"), load_policy(trained / "policy")
+    assert killed.description.weights_sha256 == undisturbed.description.weights_sha256
+    steps = [[row["steps"] for row in read_curve(run)] for run in (directory, trained)]
+    assert steps[0] == steps[1]
+
+
+def read_curve(directory) -> list[dict[str, str]]:
+    return list(csv.DictReader((directory / "learning_curve.csv").read_text().splitlines()))
+
+
+def test_the_same_command_again_says_the_same_without_training(trained, capsys):
+    before = (trained / "policy" / "policy.safetensors").read_bytes()
+    curve = read_curve(trained)
+    assert train(trained) == 0
+    assert "going on" in capsys.readouterr().out
+    assert (trained / "policy" / "policy.safetensors").read_bytes() == before
+    assert read_curve(trained) == curve
+
+
+def test_another_seed_gives_other_weights(trained, tmp_path):
+    assert train(tmp_path / "other", "--seed", "1", "--steps", "128") == 0
+    other = load_policy(tmp_path / "other" / "policy")
+    first = load_policy(trained / "policy")
+    assert other.description.weights_sha256 != first.description.weights_sha256
+
+
+def test_a_training_by_the_clock_ends_and_improves_nothing_it_should_not(tmp_path):
+    assert train(tmp_path / "run", "--minutes", "0.01") == 0
+    assert load_policy(tmp_path / "run" / "policy").description.training.steps >= 0
+
+
+def test_other_settings_are_not_mixed_into_a_training(trained, capsys):
+    for arguments in (["--seed", "1"], ["--set", "learning.gamma=0.5"], ["--minutes", "1"]):
+        line = refusal(capsys, TINY, "--missions", "1", "--out", str(trained), *arguments)
+        assert "holds a training with other settings" in line
+
+
+def test_overwrite_starts_anew_and_removes_only_what_is_ours(tmp_path):
+    directory = tmp_path / "run"
+    assert train(directory, "--steps", "64") == 0
+    (directory / "notes.txt").write_text("mine")
+    assert train(directory, "--steps", "128", "--overwrite") == 0
+    assert load_policy(directory / "policy").description.training.steps == 128
+    assert (directory / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["a3c"], "unknown algorithm 'a3c'"),
+        ([TINY, "--steps", "3", "--minutes", "1"], "give one of them"),
+        ([TINY, "--set", "speed=9"], "no 'speed'"),
+        ([TINY, "--scenario", "atlantis"], "atlantis"),
+        ([TINY, "--steps", "0"], "--steps"),
+        ([TINY, "--seed", "-1"], "--seed"),
+    ],
+)
+def test_mistakes_are_answered_in_a_line(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert words in refusal(capsys, *arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_with_something_else_is_left_alone(tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    for more in ([], ["--overwrite"]):
+        line = refusal(capsys, TINY, "--out", str(tmp_path), *more)
+        assert "is not empty and holds no training" in line
+    assert "is a file" in refusal(capsys, TINY, "--out", str(tmp_path / "thesis.tex"))
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_two_trainings_do_not_work_in_one_folder(trained, capsys):
+    with filelock.FileLock(trained / ".lock"):
+        assert main(["train", TINY, "--missions", "1", "--out", str(trained)]) == 2
+    assert "another training is at work there" in capsys.readouterr().err
+
+
+def test_without_the_extra_one_line_names_it(monkeypatch, tmp_path, capsys):
+    # a module that is None is one that cannot be imported
+    monkeypatch.setitem(sys.modules, "filelock", None)
+    line = refusal(capsys, TINY, "--out", str(tmp_path / "run"))
+    assert "python -m pip install 'uas-coverage-env[learn]'" in line
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_model_is_put_aside_and_taken_up_bit_for_bit():
+    order = Order("tiny", load_config(TINY), seed=0)
+    first, second = Trainee.untrained(order), Trainee.untrained(order)
+    first.model.learn(64)
+    arrays = frozen(first.model, first.lanes)
+    thaw(arrays, second.model, second.lanes)
+    again = frozen(second.model, second.lanes)
+    assert set(again) == set(arrays)
+    assert all(np.array_equal(again[name], array) for name, array in arrays.items())
+
+
+def test_a_checkpoint_of_another_network_is_refused():
+    order = Order("tiny", load_config(TINY), seed=0)
+    other = Order("tiny", load_config(TINY, changes=["player.hidden=[4]"]), seed=0)
+    first, second = Trainee.untrained(order), Trainee.untrained(other)
+    first.model.learn(64)
+    with pytest.raises(InputError, match="does not fit this version"):
+        thaw(frozen(first.model, first.lanes), second.model, second.lanes)
+
+
+class Payload:
+    """Pickled, it runs code when it is read."""
+
+    def __reduce__(self):
+        return os.system, (f"{sys.executable} -c \"open('ran', 'w')\"",)
+
+
+@pytest.fixture
+def zipped(tmp_path, trained):
+    """A model as Stable-Baselines3 saves it."""
+    trainee = Trainee.untrained(Order("tiny", load_config(TINY), seed=5))
+    trainee.model.save(tmp_path / "model.zip")
+    return tmp_path / "model.zip"
+
+
+def test_a_zip_is_not_even_opened_without_trust(zipped, tmp_path, capsys):
+    line = refusal(capsys, TINY, "--from", str(zipped), "--out", str(tmp_path / "run"))
+    assert "--trust-pickle" in line
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_trusted_zip_becomes_a_policy(zipped, tmp_path):
+    directory = tmp_path / "run"
+    assert train(directory, "--from", str(zipped), "--trust-pickle") == 0
+    policy = load_policy(directory / "policy")
+    model = PPO.load(zipped, device="cpu")
+    x = np.random.default_rng(0).uniform(-1, 1, (4, policy.description.network.inputs))
+    expected = model.policy.get_distribution(torch.as_tensor(x, dtype=torch.float32)).mode()
+    assert np.allclose(policy.forward(x), expected.detach().numpy(), atol=1e-6)
+
+
+@pytest.mark.parametrize("where", ["data", "policy.pth"])
+def test_even_a_trusted_zip_runs_no_code(zipped, tmp_path, monkeypatch, capsys, where):
+    monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile(zipped) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    if where == "data":
+        bomb = json.dumps({"policy_class": {":serialized:": ""}}).encode()
+    else:
+        bomb = pickle.dumps(Payload())
+    with zipfile.ZipFile("crafted.zip", "w") as archive:
+        for name, content in (parts | {where: bomb}).items():
+            archive.writestr(name, content)
+    code = train(tmp_path / "run", "--from", "crafted.zip", "--trust-pickle")
+    assert code == (0 if where == "data" else 2)
+    assert not Path("ran").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"no zip at all"])
+def test_what_is_no_zip_is_refused(tmp_path, content, capsys):
+    path = tmp_path / "model.zip"
+    path.write_bytes(content)
+    assert train(tmp_path / "run", "--from", str(path), "--trust-pickle") == 2
+    assert "model.zip: no model of this configuration" in capsys.readouterr().err
+
+
+def test_the_module_of_the_command_needs_no_learning_packages():
+    heavy = "torch", "stable_baselines3", "sb3_contrib", "tensorboard", "matplotlib"
+    script = (
+        f"import sys, {command.__name__}; "
+        f"sys.stdout.write(' '.join(n for n in {heavy!r} if n in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "")

@@ -1,0 +1,241 @@
+"""Lanes of a batch are single missions, bit for bit."""
+
+import numba
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from practice_grounds import practice_ground
+
+from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
+from uas_coverage_env.env.batch_kernel import ABSENT, drawn
+from uas_coverage_env.env.kernel import ENERGY, STATUS
+from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.world import FLYING, STATUS_NAMES, build_arena
+from uas_coverage_env.world.pool import arena_of, pool_arenas
+
+MIXED = (
+    practice_ground(n_uas=3, tower=True, n_moving=2, max_steps=25),
+    practice_ground(n_uas=1, n_moving=0, max_steps=18),
+    generate_scenario(1_000_000, n_uas=2, n_waypoints=12, n_obstacles=4),
+    practice_ground(n_uas=2, weights=(1.0, 2.0, 0.5), n_moving=1, vehicles=("hexacopter",)),
+)
+
+
+def random_actions(batch, seed):
+    rng = np.random.default_rng(seed)
+    if batch.chooses:
+        return rng.integers(0, 13, (batch.num_lanes, batch.n_uas))
+    # beyond ±1, too
+    return rng.uniform(-1.3, 1.3, (batch.num_lanes, batch.n_uas, batch.actions.size))
+
+
+def assert_is(batch, lane, env, observations, rewards=None, infos=None):
+    """What a lane shows is what a `CoverageParallelEnv` has just said."""
+    scenario = batch.scenario_of(lane)
+    assert env.possible_agents == [uas.name for uas in scenario.uas]
+    for i, agent in enumerate(env.possible_agents):
+        if agent not in observations:
+            assert batch.lanes.rewards[lane, i] == 0.0
+            continue
+        np.testing.assert_array_equal(batch.observation[lane, i], observations[agent])
+        report = batch.lanes.report[lane, i]
+        if rewards is not None:
+            assert batch.lanes.rewards[lane, i] == pytest.approx(rewards[agent], abs=1e-12)
+        if infos is not None:
+            info = infos[agent]
+            assert list(info["reward_terms"].values()) == report[: len(REWARD_TERMS)].tolist()
+            assert info["energy_Wh"] == report[ENERGY]
+            assert info["status"] == STATUS_NAMES[int(report[STATUS])]
+            if batch.chooses:
+                mask = batch.action_masks()[lane, i]
+                np.testing.assert_array_equal(info["action_mask"], mask)
+    n_uas = len(scenario.uas)
+    assert not batch.observation[lane, n_uas:].any()
+    assert (batch.worlds.status[lane, n_uas:] == ABSENT).all()
+
+
+@pytest.mark.parametrize(
+    ("action", "dynamics", "assisted"),
+    [(action, "lpv", False) for action in ACTION_NAMES]
+    + [("velocity", "nonlinear", True), ("waypoint", "lpv", True)],
+)
+def test_every_lane_flies_what_a_single_environment_flies(action, dynamics, assisted):
+    settings = {
+        "action": action,
+        "dynamics": dynamics,
+        "return_mode": assisted,
+        "safety_filter": assisted,
+        "reward_weights": {"team_coverage": 0.3},
+    }
+    batch = CoverageBatch(7, MIXED, **settings)
+    batch.reset(seed=5)
+    assert len(set(batch.lanes.scenario.tolist())) > 1
+    envs, missions = {}, np.full(7, -1)
+    for step in range(45):
+        actions = random_actions(batch, step)
+        begun = batch.lanes.mission != missions
+        missions = batch.lanes.mission.copy()
+        for lane in range(7):
+            if begun[lane]:
+                envs[lane] = CoverageParallelEnv(batch.scenario_of(lane), **settings)
+                assert_is(batch, lane, envs[lane], envs[lane].reset()[0])
+        ended = batch.lanes.terminated | batch.lanes.truncated
+        batch.step(actions)
+        for lane, env in envs.items():
+            if ended[lane]:
+                continue
+            asked = {
+                name: actions[lane, i]
+                for i, name in enumerate(env.possible_agents)
+                if name in env.agents
+            }
+            observations, rewards, _, truncations, infos = env.step(asked)
+            assert_is(batch, lane, env, observations, rewards, infos)
+            over = not env.agents
+            assert over == batch.lanes.terminated[lane] | batch.lanes.truncated[lane]
+            assert batch.lanes.truncated[lane] == any(truncations.values())
+            assert not (batch.lanes.terminated[lane] and batch.lanes.truncated[lane])
+    assert missions.max() > 0
+
+
+def flown(num_lanes, seed, threads=1):
+    """Everything that 30 steps leave behind in lanes that are seeded one after the other."""
+    batch = CoverageBatch(num_lanes, MIXED, autoreset="same_step", max_cycles=9, threads=threads)
+    batch.reset(seed=seed)
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        # the same actions for the same lanes, however many there are
+        actions = rng.uniform(-1, 1, (16, 3, 3))
+        batch.step(actions[seed : seed + num_lanes])
+    return batch.state_dict()
+
+
+def test_neither_lanes_nor_threads_change_a_mission():
+    together = flown(8, 0)
+    assert (together["mission"] > 0).all()
+    assert len(set(together["scenario"].tolist())) > 1
+    for lane in range(0, 8, 3):
+        alone = flown(1, lane)
+        for name, array in alone.items():
+            np.testing.assert_array_equal(array[0], together[name][lane])
+    if numba.config.NUMBA_NUM_THREADS == 1:
+        pytest.skip("numba has one thread here")
+    shared = flown(8, 0, threads=2)
+    for name, array in together.items():
+        np.testing.assert_array_equal(shared[name], array)
+
+
+def test_all_scenarios_are_drawn_about_equally_often():
+    draws = [drawn(np.uint64(seed), mission, 5) for seed in range(100) for mission in range(20)]
+    counts = np.bincount(draws, minlength=5)
+    assert counts.min() > 340
+    assert counts.max() < 460
+
+
+def test_a_pool_holds_every_arena_as_it_is_built():
+    pool = pool_arenas(MIXED)
+    for s, scenario in enumerate(MIXED):
+        for mine, its in zip(arena_of.py_func(pool, s), build_arena(scenario), strict=True):
+            assert mine.dtype == its.dtype
+            np.testing.assert_array_equal(mine, its)
+
+
+def test_equal_vehicles_are_stored_once():
+    grounds = [practice_ground(size_m=size_m) for size_m in (180.0, 200.0, 220.0)]
+    pool = pool_arenas([*grounds, practice_ground(vehicles=("hexacopter",))])
+    assert pool.spans["vehicles"].tolist() == [[0, 2], [0, 2], [0, 2], [2, 4]]
+    assert len(pool.vehicles) == 4
+
+
+def test_an_action_that_is_refused_changes_nothing():
+    batch = CoverageBatch(3, MIXED)
+    batch.reset(seed=5)
+    batch.step(random_actions(batch, 0))
+    before = batch.state_dict()
+    actions = random_actions(batch, 1)
+    n_uas = len(batch.scenario_of(1).uas)
+    actions[1, n_uas - 1, 2] = np.inf
+    with pytest.raises(ValueError, match=f"UAS {n_uas - 1} in lane 1"):
+        batch.step(actions)
+    after = batch.state_dict()
+    del before["asked"], after["asked"]
+    for name, array in before.items():
+        np.testing.assert_array_equal(after[name], array)
+
+
+def test_what_is_asked_of_a_uas_that_a_scenario_does_not_have_has_no_effect():
+    batch, twin = (CoverageBatch(2, MIXED) for _ in range(2))
+    for one in (batch, twin):
+        one.reset(scenarios=[1, 1])
+    actions = random_actions(batch, 0)
+    batch.step(actions)
+    actions[:, 1:] = np.nan
+    np.testing.assert_array_equal(twin.step(actions), batch.observation)
+
+
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        (np.zeros((2, 3, 2)), "shape"),
+        (np.zeros((3, 3, 3)), "shape"),
+        (np.zeros(18), "shape"),
+        (np.zeros((2, 3, 3), dtype=bool), "real numbers"),
+        (np.full((2, 3, 3), "north"), "real numbers"),
+    ],
+)
+def test_actions_of_a_wrong_form_are_refused(actions, message):
+    batch = CoverageBatch(2, MIXED)
+    batch.reset()
+    with pytest.raises(ValueError, match=message):
+        batch.step(actions)
+
+
+@pytest.mark.parametrize("choice", [-1, 13, 0.5])
+def test_choices_that_do_not_exist_are_refused(choice):
+    batch = CoverageBatch(2, MIXED, action="waypoint")
+    batch.reset()
+    with pytest.raises(ValueError, match="whole numbers"):
+        batch.step(np.full((2, 3), choice))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"scenario": []}, "no scenario"),
+        ({"scenario": ["nowhere"]}, "nowhere"),
+        ({"action": "teleport"}, "velocity"),
+        ({"dynamics": "magic"}, "nonlinear"),
+        ({"autoreset": "sometimes"}, "same_step"),
+        ({"return_mode": 1}, "True or False"),
+        ({"threads": 0}, "threads is 0"),
+        ({"max_cycles": 0}, "max_cycles"),
+        ({"reward_weights": {"glory": 1.0}}, "glory"),
+    ],
+)
+def test_wrong_arguments_are_refused_with_what_is_allowed(settings, message):
+    with pytest.raises(ValueError, match=message):
+        CoverageBatch(2, **{"scenario": MIXED, **settings})
+
+
+def test_a_batch_has_to_be_reset_first():
+    batch = CoverageBatch(2, MIXED)
+    with pytest.raises(ResetNeeded):
+        batch.step(np.zeros((2, 9)))
+    with pytest.raises(ResetNeeded):
+        batch.reset(mask=np.array([True, False]))
+
+
+def test_a_pool_takes_names_and_cuts_missions():
+    pool = ScenarioPool(["open_field", MIXED[0]], max_cycles=7)
+    assert [scenario.max_steps for scenario in pool.scenarios] == [7, 7]
+    assert len(pool) == 2
+    np.testing.assert_array_equal(pool.n_uas, [2, 3])
+
+
+def test_lanes_tell_who_flies():
+    batch = CoverageBatch(1, MIXED)
+    batch.reset(scenarios=[1])
+    np.testing.assert_array_equal(batch.flying, [[True, False, False]])
+    assert (batch.worlds.status[0] == [FLYING, ABSENT, ABSENT]).all()
+    assert batch.swarm_state(0).names == ("uas_1",)

@@ -1,0 +1,220 @@
+"""`make_vec` is what `SyncVectorEnv` over single environments is, only in one compiled call."""
+
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from practice_grounds import practice_ground
+
+import uas_coverage_env  # noqa: F401  it registers the ids
+from uas_coverage_env.env import CoverageSwarmEnv, CoverageVectorEnv
+from uas_coverage_env.env.batch_kernel import ABSENT
+from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.world import STATUS_NAMES
+
+ID = "UASCoverage-v0"
+GROUND = practice_ground(tower=True, n_moving=1, max_steps=25)
+MIXED = [practice_ground(n_uas=n, max_steps=20) for n in (1, 3)]
+
+
+def make(num_envs=3, **settings):
+    settings.setdefault("scenario", GROUND)
+    return gymnasium.make_vec(
+        ID, num_envs=num_envs, vectorization_mode="vector_entry_point", **settings
+    )
+
+
+def in_turn(num_envs=3, autoreset_mode=AutoresetMode.NEXT_STEP, **settings):
+    settings.setdefault("scenario", GROUND)
+    return SyncVectorEnv(
+        [lambda: CoverageSwarmEnv(**settings)] * num_envs, autoreset_mode=autoreset_mode
+    )
+
+
+def assert_same_infos(infos, expected):
+    """All that the single environments tell of the swarm is told, with equal masks."""
+    for name in ("covered", "energy_Wh", "action_mask"):
+        assert (name in infos) == (name in expected)
+        if name in infos:
+            np.testing.assert_array_equal(infos[name], expected[name])
+            np.testing.assert_array_equal(infos[f"_{name}"], expected[f"_{name}"])
+    for term in REWARD_TERMS:
+        mine, its = infos["reward_terms"][term], expected["reward_terms"][term]
+        np.testing.assert_allclose(mine, its, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(infos["reward_terms"][f"_{term}"], infos["_reward_terms"])
+    for i, info in enumerate(expected["uas"].values()):
+        if isinstance(info, np.ndarray):
+            continue
+        for lane in np.flatnonzero(info["_status"]):
+            assert STATUS_NAMES[infos["status"][lane, i // 2]] == info["status"][lane]
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("action", ["velocity", "waypoint"])
+def test_it_is_a_sync_vector_env_bit_for_bit(action, mode):
+    settings = {"action": action, "autoreset_mode": mode, "max_cycles": 12}
+    env, twin = make(**settings), in_turn(**settings)
+    assert isinstance(env, VectorEnv)
+    assert env.metadata["autoreset_mode"] == mode
+    for space in ("single_observation_space", "observation_space", "single_action_space"):
+        assert getattr(env, space) == getattr(twin, space)
+    assert env.action_space == twin.action_space
+    observation, infos = env.reset(seed=7)
+    expected, expected_infos = twin.reset(seed=7)
+    np.testing.assert_array_equal(observation, expected)
+    assert_same_infos(infos, expected_infos)
+    env.action_space.seed(1)
+    ends = 0
+    for _ in range(40):
+        actions = env.action_space.sample()
+        results, expected = env.step(actions), twin.step(actions)
+        np.testing.assert_array_equal(results[0], expected[0])
+        np.testing.assert_allclose(results[1], expected[1], rtol=0, atol=1e-12)
+        for mine, its in zip(results[:4], expected[:4], strict=True):
+            assert mine.dtype == its.dtype
+            assert mine.shape == its.shape
+        np.testing.assert_array_equal(results[2], expected[2])
+        np.testing.assert_array_equal(results[3], expected[3])
+        infos, expected_infos = results[4], expected[4]
+        assert_same_infos(infos, expected_infos)
+        ended = results[2] | results[3]
+        ends += int(ended.sum())
+        assert ("final_obs" in infos) == ("final_obs" in expected_infos)
+        if "final_obs" in infos:
+            np.testing.assert_array_equal(infos["_final_obs"], ended)
+            assert_same_infos(infos["final_info"], expected_infos["final_info"])
+            for mine, its in zip(infos["final_obs"], expected_infos["final_obs"], strict=True):
+                assert (mine is None) == (its is None)
+                if mine is not None:
+                    np.testing.assert_array_equal(mine, its)
+        if mode == AutoresetMode.DISABLED and ended.any():
+            observation, infos = env.reset(options={"reset_mask": ended})
+            expected, expected_infos = twin.reset(options={"reset_mask": ended})
+            np.testing.assert_array_equal(observation, expected)
+            assert_same_infos(infos, expected_infos)
+    assert ends >= 6
+
+
+def test_a_mission_that_has_ended_waits_for_its_reset_where_autoreset_is_disabled():
+    env = make(autoreset_mode="Disabled", max_cycles=1)
+    env.reset()
+    _, _, _, truncated, _ = env.step(env.action_space.sample())
+    assert truncated.all()
+    with pytest.raises(ResetNeeded, match="lane 0"):
+        env.step(env.action_space.sample())
+    env.reset(options={"reset_mask": np.array([True, False, False])})
+    with pytest.raises(ResetNeeded, match="lane 1"):
+        env.step(env.action_space.sample())
+
+
+def test_seeds_draw_the_scenarios_of_their_own_lanes():
+    env = make(8, scenario=MIXED)
+    first = env.reset(seed=11)[1]["scenario"]
+    assert set(first) == {0, 1}
+    np.testing.assert_array_equal(env.reset(seed=list(range(11, 19)))[1]["scenario"], first)
+    np.testing.assert_array_equal(make(3, scenario=MIXED).reset(seed=13)[1]["scenario"], first[2:5])
+    draws = {tuple(env.reset()[1]["scenario"]) for _ in range(6)}
+    assert len(draws) > 1
+    env.reset(seed=11)
+    kept = env.reset(seed=[None, *range(12, 19)])[1]["scenario"]
+    np.testing.assert_array_equal(kept[1:], first[1:])
+
+
+def test_scenarios_of_different_fleets_share_the_spaces_of_the_largest():
+    env = make(2, scenario=MIXED)
+    observation, infos = env.reset(options={"scenario": np.array([0, 1])})
+    size = observation.shape[1] // 3
+    assert env.single_action_space.shape == (9,)
+    np.testing.assert_array_equal(infos["status"], [[0, ABSENT, ABSENT], [0, 0, 0]])
+    alone = CoverageSwarmEnv(MIXED[0])
+    np.testing.assert_array_equal(observation[0, :size], alone.reset()[0])
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        actions = rng.uniform(-1, 1, (2, 9)).astype(np.float32)
+        observation, rewards, *_ = env.step(actions)
+        expected, reward, *_ = alone.step(actions[0, :3])
+        np.testing.assert_array_equal(observation[0, :size], expected)
+        assert rewards[0] == pytest.approx(reward, abs=1e-12)
+        assert not observation[0, size:].any()
+        assert env.observation_space.contains(observation)
+
+
+def test_observations_stay_as_they_were_unless_copies_are_spared():
+    for copy in (True, False):
+        env = make(2, copy=copy)
+        kept = env.reset()[0]
+        as_it_was = kept.copy()
+        for _ in range(2):
+            env.step(env.action_space.sample())
+        assert np.array_equal(kept, as_it_was) == copy
+
+
+def test_pictures_show_every_mission():
+    env = make(2, scenario=MIXED, render_mode="rgb_array")
+    env.reset(seed=0)
+    for _ in range(4):
+        env.step(env.action_space.sample())
+    pictures = env.render()
+    assert isinstance(pictures, tuple)
+    assert [picture.shape for picture in pictures] == [(512, 512, 3)] * 2
+    with pytest.raises(ValueError, match="render_mode"):
+        make(render_mode="human")
+
+
+def test_attributes_are_asked_of_every_mission():
+    env = make(2, scenario=MIXED, action="waypoint")
+    env.reset(options={"scenario": np.array([1, 0])})
+    assert [len(scenario.uas) for scenario in env.get_attr("scenario")] == [3, 1]
+    assert env.call("action_masks")[0].shape == (3 * 13,)
+    assert [len(state.names) for state in env.call("swarm_state")] == [3, 1]
+    env.set_attr("note", ["a", "b"])
+    assert env.get_attr("note") == ("a", "b")
+    with pytest.raises(ValueError, match="shared"):
+        env.set_attr("num_envs", 3)
+    with pytest.raises(ValueError, match="1 values"):
+        env.set_attr("note", ["a"])
+    with pytest.raises(AttributeError):
+        env.get_attr("nothing")
+
+
+def test_a_copy_in_another_process_flies_on():
+    env = CoverageVectorEnv(2, GROUND)
+    env.reset()
+    actions = env.action_space.sample()
+    env.step(actions)
+    twin = pickle.loads(pickle.dumps(env))
+    for mine, its in zip(env.step(actions)[:4], twin.step(actions)[:4], strict=True):
+        np.testing.assert_array_equal(mine, its)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"reset_mask": np.zeros(3, dtype=bool)}, "one true value"),
+        ({"reset_mask": [True, False, True]}, "give an array"),
+        ({"reset_mask": np.ones(2, dtype=bool)}, "each of 3 lanes"),
+        ({"scenario": np.array([0, 1, 2])}, "indices from 0 to 0"),
+        ({"scenario": [0.5] * 3}, "an index for each"),
+    ],
+)
+def test_wrong_options_are_refused(options, message):
+    env = make()
+    env.reset()
+    with pytest.raises(ValueError, match=message):
+        env.reset(options=options)
+
+
+@pytest.mark.parametrize("seed", [-1, [1, 2], [0, 1, 2.5], 2**64])
+def test_wrong_seeds_are_refused(seed):
+    with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed"):
+        make().reset(seed=seed)
+
+
+def test_it_closes_twice():
+    env = make()
+    env.reset()
+    env.close()
+    env.close()

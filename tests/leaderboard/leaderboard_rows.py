@@ -1,0 +1,50 @@
+"""Rows of flights that nobody has flown."""
+
+from uas_coverage_env.leaderboard import FAILED, FLOWN, Row
+
+
+def row(scenario="a", player="p", seed=0, **changes) -> Row:
+    """A flight that accomplished its mission with 10 Wh in 100 steps, unless changed."""
+    usual = {
+        "key": f"{scenario}/{player}/{seed}",
+        "scenario": scenario,
+        "scenario_sha256": "00",
+        "player": player,
+        "planner": player,
+        "options": "{}",
+        "seed": seed,
+        "dynamics": "lpv",
+        "safety_filter": False,
+        "status": FLOWN,
+        "reason": None,
+        "accomplished": True,
+        "coverage": 1.0,
+        "all_home": True,
+        "violations": 0,
+        "breaches": 0,
+        "steps": 100,
+        "energy_Wh": 10.0,
+        "min_separation_m": None,
+        "min_obstacle_clearance_m": 3.0,
+        "decision_p50_s": 0.001,
+        "decision_p95_s": 0.002,
+        "fallbacks": 0,
+        "trajectory_sha256": "11",
+        "wall_time_s": 0.1,
+        "versions": "{}",
+        "source_sha256": "22",
+        "finished_at": "2026-01-01T00:00:00+00:00",
+    }
+    return Row(**{**usual, **changes})
+
+
+def failed_row(scenario="a", player="p", seed=0, reason="refused") -> Row:
+    """A flight that there is none of."""
+    nothing = dict.fromkeys(
+        ("steps", "energy_Wh", "decision_p50_s", "decision_p95_s", "trajectory_sha256")
+    )
+    return row(
+        *(scenario, player, seed),
+        **{"status": FAILED, "reason": reason, "accomplished": False, "coverage": 0.0},
+        **{"all_home": False, "wall_time_s": None, **nothing},
+    )

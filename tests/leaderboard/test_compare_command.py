@@ -1,0 +1,239 @@
+"""`uas-coverage compare` in this process: what it says, writes, keeps and returns."""
+
+import json
+
+import numpy as np
+import polars
+import pytest
+
+from uas_coverage_env.cli import main
+from uas_coverage_env.flight import PlannerError, load_planner
+from uas_coverage_env.leaderboard import TIMES, workers
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.world import Velocity
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    return tmp_path
+
+
+def compare(scenarios, *more: str, planners="nearest-waypoint,hover", out="sweep") -> int:
+    return main(
+        [
+            *("compare", "--scenarios", str(scenarios), "--planners", planners, "--jobs", "1"),
+            *("--seeds", "0:2", "--out", str(out), *more),
+        ]
+    )
+
+
+def flights(out="sweep") -> polars.DataFrame:
+    return polars.read_parquet(f"{out}/flights.parquet").drop(*TIMES, "source_sha256")
+
+
+@pytest.fixture
+def with_planners(monkeypatch):
+    """Put planners in the place of `hover`, for whoever flies in this process."""
+
+    def put(make):
+        monkeypatch.setattr(
+            workers,
+            "load_planner",
+            lambda name, options: make() if name == "hover" else load_planner(name, options),
+        )
+
+    return put
+
+
+def test_a_sweep_prints_tables_and_writes_its_files(two_yards, elsewhere, capsys):
+    assert compare(two_yards) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "8 flights: 2 players, 2 scenarios, 2 seeds" in out
+    assert "8 flights to fly" in out
+    for heading in ("Outcome", "Effort", "Against nearest-waypoint"):
+        assert heading in out
+    table = (elsewhere / "sweep" / "table.md").read_text()
+    assert "| nearest-waypoint | 4 | 4/4 | 100.0 [100.0, 100.0] | 100 | 4/4 | 0 |" in table
+    assert f"uas-coverage compare --scenarios {two_yards}" in table
+    frame = flights()
+    assert frame.height == 8
+    assert frame["status"].unique().to_list() == ["flown"]
+    hover = frame.filter(player="hover")
+    assert hover["accomplished"].to_list() == [False] * 4
+    assert hover["steps"].to_list() == [60] * 4
+
+
+def test_the_same_sweep_goes_on_and_flies_nothing_twice(yard, elsewhere, capsys, monkeypatch):
+    assert compare(yard) == 0
+    first = flights()
+    table = (elsewhere / "sweep" / "table.md").read_text()
+    monkeypatch.setattr(workers, "rollout", None)
+    assert compare(yard) == 0
+    assert "4 of 4 flights are there" in capsys.readouterr().out
+    assert flights().equals(first)
+    assert (elsewhere / "sweep" / "table.md").read_text() == table
+
+
+def test_another_sweep_in_the_same_directory_is_refused(yard, capsys):
+    assert compare(yard) == 0
+    before = flights()
+    capsys.readouterr()
+    for more, said in {
+        ("--filter",): "safety_filter is False there, True asked for",
+        ("--dynamics", "nonlinear"): "dynamics is lpv there, nonlinear asked for",
+        ("--seeds", "0:3"): "seeds is 0:2 there, 0:3 asked for",
+        ("--planners", "lawnmower"): "players: it has no lawnmower",
+        ("--option", "hover:climb_m=6"): "options: climb_m is 5.0 there, 6.0 asked for",
+    }.items():
+        assert compare(yard, *more) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        assert said in err
+    assert compare(yard, planners="hover") == 2
+    assert "players: it has nearest-waypoint" in capsys.readouterr().err
+    assert flights().equals(before)
+    assert compare(yard, "--filter", "--overwrite") == 0
+    assert flights()["safety_filter"].to_list() == [True] * 4
+
+
+def test_processes_side_by_side_give_what_one_gives(two_yards):
+    assert compare(two_yards, planners="nearest-waypoint,random-walk") == 0
+    command = ["compare", "--scenarios", two_yards, "--planners", "nearest-waypoint,random-walk"]
+    assert main([*command, "--seeds", "0:2", "--jobs", "2", "--out", "two"]) == 0
+    assert flights("two").equals(flights())
+
+
+def test_a_planner_that_refuses_or_crashes_is_a_row_with_its_reason(
+    yard, capsys, with_planners, elsewhere
+):
+    class Crashes:
+        def reset(self, scenario, seed):
+            if seed == 0:
+                raise InputError("no map of\nthis place")
+
+        def act(self, swarm):
+            raise ZeroDivisionError("of the\nplan")
+
+    with_planners(Crashes)
+    assert compare(yard) == 1
+    err = capsys.readouterr().err
+    assert "hover failed 1 flight (first: yard, seed 0)" in err
+    frame = flights().filter(player="hover")
+    assert frame["status"].to_list() == ["failed", "failed"]
+    refused, crashed = frame["reason"].to_list()
+    assert refused.endswith("no map of this place")
+    assert crashed == "ZeroDivisionError: of the plan"
+    assert frame["energy_Wh"].to_list() == [None, None]
+    assert "2 (2 failed)" in (elsewhere / "sweep" / "table.md").read_text()
+    # a failure is a result: it is not flown again
+    assert compare(yard) == 1
+    assert "4 of 4 flights are there" in capsys.readouterr().out
+
+
+def test_commands_that_cannot_be_flown_fail_the_flight_alone(yard, with_planners):
+    class Wild:
+        def reset(self, scenario, seed):
+            pass
+
+        def act(self, swarm):
+            return dict.fromkeys(swarm.active, Velocity(np.nan, 0.0, 1.0))
+
+    assert issubclass(PlannerError, ValueError)
+    with_planners(Wild)
+    assert compare(yard) == 1
+    assert "at t = 0 s" in flights().filter(player="hover")["reason"][0]
+
+
+def test_a_flight_that_is_stopped_by_hand_is_not_kept(yard, capsys, with_planners):
+    class Interrupted:
+        def reset(self, scenario, seed):
+            self.seed = seed
+
+        def act(self, swarm):
+            if self.seed and swarm.step == 3:
+                raise KeyboardInterrupt
+            return {name: Velocity(0.0, 0.0, 1.0) for name in swarm.active}
+
+    with_planners(Interrupted)
+    assert compare(yard) == 1
+    out, err = capsys.readouterr()
+    assert "error: stopped by hand; the same command goes on" in err
+    assert "3 flights of 4 (not finished)" in out
+    assert flights().height == 3
+    with_planners(lambda: load_planner("hover"))
+    assert compare(yard) == 0
+    assert flights().height == 4
+
+
+def test_a_policy_that_changes_under_way_fails(yard, with_planners):
+    class Policy:
+        fingerprint = "other weights"
+
+        def reset(self, scenario, seed):
+            pass
+
+        def act(self, swarm):
+            return {}
+
+    with_planners(Policy)
+    assert compare(yard) == 1
+    assert "have changed" in flights().filter(player="hover")["reason"][0]
+
+
+def test_options_and_labels_reach_who_flies(yard):
+    options = ("--option", "high:climb_m=12", "--reference", "high")
+    assert compare(yard, *options, planners="hover,high=hover") == 0
+    frame = flights().filter(seed=0)
+    climbs = {
+        label: json.loads(text)["climb_m"] for label, text in frame["player", "options"].rows()
+    }
+    assert climbs == {"hover": 5.0, "high": 12.0}
+    assert frame["planner"].to_list() == ["hover"] * 2
+    assert frame["trajectory_sha256"].n_unique() == 2
+
+
+MISTAKES = {
+    "no scenario": (["--scenarios", ","], "names none"),
+    "unknown scenario": (["--scenarios", "villagge"], "villagge"),
+    "no such file": (["--scenarios", "nowhere.toml"], "nowhere.toml"),
+    "bad range": (["--scenarios", "generated:9"], "FIRST:END"),
+    "too many": (["--scenarios", "generated:0:999999999"], "at most"),
+    "unknown planner": (["--planners", "hoover"], "hoover"),
+    "planner twice": (["--planners", "hover,hover"], "twice"),
+    "no planner": (["--planners", ""], "names none"),
+    "option without planner": (["--option", "horizon=3"], "PLANNER:KEY=VALUE"),
+    "option of another": (["--option", "tour:x=3"], "no 'tour'"),
+    "unknown option": (["--option", "hover:x=3"], "no option 'x'"),
+    "option twice": (["--option", "hover:x=3", "--option", "hover:x=4"], "twice"),
+    "no seeds": (["--seeds", "4:4"], "FIRST < END"),
+    "not a range": (["--seeds", "4"], "0:20"),
+    "unknown reference": (["--reference", "tour"], "tour"),
+    "unknown backend": (["--backend", "dask"], "dask"),
+    "no jobs": (["--jobs", "0"], "jobs"),
+    "a file": (["--out", "taken.txt"], "is a file"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_and_nothing_is_flown(mistake, elsewhere, capsys):
+    (elsewhere / "taken.txt").write_text("")
+    change, said = MISTAKES[mistake]
+    given = {"--scenarios": "village", "--planners": "hover", "--seeds": "0:1", "--out": "sweep"}
+    for option in change[::2]:
+        given.pop(option, None)
+    command = [part for pair in given.items() for part in pair]
+    assert main(["compare", *command, *change]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert said in err
+    assert not (elsewhere / "sweep").exists()
+
+
+def test_ray_that_is_not_there_is_named(yard, capsys, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "ray", None)
+    assert compare(yard, "--backend", "ray") == 2
+    assert "uas-coverage-env[cluster]" in capsys.readouterr().err

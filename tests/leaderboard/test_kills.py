@@ -1,0 +1,111 @@
+"""kill -9 at random moments: nothing lost, nothing twice, the same result."""
+
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import polars
+import pytest
+
+from uas_coverage_env.leaderboard import STORE, TIMES
+
+KILLS = 10
+PLANNERS = "hover,nearest-waypoint,random-walk"
+SEEDS = 12
+DEADLINE_S = 120.0
+
+# imports and compiles once, then forks: a line of input is a command line, the answer a process
+NURSERY = """
+import os, shlex, sys
+import polars
+from uas_coverage_env import rollout
+from uas_coverage_env.cli import main
+for planner in ("hover", "nearest-waypoint", "random-walk"):
+    rollout("open_field", planner, max_steps=2)
+for line in sys.stdin:
+    child = os.fork()
+    if child == 0:
+        with open(os.devnull, "w") as nothing:
+            os.dup2(nothing.fileno(), 1)
+        os._exit(main(shlex.split(line)))
+    print(child, flush=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+@pytest.fixture
+def nursery() -> Iterator[subprocess.Popen]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", NURSERY], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    with process:
+        yield process
+        process.stdin.close()
+
+
+def started(nursery: subprocess.Popen, scenarios: str, out: Path, jobs: int) -> int:
+    """Begin a sweep; returns its process."""
+    nursery.stdin.write(
+        f"compare --scenarios '{scenarios}' --planners {PLANNERS} --seeds 0:{SEEDS} "
+        f"--jobs {jobs} --out '{out}'\n"
+    )
+    nursery.stdin.flush()
+    return int(nursery.stdout.readline())
+
+
+def ended(nursery: subprocess.Popen) -> int:
+    """Wait for the sweep; its exit code, or minus the signal that ended it."""
+    return int(nursery.stdout.readline())
+
+
+def count(out: Path) -> int:
+    """Flights that a store holds, read while it is written."""
+    try:
+        with closing(sqlite3.connect(f"file:{out / STORE}?mode=ro", uri=True)) as reader:
+            return reader.execute("SELECT count(*) FROM flights").fetchone()[0]
+    except sqlite3.OperationalError:  # not made yet
+        return 0
+
+
+def result(out: Path) -> polars.DataFrame:
+    """All that was published of the flights, apart from times."""
+    frame = polars.read_parquet(out / "flights.parquet")
+    # somebody may edit the source while the test runs
+    return frame.drop(*TIMES, "source_sha256")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="os.fork is of POSIX systems")
+def test_ten_kills_at_random_moments_change_nothing(nursery, two_yards, tmp_path):
+    total = 2 * len(PLANNERS.split(",")) * SEEDS
+    lots = random.Random(0)
+    killed, counts = tmp_path / "killed", [0]
+    # some in the middle of a flight, some right at the start; processes side by side in between
+    targets = [0, 0, *sorted(lots.sample(range(total - 4), KILLS - 2))]
+    for n, target in enumerate(targets):
+        child = started(nursery, two_yards, killed, jobs=2 if n == 5 else 1)
+        until = time.monotonic() + DEADLINE_S
+        while count(killed) < target and time.monotonic() < until:
+            time.sleep(0.001)
+        time.sleep(lots.uniform(0.0, 0.03))
+        os.kill(child, signal.SIGKILL)
+        assert ended(nursery) == -signal.SIGKILL, "it was over before it was killed"
+        counts.append(count(killed))
+        assert target <= counts[-1] < total
+    assert counts == sorted(counts), "something was lost"
+    assert not (killed / "table.md").exists()
+
+    started(nursery, two_yards, killed, jobs=1)
+    assert ended(nursery) == 0
+    started(nursery, two_yards, tmp_path / "calm", jobs=1)
+    assert ended(nursery) == 0
+    assert count(killed) == total
+    assert result(killed).equals(result(tmp_path / "calm"))
+    with closing(sqlite3.connect(killed / STORE)) as store:
+        assert store.execute("PRAGMA integrity_check").fetchall() == [("ok",)]

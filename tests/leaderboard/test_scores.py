@@ -1,0 +1,117 @@
+"""What the rows say about a player."""
+
+import dataclasses
+import json
+
+import polars
+import pytest
+from leaderboard_rows import failed_row, row
+
+from uas_coverage_env.leaderboard import Comparison, scores_of, write
+from uas_coverage_env.leaderboard.table import NOTHING, markdown, outcome_cells, scenarios_cells
+
+
+def by_player(rows, reference="base"):
+    return {one.player: one for one in scores_of(rows, reference)}
+
+
+def test_a_violating_flight_has_no_energy_and_no_part_in_pairs():
+    rows = [
+        row("a", "base", energy_Wh=20.0),
+        row("b", "base", energy_Wh=30.0),
+        row("a", "p", energy_Wh=10.0),
+        row("b", "p", energy_Wh=1.0, violations=2, accomplished=False, all_home=False),
+    ]
+    one = by_player(rows)["p"]
+    assert (one.energy_Wh.value, one.energy_Wh.n) == (10.0, 1)
+    assert (one.violations, one.violating, one.accomplished, one.all_home) == (2, 1, 1, 1)
+    assert one.energy_difference_percent.value == pytest.approx(-50.0)
+    assert one.energy_difference_percent.n == 1
+    assert one.improves_energy.value == 0.5, "better on a; worse than any on b"
+
+
+def test_a_failed_flight_covers_nothing_and_the_rest_is_still_counted():
+    rows = [row("a", "base"), row("a", "p"), failed_row("b", "p"), row("b", "base")]
+    one = by_player(rows)["p"]
+    assert (one.flights, one.failed, one.accomplished) == (2, 1, 1)
+    assert one.coverage_percent.value == 50.0
+    assert one.worst_coverage_percent == 0.0
+    assert one.decision_p50_ms == 1.0
+    assert one.steps.n == 1
+
+
+def test_energy_per_percent_leaves_out_who_covered_nothing():
+    rows = [
+        row("a", "p", coverage=0.5, accomplished=False),
+        row("b", "p", coverage=0.0, accomplished=False),
+    ]
+    one = by_player(rows, "p")["p"]
+    assert (one.Wh_per_percent.value, one.Wh_per_percent.n) == (0.2, 1)
+    assert one.steps.value is None
+
+
+def test_who_accomplishes_more_comes_first_then_who_needs_less():
+    rows = [
+        row("a", "base"),
+        row("a", "idle", coverage=0.0, energy_Wh=1.0, accomplished=False),
+        row("a", "thrifty", energy_Wh=8.0),
+        failed_row("a", "broken"),
+    ]
+    order = [one.player for one in scores_of(rows, "base")]
+    assert order == ["thrifty", "base", "idle", "broken"]
+
+
+def test_pairs_are_flights_of_the_same_scenario_and_seed():
+    rows = [
+        *(row("a", "base", seed, energy_Wh=10.0 + seed) for seed in range(3)),
+        *(row("a", "p", seed, energy_Wh=5.0 + 0.5 * seed) for seed in (2, 1, 7)),
+    ]
+    one = by_player(rows)["p"]
+    assert one.energy_difference_percent.n == 2
+    assert one.energy_difference_percent.value == pytest.approx(-50.0)
+    assert one.steps_difference_percent.value == 0.0
+
+
+def test_a_reference_that_has_not_flown_yet_leaves_the_comparison_empty():
+    one = by_player([row("a", "p")], "base")["p"]
+    assert one.improves_energy.value is None
+    assert one.relative_energy_percent.value is None
+
+
+def test_cells_say_nothing_where_there_is_nothing_to_say():
+    rows = [failed_row("a", "p"), row("a", "q|r", violations=1, accomplished=False)]
+    headings, cells = outcome_cells(scores_of(rows, "p"))
+    text = markdown((headings, cells))
+    assert all(len(line) == len(headings) for line in cells)
+    assert "nan" not in text
+    assert r"q\|r" in text
+    assert scenarios_cells(rows, ["p", "q|r", "s"])[1] == [["a", "failed", "violation", NOTHING]]
+
+
+def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
+    rows = [
+        *(row(s, "base", seed, energy_Wh=20.0 + seed) for s in "ab" for seed in (0, 1)),
+        *(row(s, "p", seed) for s in "ab" for seed in (0, 1)),
+        failed_row("a", "p", 2),
+    ]
+    comparison = Comparison.of(rows, 12, "base", "uas-coverage compare ...", "2 flights at a time")
+    names = write(comparison, tmp_path)
+    assert set(names) <= {path.name for path in tmp_path.iterdir()}
+    flights = polars.read_parquet(tmp_path / "flights.parquet")
+    assert flights.rows() == [dataclasses.astuple(one) for one in rows]
+    scores = json.loads((tmp_path / "table.json").read_text())
+    assert [one["player"] for one in scores["scores"]] == ["base", "p"]
+    assert scores["scores"][0]["energy_Wh"] == {"value": 20.5, "low": 20.0, "high": 21.0, "n": 4}
+    header, *lines = (tmp_path / "table.csv").read_text().splitlines()
+    assert len(lines) == 2
+    assert {"energy_Wh", "energy_Wh_low", "energy_Wh_high"} <= set(header.split(","))
+    table = (tmp_path / "table.md").read_text()
+    assert "9 flights of 12 (not finished)" in table
+    assert "p failed 1 flight (first: a, seed 2): refused" in table
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_the_picture_is_drawn_for_any_flights(tmp_path):
+    rows = [row("a", "base"), failed_row("a", "p"), row("b", "q", violations=1)]
+    assert "coverage-energy.png" in write(Comparison.of(rows, 3, "base", "c", "j"), tmp_path)
+    assert (tmp_path / "coverage-energy.png").read_bytes().startswith(b"\x89PNG")

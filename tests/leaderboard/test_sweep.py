@@ -1,0 +1,149 @@
+"""What a sweep flies, and by what its flights are known."""
+
+from itertools import combinations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uas_coverage_env.leaderboard import SETS, Sweep, players_of, scenarios_of, source_of
+from uas_coverage_env.leaderboard.hashing import content_hash
+from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
+from uas_coverage_env.leaderboard.sweep import difference
+from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.strict_toml import InputError
+
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=8,
+)  # fmt: skip
+
+
+def sweep(scenarios="village", planners="milp-mpc", options=(), seeds=range(1), **settings):
+    return Sweep(scenarios_of([scenarios]), players_of([planners], options), seeds, **settings)
+
+
+def keys(some: Sweep) -> list[str]:
+    return [entry.key for entry in some.entries()]
+
+
+@given(st.dictionaries(st.text(max_size=4), PLAIN, max_size=5))
+@settings(max_examples=100, deadline=None, derandomize=True)
+def test_the_order_of_keys_does_not_change_a_hash(data):
+    assert content_hash(dict(reversed(data.items()))) == content_hash(data)
+
+
+@given(PLAIN, PLAIN)
+@settings(max_examples=100, deadline=None, derandomize=True)
+def test_other_data_has_another_hash(one, other):
+    same = repr(one) == repr(other) or (one == other and type(one) is type(other) is dict)
+    assert (content_hash(one) == content_hash(other)) == same
+
+
+def test_every_scenario_is_flown_by_everybody_with_every_seed():
+    some = sweep("village,corridor", "hover,lawnmower", seeds=range(3, 5))
+    entries = list(some.entries())
+    flown = [(e.seed, e.scenario.name, e.player.label) for e in entries]
+    assert len(set(keys(some))) == len(flown) == len(set(flown)) == 8
+    assert {seed for seed, *_ in flown[:4]} == {3}, "seed by seed"
+
+
+def test_whatever_changes_a_flight_changes_its_key():
+    sweeps = {
+        "as it is": sweep(),
+        "option": sweep(options=["milp-mpc:horizon=12"]),
+        "another option": sweep(options=["milp-mpc:horizon=13"]),
+        "planner": sweep(planners="milp-mpc-guided"),
+        "label": sweep(planners="mine=milp-mpc"),
+        "scenario": sweep("corridor"),
+        "seed": sweep(seeds=range(1, 2)),
+        "dynamics": sweep(dynamics="nonlinear"),
+        "filter": sweep(safety_filter=True),
+    }
+    for (one, first), (other, second) in combinations(sweeps.items(), 2):
+        assert keys(first) != keys(second), f"{one} and {other}"
+        assert difference(first.description(), second.description())
+
+
+def test_an_option_that_is_spelt_out_is_the_default():
+    (player,) = players_of(["milp-mpc"], []).values()
+    spelt = [f"milp-mpc:{key}={value}" for key, value in player.options.items()]
+    plain = [text for text in spelt if not text.endswith("=None")]
+    assert keys(sweep(options=plain)) == keys(sweep())
+    assert keys(sweep(options=plain[::-1])) == keys(sweep())
+
+
+def test_a_scenario_is_its_content_not_its_file(tmp_path, village_text):
+    elsewhere = tmp_path / "copy of the village.toml"
+    elsewhere.write_text(village_text + "\n# a remark\n")
+    assert keys(sweep(str(elsewhere))) == keys(sweep())
+    elsewhere.write_text(village_text.replace("max_steps = 500", "max_steps = 499"))
+    assert keys(sweep(str(elsewhere))) != keys(sweep())
+
+
+def test_a_vehicle_that_changes_changes_the_scenario(tmp_path, village_text):
+    from importlib.resources import files
+
+    vehicle = files("uas_coverage_env.vehicle").joinpath("s500_v2.toml").read_text()
+    (tmp_path / "mine.toml").write_text(vehicle)
+    village = tmp_path / "village.toml"
+    village.write_text(village_text.replace('"s500_v2"', '"mine.toml"'))
+    before = scenario_hash(load_scenario(village))
+    assert before == scenario_hash(load_scenario("village")), "the same machine"
+    line = next(line for line in vehicle.splitlines() if line.startswith("mass_kg"))
+    (tmp_path / "mine.toml").write_text(vehicle.replace(line, f"{line}  # weighed"))
+    assert scenario_hash(load_scenario(village)) == before
+    heavier = f"mass_kg = {1.01 * float(line.split('=')[1].split('#')[0])}"
+    (tmp_path / "mine.toml").write_text(vehicle.replace(line, heavier))
+    assert scenario_hash(load_scenario(village)) != before
+
+
+def test_a_policy_is_its_weights_not_its_folder():
+    (hover,) = players_of(["hover"], []).values()
+    one = type(hover)("p", "policy:here", {}, "weights 1", "package")
+    moved = type(hover)("p", "policy:there", {}, "weights 1", "package")
+    trained = type(hover)("p", "policy:here", {}, "weights 2", "package")
+    assert one.identity() == moved.identity() != trained.identity()
+
+
+def test_sets_are_twenty_scenarios_each_and_have_none_in_common():
+    dev, test = scenarios_of(["dev"]), scenarios_of(["test"])
+    assert len(dev) == len(test) == 20
+    assert not {scenario_hash(s) for s in dev.values()} & {scenario_hash(s) for s in test.values()}
+    assert scenarios_of(["generated:2000:2020"]) == dev
+    assert not set(SETS["dev"]) & set(SETS["test"])
+
+
+def test_what_is_asked_for_twice_is_flown_once():
+    assert list(scenarios_of(["village corridor,village", "corridor"])) == ["village", "corridor"]
+
+
+def test_two_different_scenarios_of_one_name_are_refused(tmp_path, village_text):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(village_text.replace("max_steps = 500", "max_steps = 400"))
+    with pytest.raises(InputError, match="two different ones are named 'village'"):
+        scenarios_of(["village", str(mine)])
+
+
+def test_a_player_can_fly_twice_under_labels():
+    players = players_of(["hover,still=hover"], [])
+    assert {label: player.planner for label, player in players.items()} == {
+        "hover": "hover",
+        "still": "hover",
+    }
+
+
+def test_a_difference_is_named_where_it_lies():
+    kept = {"seeds": "0:2", "players": {"tour": {"options": {"time_s": 1.0}}, "hover": {}}}
+    asked = {"seeds": "0:2", "players": {"tour": {"options": {"time_s": 2.0}}, "hover": {}}}
+    assert difference(kept, kept) == ""
+    assert difference(kept, asked) == "players: tour: options: time_s is 1.0 there, 2.0 asked for"
+    assert difference(kept, {"seeds": "0:2"}) == "it has players, which is not asked for"
+    assert difference({"seeds": "0:2"}, kept) == "it has no players"
+
+
+def test_the_source_is_that_of_the_world_and_of_who_flies():
+    hover = players_of(["hover"], []).values()
+    assert source_of(hover) == source_of(hover) != source_of([])

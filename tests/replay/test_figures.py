@@ -1,0 +1,142 @@
+"""Figures for print: what they hold, and that they are vector files."""
+
+import dataclasses
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from uas_coverage_env.flight import MODES, DecisionRecord
+from uas_coverage_env.replay.figures import (
+    KINDS,
+    battery_figure,
+    decision_time_figure,
+    map_figure,
+    modes_figure,
+    save_figure,
+)
+from uas_coverage_env.replay.figures.battery import published_battery
+from uas_coverage_env.strict_toml import InputError
+
+
+def lines(axes) -> list[np.ndarray]:
+    return [line.get_xydata() for line in axes.get_lines()]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_a_vector_file_that_repeats_to_the_byte(kind, flight, tmp_path):
+    figures = [KINDS[kind](flight) for _ in range(2)]
+    for suffix, start in ((".pdf", b"%PDF"), (".svg", b"<?xml")):
+        files = [tmp_path / f"{n}{suffix}" for n in (1, 2)]
+        for figure, file in zip(figures, files, strict=True):
+            save_figure(figure, file)
+        assert files[0].read_bytes().startswith(start)
+        assert files[0].read_bytes() == files[1].read_bytes()
+        assert b"<image" not in files[0].read_bytes()
+
+
+def test_figures_leave_the_settings_of_matplotlib_alone(flight, tmp_path):
+    before = dict(mpl.rcParams)
+    save_figure(modes_figure(flight), tmp_path / "modes.svg")
+    assert dict(mpl.rcParams) == before
+
+
+def test_the_map_shows_what_was_flown_and_predicted_until_a_step(flight):
+    (axes,) = map_figure(flight, step=25).axes
+    drawn = lines(axes)
+    for i in range(2):
+        path = flight.x[:26, i, [1, 0]]
+        assert any(line.shape == path.shape and (line == path).all() for line in drawn)
+        rows = flight.plan[(flight.plan["step"] == 25) & (flight.plan["uas"] == i)]
+        predicted = rows["position_m"][:, [1, 0]]
+        assert any(line.shape == predicted.shape and (line == predicted).all() for line in drawn)
+    assert f"{flight.covered[25]} of 49" in axes.get_title()
+    assert {text.get_text() for text in axes.texts} == {"uas_1", "uas_2"}
+
+
+def test_the_map_shows_the_last_sample_by_default(flight):
+    (axes,) = map_figure(flight).axes
+    assert f"{flight.time_s[-1]:g} s" in axes.get_title()
+
+
+def test_a_step_that_was_not_flown_is_refused(flight):
+    with pytest.raises(InputError, match="samples 0 to 60"):
+        map_figure(flight, step=61)
+
+
+def test_the_battery_figure_holds_our_curves_and_the_published_ones(flight):
+    soc, voltage, current = battery_figure(flight).axes
+    table = published_battery()
+    airborne = int(np.count_nonzero(table["current_uas2_A"]))
+    for axes, ours, name, scale in (
+        (soc, flight.soc, "soc_uas2", 100.0),
+        (voltage, flight.voltage_V, "voltage_uas2_V", 1.0),
+        (current, flight.current_A, "current_uas2_A", 1.0),
+    ):
+        series = [line[:, 1] for line in lines(axes)]
+        # the last sample has no current: nothing is decided there
+        assert any(np.array_equal(line, scale * ours[:-1, 1]) for line in series)
+        assert any(np.array_equal(line, scale * table[name][:airborne]) for line in series)
+    assert soc.get_ylabel() == "State of charge, %"
+
+
+def test_the_published_curves_are_drawn_beside_the_village_alone(flight):
+    elsewhere = dataclasses.replace(
+        flight, scenario=flight.scenario.model_copy(update={"name": "meadow"})
+    )
+
+    def count(figure):
+        return len(figure.axes[1].get_lines())
+
+    assert count(battery_figure(flight)) == 4
+    assert count(battery_figure(elsewhere)) == 2
+    assert count(battery_figure(elsewhere, published=True)) == 4
+    assert count(battery_figure(flight, published=False)) == 2
+
+
+def test_the_published_curves_are_those_that_the_battery_is_tested_against():
+    tests = Path(__file__).parents[1] / "paper" / "fig3_battery_reference.csv"
+    table = np.genfromtxt(tests, delimiter=",", names=True)
+    assert table.dtype.names is not None
+    assert {name: table[name].tolist() for name in table.dtype.names} == {
+        name: values.tolist() for name, values in published_battery().items()
+    }
+
+
+def test_the_modes_fill_the_time_of_every_uas(flight):
+    mode = flight.mode.copy()
+    mode[40:, 0] = MODES.index("return")
+    mode[50:, 0] = MODES.index("lost")
+    coverage, bars = modes_figure(dataclasses.replace(flight, mode=mode)).axes
+    widths = {0.0: [], 1.0: []}
+    for patch in bars.patches:
+        widths[round(patch.get_y() + patch.get_height() / 2)].append(patch.get_width())
+    assert widths == {0.0: [40.0, 10.0, 10.0], 1.0: [60.0]}
+    assert coverage.get_lines()[0].get_ydata().tolist() == flight.covered.tolist()
+
+
+def test_decision_times_are_drawn_with_fallbacks_and_the_limit(flight):
+    decisions = [DecisionRecord(0.5 + 0.01 * k, fallback=k in (7, 9)) for k in range(60)]
+    figure = decision_time_figure(
+        dataclasses.replace(
+            flight, decisions=tuple(decisions), planner_options={"time_limit_s": 1.0}
+        )
+    )
+    series, shares = figure.axes
+    durations = [decision.duration_s for decision in decisions]
+    assert any(np.array_equal(line[:, 1], durations) for line in lines(series))
+    assert any(np.array_equal(line, [[7, 0.57], [9, 0.59]]) for line in lines(series))
+    assert any((line[:, 1] == 1.0).all() for line in lines(series)), "the limit"
+    assert series.get_ylabel() == "Decision time, s"
+    assert "50 %: 0.795 s" in {text.get_text() for text in shares.texts}
+
+
+def test_fast_decisions_are_counted_in_milliseconds(plain):
+    series, _ = decision_time_figure(plain).axes
+    assert series.get_ylabel() == "Decision time, ms"
+
+
+def test_a_flight_without_decisions_has_no_decision_times(plain):
+    with pytest.raises(InputError, match="no decision"):
+        decision_time_figure(dataclasses.replace(plain, decisions=()))

@@ -1,0 +1,290 @@
+"""The replay page in a real Chromium without a screen, opened from disk.
+
+Needs the Debian packages `chromium` and `chromium-driver`.
+"""
+
+import dataclasses
+import io
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image
+from selenium import webdriver
+from selenium.webdriver import Keys
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import WebDriverWait
+
+from uas_coverage_env.replay import write_replay
+
+BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(
+    not (BROWSER and DRIVER),
+    reason="no Chromium here: apt-get install chromium chromium-driver",
+)
+
+DESKTOP, PHONE = (1400, 900), (390, 844)
+# fewer pixels to compute where the size does not matter
+SMALL = (860, 560)
+HOSTILE = '</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 1">'
+
+
+def started(*arguments: str) -> webdriver.Chrome:
+    options = Options()
+    options.binary_location = BROWSER or ""
+    # WebGL is computed by the processor; a container has little shared memory
+    for argument in (
+        *("--headless=new", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
+        *arguments,
+    ):
+        options.add_argument(argument)
+    if os.geteuid() == 0:
+        # Chromium does not isolate its processes for the superuser
+        options.add_argument("--no-sandbox")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    return webdriver.Chrome(options=options, service=Service(DRIVER))
+
+
+@pytest.fixture(scope="module")
+def browser():
+    driver = started()
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def browser_without_webgl():
+    driver = started("--disable-3d-apis")
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def page(flight, tmp_path_factory):
+    return write_replay([flight], tmp_path_factory.mktemp("page") / "replay.html")
+
+
+def opened(driver, page, size=SMALL, theme="light", moment=""):
+    """Open a page anew; what the browser has logged until now is forgotten."""
+    driver.get("about:blank")
+    emulate(driver, size, theme)
+    for kind in ("browser", "performance"):
+        driver.get_log(kind)
+    driver.get(page.as_uri() + moment)
+    WebDriverWait(driver, 20).until(lambda _: driver.find_elements(By.CLASS_NAME, "card"))
+    settled(driver)
+    return driver
+
+
+def emulate(driver, size, theme):
+    width, height = size
+    driver.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 700},
+    )
+    driver.execute_cdp_cmd(
+        "Emulation.setEmulatedMedia",
+        {"features": [{"name": "prefers-color-scheme", "value": theme}]},
+    )
+
+
+def settled(driver):
+    """Wait until what was asked for has been drawn."""
+    driver.execute_async_script(
+        "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))"
+    )
+
+
+def pressed(driver, *keys):
+    driver.find_element(By.TAG_NAME, "body").send_keys(*keys)
+    settled(driver)
+
+
+def time_s(driver) -> float:
+    return float(driver.find_element(By.CLASS_NAME, "time").text.split()[0])
+
+
+def cards(driver) -> list[str]:
+    return [card.text for card in driver.find_elements(By.CLASS_NAME, "card")]
+
+
+def pixels(driver, css) -> np.ndarray:
+    png = driver.find_element(By.CSS_SELECTOR, css).screenshot_as_png
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+
+
+def colours(image) -> int:
+    return len(np.unique(image.reshape(-1, 3), axis=0))
+
+
+def complaints(driver) -> list[str]:
+    return [entry["message"] for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def requests(driver) -> list[str]:
+    events = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
+    return [
+        event["params"]["request"]["url"]
+        for event in events
+        if event["method"] == "Network.requestWillBeSent"
+    ]
+
+
+def test_it_opens_from_disk_draws_and_asks_for_nothing(browser, page):
+    opened(browser, page)
+    assert browser.find_element(By.CSS_SELECTOR, "canvas.scene").is_displayed()
+    assert colours(pixels(browser, ".stage")) > 500
+    for chart in browser.find_elements(By.CLASS_NAME, "chart"):
+        assert chart.size["width"] > 200
+        assert chart.size["height"] >= 90
+    assert cards(browser)[0].startswith("uas_1\ncovering\n100.0 %")
+    assert requests(browser) == [page.as_uri()]
+    assert browser.execute_script("return performance.getEntriesByType('resource').length") == 0
+    assert complaints(browser) == []
+
+
+def test_the_slider_moves_the_vehicles(browser, page, flight):
+    opened(browser, page)
+    before, picture = cards(browser), pixels(browser, ".stage")
+    slider = browser.find_element(By.CSS_SELECTOR, "input[type=range]")
+    ActionChains(browser).move_to_element(slider).click().perform()
+    settled(browser)
+    k = round(time_s(browser))
+    assert abs(k - flight.steps / 2) <= 1
+    assert (pixels(browser, ".stage") != picture).any(axis=2).sum() > 500
+    after = cards(browser)
+    assert before[0] != after[0]
+    pressed(browser, Keys.ARROW_RIGHT)
+    k = int(time_s(browser))
+    north, east = flight.x[k, 1, :2]
+    assert f"N {north:.0f} m, E {east:.0f} m" in cards(browser)[1]
+    assert f"{100 * flight.soc[k, 1]:.1f} %" in cards(browser)[1]
+
+
+def test_a_click_on_a_curve_sets_the_time(browser, page):
+    opened(browser, page)
+    chart = browser.find_elements(By.CLASS_NAME, "chart")[1]
+    ActionChains(browser).move_to_element(chart).click().perform()
+    settled(browser)
+    assert 25 < time_s(browser) < 35
+
+
+def test_keys_step_play_and_change_the_view(browser, page, flight):
+    opened(browser, page)
+    pressed(browser, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+    assert time_s(browser) == 2.0
+    pressed(browser, Keys.SHIFT, Keys.ARROW_RIGHT)
+    assert time_s(browser) == 12.0
+    pressed(browser, Keys.ARROW_LEFT)
+    assert time_s(browser) == 11.0
+    pressed(browser, Keys.END)
+    assert time_s(browser) == flight.steps
+    pressed(browser, Keys.HOME)
+    assert time_s(browser) == 0.0
+
+    pressed(browser, "+")
+    assert browser.find_element(By.CSS_SELECTOR, "select[aria-label=Speed]").text  # it is there
+    pressed(browser, Keys.SPACE)
+    WebDriverWait(browser, 20).until(lambda _: time_s(browser) > 1)
+    pressed(browser, Keys.SPACE)
+    stopped = time_s(browser)
+    settled(browser)
+    assert time_s(browser) == stopped
+
+    overview = pixels(browser, ".stage")
+    pressed(browser, "2")
+    assert browser.find_elements(By.CSS_SELECTOR, ".card[aria-pressed=true] b")[0].text == "uas_2"
+    assert (pixels(browser, ".stage") != overview).any(axis=2).mean() > 0.5
+    pressed(browser, "t")
+    assert not browser.find_elements(By.CSS_SELECTOR, ".card[aria-pressed=true]")
+    pressed(browser, "m")
+    assert browser.find_element(By.CSS_SELECTOR, "canvas.map").is_displayed()
+    assert not browser.find_element(By.CSS_SELECTOR, "canvas.scene").is_displayed()
+    pressed(browser, "m", "?")
+    assert browser.find_element(By.TAG_NAME, "dialog").is_displayed()
+    assert complaints(browser) == []
+
+
+def test_a_violation_is_listed_and_leads_to_its_moment(browser, page):
+    opened(browser, page)
+    (entry,) = browser.find_elements(By.CSS_SELECTOR, ".violations button")
+    assert entry.text == "30 s: uas_1, obstacle contact with church"
+    entry.click()
+    settled(browser)
+    assert time_s(browser) == 30.0
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".track .violation")) == 1
+
+
+def test_without_webgl_the_map_is_drawn_with_the_same_slider(browser_without_webgl, page):
+    driver = opened(browser_without_webgl, page)
+    assert driver.find_element(By.CSS_SELECTOR, "canvas.map").is_displayed()
+    assert not driver.find_element(By.CSS_SELECTOR, "canvas.scene").is_displayed()
+    before = pixels(driver, ".stage")
+    assert colours(before) > 100
+    slider = driver.find_element(By.CSS_SELECTOR, "input[type=range]")
+    ActionChains(driver).move_to_element(slider).click().perform()
+    settled(driver)
+    assert (pixels(driver, ".stage") != before).any(axis=2).sum() > 500
+    assert "N 250 m, E 10 m" not in cards(driver)[0]
+    assert complaints(driver) == []
+    assert requests(driver) == [page.as_uri()]
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_it_fits_the_screen_in_light_and_dark(browser, page, size):
+    opened(browser, page, size, "light", "#t=20")
+    light = pixels(browser, "body")
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= size[0]
+    controls = browser.find_element(By.CLASS_NAME, "controls").rect
+    buttons = browser.find_elements(By.CSS_SELECTOR, ".controls button, .controls select")
+    for control in buttons:
+        if control.is_displayed():
+            assert control.rect["x"] + control.rect["width"] <= size[0]
+            assert control.rect["height"] >= (40 if size == PHONE else 34)
+    assert controls["width"] == size[0]
+    assert time_s(browser) == 20.0
+    # the page changes with the system, while it is open
+    emulate(browser, size, "dark")
+    settled(browser)
+    dark = pixels(browser, "body")
+    assert light.mean() > 180
+    assert dark.mean() < 75
+    assert colours(dark) > 500
+    assert complaints(browser) == []
+
+
+def test_two_flights_are_played_side_by_side(browser, flight, plain, tmp_path):
+    other = dataclasses.replace(plain, planner="other")
+    opened(browser, write_replay([flight, other], tmp_path / "replay.html"))
+    left, right = browser.find_elements(By.CLASS_NAME, "flight")
+    assert left.rect["width"] == right.rect["width"]
+    assert [title.text for title in browser.find_elements(By.TAG_NAME, "h1")] == [
+        "village · nearest-waypoint",
+        "village · other",
+    ]
+    pressed(browser, Keys.END)
+    assert len(cards(browser)) == 4
+    assert cards(browser)[:2] == cards(browser)[2:]
+    # one camera for both
+    before = pixels(browser, ".flight:last-child .stage")
+    stage = left.find_element(By.CLASS_NAME, "stage")
+    ActionChains(browser).drag_and_drop_by_offset(stage, 120, 30).perform()
+    settled(browser)
+    assert (pixels(browser, ".flight:last-child .stage") != before).any(axis=2).mean() > 0.3
+    assert complaints(browser) == []
+
+
+def test_a_hostile_name_is_shown_and_does_nothing(browser, flight, tmp_path):
+    water = flight.scenario.decorations[0].model_copy(update={"kind": HOSTILE})
+    scenario = flight.scenario.model_copy(update={"decorations": (water,)})
+    evil = dataclasses.replace(flight, scenario=scenario, planner=HOSTILE)
+    opened(browser, write_replay([evil], tmp_path / "replay.html"))
+    assert browser.find_element(By.TAG_NAME, "h1").text == f"village · {HOSTILE}"
+    assert browser.title == f"village, {HOSTILE}"
+    assert browser.execute_script("return typeof window.hacked") == "undefined"
+    assert complaints(browser) == []

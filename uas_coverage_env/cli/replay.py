@@ -1,0 +1,61 @@
+"""`uas-coverage replay`: a page, a video or a GIF of a flight."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uas_coverage_env.cli.output import console
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.replay import write_gif, write_replay, write_video
+from uas_coverage_env.strict_toml import InputError
+
+_PAGE = "replay.html"
+
+
+def replay(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+    other: Annotated[
+        Path | None, typer.Argument(metavar="[DIR2]", help="A second flight, shown beside it.")
+    ] = None,
+    video: Annotated[
+        Path | None, typer.Option(metavar="FILE.mp4", help="Write a video too (extra `view`).")
+    ] = None,
+    gif: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="Write a GIF too.")] = None,
+    fps: Annotated[
+        int, typer.Option(min=1, max=50, help="Pictures per second; one picture per step.")
+    ] = 10,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the film where it exists.")
+    ] = False,
+) -> None:
+    """Write DIR/replay.html, a page that opens from disk and needs no network.
+
+    It is written anew each time. With two flights, both are played side by side.
+    """
+    for path, suffix in ((video, ".mp4"), (gif, ".gif")):
+        if path is not None:
+            check_file(path, (suffix,), overwrite=overwrite)
+    sources = [str(path) for path in (directory, other) if path is not None]
+    flights = [Flight.load(source) for source in sources]
+    out = console()
+    for path, write in ((video, write_video), (gif, write_gif)):
+        if path is not None:
+            write(flights, path, fps=fps)
+            out.print(f"film in {path} ({path.stat().st_size / 1e3:.0f} kB)", markup=False)
+    page = write_replay(flights, directory / _PAGE, sources=sources)
+    out.print(f"page in {page} ({page.stat().st_size / 1e3:.0f} kB)", markup=False)
+
+
+def check_file(path: Path, suffixes: tuple[str, ...], *, overwrite: bool) -> None:
+    """Make sure that a picture or film can be written there, before it is made.
+
+    Raises:
+        InputError: Another kind of file, or it exists, or its folder does not.
+    """
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: should end in {' or '.join(suffixes)}")
+    if path.exists() and not overwrite:
+        raise InputError(f"{path}: exists; give another file or add --overwrite")
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: is no folder; make it first")

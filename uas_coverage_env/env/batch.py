@@ -1,0 +1,380 @@
+"""Many missions side by side in arrays: one compiled call flies all of them for one step."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.actions import HOME_CHOICE
+from uas_coverage_env.env.batch_kernel import (
+    ACCEPTED,
+    DISABLED,
+    DRAW,
+    FLY,
+    NEXT_STEP,
+    REST,
+    SAME_STEP,
+    SWARM_SIZE,
+    Lanes,
+    step_batch,
+    step_batch_in_threads,
+)
+from uas_coverage_env.env.kernel import REPORT_SIZE
+from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
+from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.rewards import weights_of
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, SwarmState
+from uas_coverage_env.world.pool import lanes_of
+
+AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
+"""When a mission that has ended begins anew."""
+
+_MOST_LANES = 2**20
+_SEEDS = 2**64
+
+
+class CoverageBatch:
+    """Missions in L lanes; what flies in one is, bit for bit, what `CoverageParallelEnv` flies.
+
+    Every lane draws the scenario of each of its missions from the pool, by its own seed and the
+    number of the mission alone: neither the number of lanes nor that of threads changes a result.
+    Where scenarios differ in their number of UAS, the arrays have room for the largest: rows of UAS
+    that a scenario does not have are zero, never fly, and what is asked of them has no effect.
+
+    Args:
+        num_lanes: L.
+        scenario: See `ScenarioPool`.
+        action: A name of `ACTION_NAMES`.
+        dynamics: "lpv" or "nonlinear".
+        return_mode: Bring every UAS home in time.
+        safety_filter: Keep commands clear of harm.
+        reward_weights: Reward term -> weight; the others keep their defaults.
+        max_cycles: Steps after which missions are cut; None: as each scenario has it.
+        autoreset: A name of `AUTORESET`.
+        threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
+            for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
+
+    Attributes:
+        num_lanes: L.
+        n_uas: U, of the largest scenario.
+        pool: The scenarios.
+        lanes: What happened, see `Lanes`; the arrays are written by every step.
+        worlds: The states of the world, with an axis of lanes in front; written likewise.
+        autoreset: As in `batch_kernel`.
+
+    Raises:
+        ValueError: An argument is none of what is allowed; says what is.
+    """
+
+    def __init__(
+        self,
+        num_lanes: int,
+        scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
+        *,
+        action: str = "velocity",
+        dynamics: str = "lpv",
+        return_mode: bool = False,
+        safety_filter: bool = False,
+        reward_weights: Mapping[str, float] | None = None,
+        max_cycles: int | None = None,
+        autoreset: str = "next_step",
+        threads: int = 1,
+    ) -> None:
+        _check_count("num_envs", num_lanes, _MOST_LANES)
+        _check_count("threads", threads, numba.config.NUMBA_NUM_THREADS)
+        if autoreset not in AUTORESET:
+            raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
+        for name, switch in (("return_mode", return_mode), ("safety_filter", safety_filter)):
+            if not isinstance(switch, bool | np.bool_):
+                raise ValueError(f"{name} is {switch!r}; it is True or False")
+        if dynamics not in ("lpv", "nonlinear"):
+            raise ValueError(f"dynamics is {dynamics!r}; it is 'lpv' or 'nonlinear'")
+        self.pool = ScenarioPool(scenario, action=action, max_cycles=max_cycles)
+        self.num_lanes = int(num_lanes)
+        self.n_uas = int(self.pool.n_uas.max())
+        self.actions = self.pool.actions
+        self.chooses = action == "waypoint"
+        self.filters = bool(safety_filter)
+        self.autoreset = AUTORESET[autoreset]
+        self.worlds = lanes_of(self.num_lanes, self.pool.arenas)
+        self.lanes = _empty_lanes(self.pool, self.num_lanes)
+        self._settings = (
+            self.actions.kind,
+            weights_of(reward_weights),
+            dynamics == "nonlinear",
+            bool(return_mode),
+            bool(safety_filter),
+            self.autoreset,
+        )
+        shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)
+        self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
+        self._threads = int(threads)
+        self._begun = False
+        self._kernel: Callable[..., int] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # machine code does not travel
+        return {**self.__dict__, "_kernel": None}
+
+    @property
+    def observation(self) -> NDArray[np.float32]:
+        """(L, U, OBSERVATION_SIZE) the latest; overwritten by the step after the next."""
+        return self._observations[0]
+
+    @property
+    def flying(self) -> NDArray[np.bool_]:
+        """(L, U) which UAS fly now, an array of its own."""
+        return self.worlds.status == FLYING
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """(L, U, K_WAYPOINTS + 1) choices that name a waypoint, and home."""
+        return masks_of(self.lanes.candidates)
+
+    def seed(self, seed: int | Sequence[int | None]) -> None:
+        """Seed the lanes, each of which counts its missions from 0 again.
+
+        Args:
+            seed: A number s gives lane i the seed s + i; or one seed for each lane, None where it
+                goes on as it is.
+
+        Raises:
+            ValueError: A seed is negative or too large, or their number is wrong.
+        """
+        if isinstance(seed, int | np.integer):
+            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_lanes)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_lanes:
+            raise ValueError(f"{len(seeds)} seeds for {self.num_lanes} lanes; give one for each")
+        for lane, value in enumerate(seeds):
+            if value is None:
+                continue
+            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+            if not whole or not 0 <= value < _SEEDS:
+                raise ValueError(f"seed of lane {lane} is {value!r}; give a whole number from 0 on")
+            self.lanes.seed[lane] = value
+            self.lanes.mission[lane] = -1
+
+    def reset(
+        self,
+        seed: int | Sequence[int | None] | None = None,
+        *,
+        mask: NDArray[np.bool_] | None = None,
+        scenarios: Sequence[int] | NDArray[np.integer] | None = None,
+    ) -> NDArray[np.float32]:
+        """Begin missions.
+
+        Args:
+            seed: See `seed`; None: the lanes go on drawing, at first from seeds of no meaning.
+            mask: (L,) in which lanes; None: in all.
+            scenarios: (L,) indices in the pool, what to fly instead of drawing; None: draw.
+
+        Returns:
+            (L, U, OBSERVATION_SIZE) see `observation`.
+
+        Raises:
+            ValueError: An argument is wrong.
+        """
+        if mask is None:
+            mask = np.ones(self.num_lanes, dtype=np.bool_)
+        elif mask.shape != (self.num_lanes,) or mask.dtype != np.bool_:
+            raise ValueError(
+                f"mask has shape {mask.shape} and dtype {mask.dtype}; "
+                f"give one truth value for each of {self.num_lanes} lanes"
+            )
+        if not self._begun and not mask.all():
+            raise ResetNeeded("reset of some lanes before any: reset all lanes first")
+        orders = self._chosen(scenarios)
+        orders[~mask] = REST
+        if seed is not None:
+            self.seed(seed)
+        self._run(orders)
+        self._begun = True
+        return self.observation
+
+    def step(self, actions: Any) -> NDArray[np.float32]:
+        """Fly all lanes for one step; what came of it is in `lanes`.
+
+        Args:
+            actions: (L, U, size) numbers, or (L, U) choices; as (L, -1) too.
+
+        Returns:
+            (L, U, OBSERVATION_SIZE) see `observation`.
+
+        Raises:
+            ValueError: An action is invalid; names lane, UAS and value. Nothing has changed.
+            ResetNeeded: `reset` was not called before, or a lane that has ended was not reset.
+        """
+        lanes = self.lanes
+        if not self._begun:
+            raise ResetNeeded("step() before reset(): call reset() first")
+        if self.autoreset == DISABLED:
+            ended = lanes.terminated | lanes.truncated
+            if ended.any():
+                raise ResetNeeded(
+                    f"the mission of lane {int(ended.argmax())} has ended: reset the lanes that "
+                    f"have ended before the next step, or choose another autoreset mode"
+                )
+        self._ask(actions)
+        refused = self._run(lanes.orders)
+        if refused != ACCEPTED:
+            lane, i = divmod(refused, self.n_uas)
+            raise ValueError(
+                f"action of UAS {i} in lane {lane} is {lanes.asked[lane, i].tolist()}; "
+                f"give finite numbers"
+            )
+        return self.observation
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """All that changes from step to step, in arrays of their own, by name."""
+        return {name: array.copy() for name, array in self._changing().items()}
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on where a batch of the same arguments was when its `state_dict` was taken.
+
+        Raises:
+            ValueError: An array is missing, surplus, or of another shape or dtype.
+        """
+        own = self._changing()
+        if set(state) != set(own):
+            wrong = ", ".join(sorted(set(state) ^ set(own)))
+            raise ValueError(f"the state of another kind of batch: {wrong} missing or surplus")
+        for name, array in own.items():
+            given = np.asarray(state[name])
+            if given.shape != array.shape or given.dtype != array.dtype:
+                raise ValueError(
+                    f"{name} has shape {given.shape} and dtype {given.dtype}; "
+                    f"this batch has {array.shape} and {array.dtype}"
+                )
+        for name, array in own.items():
+            array[...] = state[name]
+        self._begun = bool((self.lanes.mission >= 0).all())
+
+    def _changing(self) -> dict[str, NDArray[Any]]:
+        # commands and outcomes are written anew in every step
+        lanes = {k: v for k, v in self.lanes._asdict().items() if v.dtype.names is None}
+        arrays = {**self.worlds._asdict(), **lanes, "observation": self.observation}
+        return {name: array for name, array in arrays.items() if not name.startswith("final_")}
+
+    def swarm_state(self, lane: int) -> SwarmState:
+        """What a player of this lane sees now, in arrays of their own."""
+        scenario = self.scenario_of(lane)
+        n_uas, step = len(scenario.uas), int(self.worlds.step[lane, 0])
+        time_s = step * scenario.dt_s
+        return SwarmState(
+            time_s=time_s,
+            step=step,
+            names=tuple(uas.name for uas in scenario.uas),
+            x=self.worlds.x[lane, :n_uas].copy(),
+            reference_mps=self.worlds.reference[lane, :n_uas].copy(),
+            status=self.worlds.status[lane, :n_uas].copy(),
+            uncovered=self.worlds.uncovered[lane, : len(scenario.waypoints)].copy(),
+            home_m=np.array([uas.start_m for uas in scenario.uas]),
+            moving_position_m=np.array(scenario.moving_positions(time_s)).reshape(-1, 3),
+            moving_velocity_mps=np.array(scenario.moving_velocities(time_s)).reshape(-1, 3),
+        )
+
+    def scenario_of(self, lane: int) -> Scenario:
+        """The scenario that a lane flies now."""
+        return self.pool.scenarios[self.lanes.scenario[lane]]
+
+    def _run(self, orders: NDArray[np.int64]) -> int:
+        arenas, tables = self.pool.arenas, self.pool.tables
+        given = (arenas, tables, self.worlds, self.lanes, orders, *self._settings)
+        before, free = self._observations
+        if self._kernel is None:
+            kernel = step_batch if self._threads == 1 else step_batch_in_threads
+            self._kernel = _for_these_types(kernel, (*given, before, free))
+        if self._threads == 1:
+            refused = self._kernel(*given, before, free)
+        else:
+            threads = numba.get_num_threads()
+            numba.set_num_threads(self._threads)
+            refused = self._kernel(*given, before, free)
+            numba.set_num_threads(threads)
+        if refused == ACCEPTED:
+            self._observations = free, before
+        return refused
+
+    def _chosen(self, scenarios: Any) -> NDArray[np.int64]:
+        if scenarios is None:
+            return np.full(self.num_lanes, DRAW)
+        chosen = np.asarray(scenarios)
+        if chosen.shape != (self.num_lanes,) or chosen.dtype.kind not in "iu":
+            raise ValueError(
+                f"scenarios are {scenarios!r}; give an index for each of {self.num_lanes} lanes"
+            )
+        if chosen.min() < 0 or chosen.max() >= len(self.pool):
+            raise ValueError(
+                f"scenarios go from {chosen.min()} to {chosen.max()}; "
+                f"the pool has indices from 0 to {len(self.pool) - 1}"
+            )
+        return chosen.astype(np.int64)
+
+    def _ask(self, actions: Any) -> None:
+        actions = np.asarray(actions)
+        asked = self.lanes.asked
+        if len(actions.shape) < 2 or len(actions) != len(asked) or actions.size != asked.size:
+            raise ValueError(
+                f"actions have shape {actions.shape}; give {self.actions.size} for each of "
+                f"{self.n_uas} UAS in each of {self.num_lanes} lanes"
+            )
+        if actions.dtype.kind not in ("iu" if self.chooses else "fiu"):
+            kind = "whole numbers" if self.chooses else "real numbers"
+            raise ValueError(f"actions have dtype {actions.dtype}; give {kind}")
+        if self.chooses and (actions.min() < 0 or actions.max() > HOME_CHOICE):
+            raise ValueError(
+                f"actions go from {actions.min()} to {actions.max()}; "
+                f"give whole numbers from 0 to {HOME_CHOICE} (home)"
+            )
+        asked[:] = actions.reshape(asked.shape)
+
+
+def _check_count(name: str, count: Any, most: int) -> None:
+    whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+    if not whole or not 1 <= count <= most:
+        raise ValueError(f"{name} is {count!r}; give a whole number from 1 to {most}")
+
+
+def _for_these_types(kernel: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
+    """The machine code for arguments of these types: it spares a look at each of them."""
+    if not hasattr(kernel, "compile"):
+        return kernel  # NUMBA_DISABLE_JIT=1: a function like any other
+    return kernel.compile(tuple(numba.typeof(argument) for argument in arguments))
+
+
+def masks_of(candidates: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which choices name a waypoint, and home: (..., K_WAYPOINTS) -> (..., K_WAYPOINTS + 1)."""
+    masks = np.ones((*candidates.shape[:-1], HOME_CHOICE + 1), dtype=np.bool_)
+    np.greater_equal(candidates, 0, out=masks[..., :HOME_CHOICE])
+    return masks
+
+
+def _empty_lanes(pool: ScenarioPool, n: int) -> Lanes:
+    n_uas, n_waypoints = int(pool.n_uas.max()), int(pool.n_waypoints.max())
+    return Lanes(
+        seed=np.random.default_rng().integers(_SEEDS, size=n, dtype=np.uint64),
+        mission=np.full(n, -1),
+        scenario=np.zeros(n, dtype=np.int64),
+        orders=np.full(n, FLY),
+        asked=np.zeros((n, n_uas, pool.actions.size)),
+        targets=np.zeros((n, n_uas), dtype=np.int64),
+        candidates=np.zeros((n, n_uas, K_WAYPOINTS), dtype=np.int64),
+        company=np.zeros((n, n_waypoints, 2)),
+        commands=np.zeros((n, n_uas), dtype=COMMAND_DTYPE),
+        outcome=np.zeros((n, n_uas), dtype=OUTCOME_DTYPE),
+        report=np.zeros((n, n_uas, REPORT_SIZE)),
+        rewards=np.zeros((n, n_uas)),
+        swarm=np.zeros((n, SWARM_SIZE)),
+        terminated=np.zeros(n, dtype=np.bool_),
+        truncated=np.zeros(n, dtype=np.bool_),
+        final_observation=np.zeros((n, n_uas, OBSERVATION_SIZE), np.float32),
+        final_report=np.zeros((n, n_uas, REPORT_SIZE)),
+        final_swarm=np.zeros((n, SWARM_SIZE)),
+        final_candidates=np.zeros((n, n_uas, K_WAYPOINTS), dtype=np.int64),
+    )

@@ -1,0 +1,54 @@
+"""Who is better: planners and policies on the same scenarios, flown, kept, counted, published."""
+
+from uas_coverage_env.leaderboard.machine import machine
+from uas_coverage_env.leaderboard.players import Player, players_of
+from uas_coverage_env.leaderboard.publish import Comparison, failures, write
+from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES, Row
+from uas_coverage_env.leaderboard.scenario_sets import (
+    SETS,
+    benchmark_scenario,
+    scenarios_of,
+    seed_range,
+)
+from uas_coverage_env.leaderboard.scores import Scores, scores_of
+from uas_coverage_env.leaderboard.store import STORE, Store, opened
+from uas_coverage_env.leaderboard.sweep import Entry, Sweep, source_of
+from uas_coverage_env.leaderboard.workers import (
+    Backend,
+    StoppedError,
+    WorkerLostError,
+    fly,
+    fly_all,
+    jobs_of,
+)
+
+__all__ = [
+    "FAILED",
+    "FLOWN",
+    "SETS",
+    "STORE",
+    "TIMES",
+    "Backend",
+    "Comparison",
+    "Entry",
+    "Player",
+    "Row",
+    "Scores",
+    "StoppedError",
+    "Store",
+    "Sweep",
+    "WorkerLostError",
+    "benchmark_scenario",
+    "failures",
+    "fly",
+    "fly_all",
+    "jobs_of",
+    "machine",
+    "opened",
+    "players_of",
+    "scenarios_of",
+    "scores_of",
+    "seed_range",
+    "source_of",
+    "write",
+]

@@ -1,0 +1,97 @@
+"""Who is compared: planners and policies by name, each with all its options."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from uas_coverage_env.flight import load_planner
+from uas_coverage_env.flight.registry import options_of
+from uas_coverage_env.strict_toml import InputError
+
+_LABELLED = re.compile(r"([\w.+-]+)=(.+)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Player:
+    """A planner as it is flown.
+
+    Attributes:
+        label: Under which it stands in the tables.
+        planner: Its name, as `load_planner` takes it.
+        options: Every option, defaults filled in, as plain data.
+        fingerprint: Changes with the data it flies by (a policy's weights); empty where none.
+        package: The package that its code is in.
+    """
+
+    label: str
+    planner: str
+    options: Mapping[str, Any]
+    fingerprint: str
+    package: str
+
+    def identity(self) -> dict[str, Any]:
+        """What its flights depend on; where a policy's folder lies does not matter."""
+        kind, _, argument = self.planner.partition(":")
+        planner = kind if argument and self.fingerprint else self.planner
+        return {
+            "planner": planner,
+            "options": dict(self.options),
+            "fingerprint": self.fingerprint,
+        }
+
+
+def players_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, Player]:
+    """The players that a person asks for, by label, in their order.
+
+    Args:
+        texts: Each one or several (comma between them) of PLANNER or LABEL=PLANNER.
+        options: LABEL:KEY=VALUE each; the label of a planner without one is its name.
+
+    Raises:
+        InputError: No planner, an unknown one or an unknown option, a label given twice.
+    """
+    planners: dict[str, str] = {}
+    for item in (part.strip() for text in texts for part in text.split(",")):
+        labelled = _LABELLED.fullmatch(item)
+        label, planner = labelled.groups() if labelled else (item, item)
+        if not item:
+            continue
+        if label in planners:
+            raise InputError(
+                f"--planners: {label!r} is given twice; give the second one a label of its own, "
+                f"as in other={planner}"
+            )
+        planners[label] = planner
+    if not planners:
+        raise InputError("--planners: names none; give some, as in nearest-waypoint,lawnmower")
+    given: dict[str, dict[str, str]] = {label: {} for label in planners}
+    for text in options:
+        label, key, value = _option(text, list(planners))
+        if key in given[label]:
+            raise InputError(f"--option {label}:{key} is given twice; give it once")
+        given[label][key] = value
+    return {label: _player(label, planner, given[label]) for label, planner in planners.items()}
+
+
+def _player(label: str, name: str, options: Mapping[str, str]) -> Player:
+    planner = load_planner(name, options)
+    return Player(
+        label,
+        name,
+        options_of(planner),
+        fingerprint=getattr(planner, "fingerprint", ""),
+        package=type(planner).__module__.partition(".")[0],
+    )
+
+
+def _option(text: str, labels: Sequence[str]) -> tuple[str, str, str]:
+    left, equals, value = (part.strip() for part in text.partition("="))
+    label, colon, key = (part.strip() for part in left.rpartition(":"))
+    if not (equals and colon and key):
+        raise InputError(
+            f"--option {text!r}: should be PLANNER:KEY=VALUE, as in {labels[0]}:horizon=12"
+        )
+    if label not in labels:
+        raise InputError(f"--option {text!r}: no {label!r} in --planners {','.join(labels)}")
+    return label, key, value

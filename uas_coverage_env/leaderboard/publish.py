@@ -1,0 +1,167 @@
+"""The files of a comparison: flights as parquet, scores as CSV, JSON and Markdown, a picture."""
+
+import csv
+import dataclasses
+import io
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from uas_coverage_env.leaderboard.machine import machine, versions
+from uas_coverage_env.leaderboard.picture import picture
+from uas_coverage_env.leaderboard.row import FAILED, Row
+from uas_coverage_env.leaderboard.scores import Scores, scores_of
+from uas_coverage_env.leaderboard.table import (
+    effort_cells,
+    markdown,
+    notes,
+    outcome_cells,
+    reference_cells,
+    scenarios_cells,
+)
+from uas_coverage_env.strict_toml import InputError
+
+FLIGHTS, TABLE, PICTURE = "flights.parquet", "table.md", "coverage-energy.png"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A sweep, or as much of it as was flown, summed up.
+
+    Attributes:
+        rows: Its flights.
+        planned: How many flights the whole sweep has.
+        reference: Label of the player with whom the others are compared.
+        command: The command line that made it.
+        jobs: How it was flown, for people.
+        scores: Of each player, best first.
+    """
+
+    rows: Sequence[Row]
+    planned: int
+    reference: str
+    command: str
+    jobs: str
+    scores: Sequence[Scores]
+
+    @classmethod
+    def of(
+        cls, rows: Sequence[Row], planned: int, reference: str, command: str, jobs: str
+    ) -> "Comparison":
+        """Sum up rows, of which there is at least one."""
+        return cls(rows, planned, reference, command, jobs, scores_of(rows, reference))
+
+    def circumstances(self) -> list[str]:
+        """Command, extent, machine and versions, a line each."""
+        scenarios = len({row.scenario for row in self.rows})
+        seeds = len({row.seed for row in self.rows})
+        some = "" if len(self.rows) == self.planned else f" of {self.planned} (not finished)"
+        lines = [
+            f"{self.command}",
+            f"{len(self.rows)} flights{some}: {len(self.scores)} players, {scenarios} scenarios, "
+            f"{seeds} {'seed' if seeds == 1 else 'seeds'}",
+            f"{machine()}; {self.jobs}",
+            versions(),
+        ]
+        sources = len({row.source_sha256 for row in self.rows})
+        if sources > 1:
+            lines.append(
+                f"The flights were flown by {sources} states of the source code, all of them "
+                "called by the same version; --overwrite flies them anew."
+            )
+        return lines
+
+
+def write(comparison: Comparison, directory: Path) -> list[str]:
+    """Write all files; returns their names.
+
+    Raises:
+        InputError: One cannot be written.
+    """
+    files = {
+        FLIGHTS: _parquet(comparison.rows),
+        "table.csv": _csv(comparison.scores).encode(),
+        "table.json": _json(comparison).encode(),
+        TABLE: _markdown(comparison).encode(),
+        PICTURE: picture(comparison.scores, comparison.rows, comparison.reference),
+    }
+    there = {name: content for name, content in files.items() if content is not None}
+    for name, content in there.items():
+        temporary = directory / f".{name}.{os.getpid()}"
+        try:
+            temporary.write_bytes(content)
+            temporary.replace(directory / name)
+        except OSError as error:
+            raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
+        finally:
+            temporary.unlink(missing_ok=True)
+    return list(there)
+
+
+def _parquet(rows: Sequence[Row]) -> bytes:
+    import polars  # 50 MB of code that only this needs
+
+    kinds = {"str": polars.String, "int": polars.Int64, "bool": polars.Boolean}
+    schema = {}
+    for field in dataclasses.fields(Row):
+        kind = str(getattr(field.type, "__name__", field.type)).partition(" | ")[0]
+        schema[field.name] = kinds.get(kind, polars.Float64)
+    frame = polars.DataFrame([dataclasses.astuple(row) for row in rows], schema, orient="row")
+    file = io.BytesIO()
+    frame.write_parquet(file)
+    return file.getvalue()
+
+
+def _csv(scores: Sequence[Scores]) -> str:
+    text = io.StringIO()
+    flat = [one.flat() for one in scores]
+    writer = csv.DictWriter(text, list(flat[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(flat)
+    return text.getvalue()
+
+
+def _json(comparison: Comparison) -> str:
+    data: dict[str, Any] = {
+        "command": comparison.command,
+        "machine": machine(),
+        "versions": versions(),
+        "reference": comparison.reference,
+        "flights": len(comparison.rows),
+        "planned": comparison.planned,
+        "scores": [dataclasses.asdict(one) for one in comparison.scores],
+    }
+    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _markdown(comparison: Comparison) -> str:
+    rows, reference = comparison.rows, comparison.reference
+    players = [one.player for one in comparison.scores]
+    command, *circumstances = comparison.circumstances()
+    parts = [f"`{command}`\n", *(f"{line}\n" for line in circumstances)]
+    parts.append(markdown(outcome_cells(comparison.scores)))
+    parts.append(markdown(effort_cells(comparison.scores)))
+    if len(players) > 1 and reference in players:
+        parts.append(markdown(reference_cells(comparison.scores, reference)))
+    parts += [f"{line}\n" for line in notes(rows, reference)]
+    failed = [row for row in rows if row.status == FAILED]
+    if failed:
+        parts.append("".join(f"- {line}\n" for line in failures(failed)))
+    parts.append("Energy and steps on each scenario, means of the accomplished flights:\n")
+    parts.append(markdown(scenarios_cells(rows, players)))
+    return "\n".join(parts)
+
+
+def failures(failed: Sequence[Row]) -> list[str]:
+    """Why flights failed, a line for each reason of each player."""
+    found: dict[tuple[str, str], list[Row]] = {}
+    for row in failed:
+        found.setdefault((row.player, row.reason or ""), []).append(row)
+    return [
+        f"{player} failed {len(rows)} {'flight' if len(rows) == 1 else 'flights'} "
+        f"(first: {rows[0].scenario}, seed {rows[0].seed}): {reason}"
+        for (player, reason), rows in found.items()
+    ]

@@ -1,0 +1,93 @@
+"""The scenarios that players are compared on: sets by name, shipped scenarios, files, seeds."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from uas_coverage_env.leaderboard.hashing import content_hash
+from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
+from uas_coverage_env.strict_toml import InputError
+
+# `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
+SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
+_GENERATED = "generated"
+_MOST_GENERATED = 100_000
+
+
+def benchmark_scenario(seed: int) -> Scenario:
+    """The generated scenario of a seed: 1 to 4 UAS, 20 to 60 waypoints, 5 to 20 obstacles."""
+    lots = np.random.default_rng([seed, 20, 60, 5, 20])
+    return generate_scenario(
+        seed,
+        n_uas=int(lots.integers(1, 5)),
+        n_waypoints=int(lots.integers(20, 61)),
+        n_obstacles=int(lots.integers(5, 21)),
+    )
+
+
+def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
+    """The scenarios that a person asks for, by name; what is asked for twice comes once.
+
+    Args:
+        texts: Each one or several (comma or space between them) of: the name of a set, the name of
+            a shipped scenario, the path of a scenario file, `generated:FIRST:END`.
+
+    Raises:
+        InputError: There are none, one of them cannot be read, or two that differ share a name.
+    """
+    found: dict[str, Scenario] = {}
+    for scenario in (scenario for item in _items(texts) for scenario in _scenarios(item)):
+        other = found.setdefault(scenario.name, scenario)
+        if scenario_hash(other) != scenario_hash(scenario):
+            raise InputError(
+                f"--scenarios: two different ones are named {scenario.name!r}; rename one of them"
+            )
+    if not found:
+        raise InputError(f"--scenarios: names none; give some, as in village,{next(iter(SETS))}")
+    return found
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """What the scenario is, its vehicles included, whatever files it came from."""
+    content = scenario.model_dump(mode="json", by_alias=True)
+    for uas, vehicle in zip(content["uas"], scenario.vehicles, strict=True):
+        uas["vehicle"] = vehicle.model_dump(mode="json")
+    return content_hash(content)
+
+
+def seed_range(option: str, text: str) -> range:
+    """FIRST:END as a range; END is not part of it.
+
+    Raises:
+        InputError: It is not that, or empty.
+    """
+    first, separator, end = text.partition(":")
+    if not (separator and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
+        raise InputError(f"{option} {text!r}: should be FIRST:END with FIRST < END, as in 0:20")
+    return range(int(first), int(end))
+
+
+def _items(texts: Iterable[str]) -> Iterator[str]:
+    for text in texts:
+        if Path(text).is_file():  # its path may hold a space
+            yield text
+        else:
+            yield from filter(None, re.split(r"[,\s]+", text))
+
+
+def _scenarios(item: str) -> Iterator[Scenario]:
+    kind, separator, rest = item.partition(":")
+    if item in SETS:
+        seeds: Sequence[int] = SETS[item]
+    elif separator and kind == _GENERATED:
+        seeds = seed_range(f"--scenarios {_GENERATED}:", rest)
+        if len(seeds) > _MOST_GENERATED:
+            raise InputError(
+                f"--scenarios {item!r}: are {len(seeds)} scenarios; at most {_MOST_GENERATED}"
+            )
+    else:
+        yield load_scenario(item)
+        return
+    yield from map(benchmark_scenario, seeds)

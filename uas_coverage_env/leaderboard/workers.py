@@ -1,0 +1,132 @@
+"""Flying a list of flights, side by side: joblib's processes, or the machines of a Ray cluster."""
+
+import os
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+from uas_coverage_env.flight import PlannerError, load_planner, rollout
+from uas_coverage_env.leaderboard.row import Row
+from uas_coverage_env.leaderboard.sweep import Entry
+from uas_coverage_env.strict_toml import InputError
+
+Backend = Literal["process", "ray"]
+
+_SECONDS_BETWEEN_LOOKS = 1.0
+
+
+class StoppedError(Exception):
+    """A flight was ended by hand: there is nothing to keep of it."""
+
+
+class WorkerLostError(Exception):
+    """A process that flew was killed from outside, or crashed."""
+
+
+def jobs_of(asked: int | None, backend: Backend) -> int:
+    """How many flights are flown side by side; -1: as many as the Ray cluster has cores."""
+    if asked is not None:
+        return asked
+    return -1 if backend == "ray" else cpu_count()
+
+
+def fly_all(
+    entries: Sequence[Entry], jobs: int, backend: Backend, source_sha256: str
+) -> Iterator[Row]:
+    """Fly everything; each row as soon as its flight is over, in no particular order.
+
+    Args:
+        entries: What to fly.
+        jobs: Flights side by side, see `jobs_of`.
+        backend: `process`, or `ray`: the cluster of `RAY_ADDRESS`, or a local one.
+        source_sha256: Hash of the source code that flies.
+
+    Raises:
+        InputError: Ray is not installed.
+        StoppedError: Ctrl-C ended a flight.
+        WorkerLostError: A process that flew is gone.
+    """
+    if not entries:
+        return
+    if backend == "ray":
+        _join_ray(jobs)
+        chosen = {"backend": "uas-ray"}
+    else:
+        chosen = {"backend": "loky", "initializer": _end_with, "initargs": (os.getpid(),)}
+    try:
+        with parallel_config(n_jobs=jobs, **chosen):
+            # one flight per task: what is finished is kept at once
+            parallel = Parallel(
+                return_as="generator_unordered",
+                batch_size=1,  # pyright: ignore[reportArgumentType]  # its default is a word
+                max_nbytes=None,  # nothing large travels
+            )
+            for row in parallel(delayed(fly)(entry, source_sha256) for entry in entries):
+                if row is None:
+                    raise StoppedError
+                yield row
+    except TerminatedWorkerError as error:
+        raise WorkerLostError(
+            "a process that flew was killed or crashed (out of memory?); finished flights are kept"
+        ) from error
+
+
+def fly(entry: Entry, source_sha256: str) -> Row | None:
+    """Fly one flight; None: it was stopped by hand."""
+    player = entry.player
+    try:
+        planner = load_planner(player.planner, player.options)
+        if getattr(planner, "fingerprint", "") != player.fingerprint:
+            raise InputError(f"{player.label}: its files have changed since the sweep has begun")
+        flight = rollout(
+            entry.scenario,
+            planner,
+            seed=entry.seed,
+            dynamics=entry.dynamics,
+            safety_filter=True if entry.safety_filter else None,
+        )
+    except (InputError, PlannerError) as error:
+        return Row.failed(entry, str(error), source_sha256)
+    except Exception as error:  # a planner may be anybody's: its crash must not end the sweep
+        return Row.failed(entry, f"{type(error).__name__}: {error}", source_sha256)
+    return None if flight.ended == "stopped" else Row.of(entry, flight, source_sha256)
+
+
+def _end_with(owner: int) -> None:
+    """Let this process end when its owner is gone: after a kill -9 it would wait for minutes."""
+
+    def watch() -> None:
+        while os.getppid() == owner:
+            time.sleep(_SECONDS_BETWEEN_LOOKS)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _join_ray(jobs: int) -> None:
+    """Make Ray known to joblib, and start a local cluster where there is none to join."""
+    try:
+        import ray  # pyright: ignore[reportMissingImports]
+        from ray.util.joblib.ray_backend import RayBackend  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        raise InputError(
+            f"--backend ray: Ray cannot be loaded ({error}); "
+            "python -m pip install 'uas-coverage-env[cluster]'"
+        ) from error
+
+    class Returning(RayBackend):
+        # its pool does hand over each result as it comes; joblib declares this off for all pools,
+        # because one that nobody reads to the end would wait for ever: ours is read to the end
+        supports_return_generator = True
+
+    if not ray.is_initialized():
+        here = "RAY_ADDRESS" not in os.environ
+        local = {"num_cpus": None if jobs < 0 else jobs, "include_dashboard": False} if here else {}
+        ray.init(**local, log_to_driver=False, logging_level="ERROR")
+    from joblib import register_parallel_backend
+
+    register_parallel_backend("uas-ray", Returning)

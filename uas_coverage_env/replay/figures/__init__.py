@@ -1,0 +1,48 @@
+"""Figures of a flight for print, drawn with matplotlib (extra `view`).
+
+A new figure is one file with a function `flight -> Figure`, and one line in `KINDS`.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.replay.figures.battery import battery_figure
+from uas_coverage_env.replay.figures.decision_time import decision_time_figure
+from uas_coverage_env.replay.figures.map import map_figure
+from uas_coverage_env.replay.figures.modes import modes_figure
+from uas_coverage_env.replay.figures.style import printed
+from uas_coverage_env.strict_toml import InputError
+
+KINDS: dict[str, Callable[[Flight], Figure]] = {
+    "map": map_figure,
+    "battery": battery_figure,
+    "modes": modes_figure,
+    "decision-time": decision_time_figure,
+}
+
+__all__ = [
+    "KINDS",
+    "battery_figure",
+    "decision_time_figure",
+    "map_figure",
+    "modes_figure",
+    "save_figure",
+]
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure as .pdf, .svg or .png; the same figure always gives the same file.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    dates = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}
+    try:
+        with printed():
+            figure.savefig(path, metadata=dates[path.suffix.lower()])
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    return path

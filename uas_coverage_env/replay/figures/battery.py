@@ -1,0 +1,96 @@
+"""Charge, voltage and current of every UAS (Gasche et al., Fig. 3)."""
+
+from importlib.resources import files
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.replay.figures.style import line_style, printed, rows, uas_colour
+
+_PUBLISHED_SCENARIO = "village"
+"""The paper's mission; beside another one its curves would say nothing."""
+
+_GREY = "#9a9a9a"
+_PANELS = (("State of charge, %", 100.0), ("Voltage, V", 1.0), ("Current, A", 1.0))
+
+
+def battery_figure(flight: Flight, *, published: bool | None = None) -> Figure:
+    """Three panels over time, one line per UAS.
+
+    Args:
+        flight: The flight.
+        published: Draw the paper's curves too, in grey; by default where the flight is of the
+            village mission. The paper flew a map of its own, which is not published: the curves
+            are alike, not equal.
+    """
+    if published is None:
+        published = flight.scenario.name == _PUBLISHED_SCENARIO
+    with printed():
+        figure, axes = rows(5.4, [1.0, 1.0, 1.0])
+        if published:
+            _draw_published(axes)
+        for i in range(len(flight.names)):
+            airborne = slice(0, int(flight.last_sample[i]))
+            panels = (flight.soc[:, i], flight.voltage_V[:, i], flight.current_A[:, i])
+            for axis, series, (_, scale) in zip(axes, panels, _PANELS, strict=True):
+                axis.plot(
+                    flight.time_s[airborne],
+                    scale * series[airborne],
+                    color=uas_colour(i),
+                    linestyle=line_style(i),
+                )
+        for axis, (label, _) in zip(axes, _PANELS, strict=True):
+            axis.set_ylabel(label)
+            axis.margins(x=0.01)
+        for floor in sorted({1.0 - uas.dod_max for uas in flight.scenario.uas}):
+            axes[0].axhline(100 * floor, color="#c81e2d", linewidth=0.8, linestyle=":")
+        axes[0].set_ylim(bottom=0)
+        axes[-1].set_xlabel("Time, s")
+        figure.align_ylabels(axes)
+        figure.legend(handles=_legend(flight, published), loc="outside upper center", ncols=3)
+    return figure
+
+
+def published_battery() -> dict[str, NDArray[np.float64]]:
+    """The curves of the paper's Fig. 3, read from the figure; one row per second.
+
+    Columns: `t_s`, and `soc_uas1`, `voltage_uas1_V`, `current_uas1_A`, the same for `uas2`.
+    Equal to `tests/paper/fig3_battery_reference.csv`.
+    """
+    file = files("uas_coverage_env.replay.figures").joinpath("published_battery.csv")
+    table = np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True)
+    return {name: table[name] for name in table.dtype.names or ()}
+
+
+def _draw_published(axes: list[Axes]) -> None:
+    table = published_battery()
+    for i, uas in enumerate(("uas1", "uas2")):
+        current_A = table[f"current_{uas}_A"]
+        # without current it has landed
+        airborne = slice(0, int(np.count_nonzero(current_A)))
+        panels = (table[f"soc_{uas}"], table[f"voltage_{uas}_V"], current_A)
+        for axis, series, (_, scale) in zip(axes, panels, _PANELS, strict=True):
+            axis.plot(
+                table["t_s"][airborne],
+                scale * series[airborne],
+                color=_GREY,
+                linestyle=line_style(i),
+                linewidth=0.8,
+            )
+
+
+def _legend(flight: Flight, published: bool) -> list[Line2D]:
+    ours = [
+        Line2D([], [], color=uas_colour(i), linestyle=line_style(i), label=name)
+        for i, name in enumerate(flight.names)
+    ]
+    limit = Line2D([], [], color="#c81e2d", linestyle=":", linewidth=0.8, label="lowest allowed")
+    theirs = [
+        Line2D([], [], color=_GREY, linestyle=line_style(i), label=f"UAS {i + 1}, Gasche et al.")
+        for i in range(2)
+    ]
+    return [*ours, *(theirs if published else []), limit]

@@ -1,0 +1,73 @@
+"""How long the planner took for each decision, over time and as a distribution."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from uas_coverage_env.draw import colours
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade
+from uas_coverage_env.strict_toml import InputError
+
+_MILLISECONDS_BELOW_S = 0.1
+
+
+def decision_time_figure(flight: Flight) -> Figure:
+    """Each decision's time at its step on the left, the share of decisions that are faster right.
+
+    Raises:
+        InputError: The flight holds no decision.
+    """
+    if not flight.decisions:
+        raise InputError("the flight holds no decision: it ended before the first step")
+    durations_s = np.array([decision.duration_s for decision in flight.decisions])
+    fallback = np.array([decision.fallback for decision in flight.decisions])
+    fast = durations_s.max() < _MILLISECONDS_BELOW_S
+    unit, scale = ("ms", 1e3) if fast else ("s", 1.0)
+    times_s = flight.time_s[: len(durations_s)]
+    with printed():
+        figure = Figure(figsize=(WIDTH_IN, 2.7), layout="constrained")
+        series, shares = figure.subplots(1, 2, width_ratios=[1.6, 1.0], sharey=True)
+        ink = shade(colours.BLUE)
+        series.plot(times_s, scale * durations_s, color=ink, linewidth=0.6, alpha=0.5)
+        series.plot(times_s, scale * durations_s, "o", color=ink, markersize=2.2)
+        if fallback.any():
+            series.plot(
+                times_s[fallback],
+                scale * durations_s[fallback],
+                "x",
+                color=shade(colours.VERMILLION),
+                label=f"on a fallback ({fallback.sum()})",
+            )
+            series.legend(loc="lower left")
+        series.set(xlabel="Time of flight, s", ylabel=f"Decision time, {unit}")
+        ordered = np.sort(scale * durations_s)
+        shares.plot(np.arange(1, len(ordered) + 1) / len(ordered), ordered, color=ink)
+        for percent in (50, 99):
+            value = float(np.percentile(ordered, percent))
+            shares.plot(percent / 100, value, "o", color=ink, markersize=3.5)
+            shares.annotate(
+                f"{percent} %: {value:.3g} {unit}",
+                (percent / 100, value),
+                xytext=(-6, 5),
+                textcoords="offset points",
+                ha="right",
+                fontsize=8,
+            )
+        shares.xaxis.set_major_formatter(PercentFormatter(1.0))
+        shares.set(xlabel="Share of the decisions", xlim=(0, 1.02))
+        limit_s = flight.planner_options.get("time_limit_s")
+        if isinstance(limit_s, int | float) and np.isfinite(limit_s):
+            for axis in (series, shares):
+                axis.axhline(scale * limit_s, color=shade(colours.RED), linewidth=0.8, ls=":")
+            series.annotate(
+                "limit",
+                (1.0, scale * limit_s),
+                xycoords=("axes fraction", "data"),
+                xytext=(-2, 3),
+                textcoords="offset points",
+                ha="right",
+                fontsize=8,
+            )
+        series.set_ylim(bottom=0, top=1.12 * series.dataLim.y1)
+    return figure

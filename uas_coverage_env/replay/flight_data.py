@@ -1,0 +1,92 @@
+"""What a replay page knows of a flight: its series as whole numbers, which are short in JSON."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.flight import MODES, Flight, covered_at, summary
+from uas_coverage_env.replay.scene_data import scene_data
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA
+
+POSITION_M = 0.01
+PLAN_M = 0.1
+ANGLE_RAD = 0.001
+SOC = 0.0001
+VOLTAGE_V = 0.001
+CURRENT_A = 0.01
+DURATION_S = 0.00001
+
+
+def flight_data(flight: Flight, source: str) -> dict[str, Any]:
+    """A flight as plain data for the viewer (`viewer/src/flight.ts` reads it).
+
+    A series is `{"unit": u, "values": [whole numbers]}`, the value being their product; its axes
+    are, slowest first, time T, UAS U (or moving obstacles M), and components.
+
+    Args:
+        flight: The flight.
+        source: What mistakes call it: its directory.
+
+    Raises:
+        InputError: A value of the flight is not finite, so that it has no place in a picture.
+    """
+    outcome = summary(flight)
+    durations_s = np.array([decision.duration_s for decision in flight.decisions])
+    series = {
+        "position": (flight.x[..., 0:3], POSITION_M),
+        "attitude": (flight.x[..., [PHI, THETA, PSI]], ANGLE_RAD),
+        "soc": (1.0 - flight.x[..., DOD], SOC),
+        "voltage": (flight.voltage_V, VOLTAGE_V),
+        "current": (flight.current_A, CURRENT_A),
+        "moving": (flight.moving_position_m, POSITION_M),
+        "duration": (durations_s, DURATION_S),
+    }
+    return {
+        "planner": flight.planner,
+        "seed": flight.seed,
+        "dynamics": flight.dynamics,
+        "dt_s": flight.scenario.dt_s,
+        "samples": len(flight.x),
+        "scene": scene_data(flight.scenario),
+        **{name: _series(values, unit, name, source) for name, (values, unit) in series.items()},
+        "modes": list(MODES),
+        "mode": flight.mode.ravel().tolist(),
+        "last": flight.last_sample.tolist(),
+        "covered": flight.covered.tolist(),
+        "covered_at": covered_at(flight).tolist(),
+        "fallbacks": [k for k, decision in enumerate(flight.decisions) if decision.fallback],
+        "plan": {"unit": PLAN_M, "steps": _plan(flight, source)},
+        "violations": outcome["violations"],
+        "summary": {
+            key: outcome[key] for key in ("coverage", "steps", "energy_Wh", "all_home", "breaches")
+        },
+    }
+
+
+def _series(values: NDArray[np.float64], unit: float, name: str, source: str) -> dict[str, Any]:
+    return {"unit": unit, "values": _whole(values, unit, name, source).ravel().tolist()}
+
+
+def _whole(values: NDArray[np.float64], unit: float, name: str, source: str) -> NDArray[np.int64]:
+    # far beyond what a scenario can hold, and well within what a browser counts exactly
+    if not (np.abs(values) < 1e9).all():
+        raise InputError(f"{source}: {name} holds a value that is not finite; fly it again")
+    return np.rint(values / unit).astype(np.int64)
+
+
+def _plan(flight: Flight, source: str) -> list[list[list[int]]]:
+    """[step][uas] -> x, y, z, x, y, z, ... of the predicted positions; a step without: []."""
+    plan = flight.plan
+    whole = _whole(plan["position_m"], PLAN_M, "plan.csv", source)
+    flown, uas = len(flight.x), len(flight.names)
+    if len(plan) and not (plan["step"].min() >= 0 and plan["step"].max() < flown):
+        raise InputError(f"{source}: plan.csv predicts at a time that was not flown")
+    steps: list[list[list[int]]] = [[] for _ in range(flown)]
+    order = np.lexsort((plan["n"], plan["uas"], plan["step"]))
+    of_step = plan["step"][order]
+    for rows in np.split(order, np.flatnonzero(np.diff(of_step)) + 1) if len(plan) else ():
+        k = plan["step"][rows[0]]
+        steps[k] = [whole[rows[plan["uas"][rows] == i]].ravel().tolist() for i in range(uas)]
+    return steps

@@ -1,0 +1,216 @@
+// One small chart over time: lines that are told apart by dashes and numbers as well as colour,
+// and a cursor at the time of the page.
+
+import { stroke } from "./marks";
+import { bright, colour } from "./palette";
+import { roundStep } from "./round_step";
+
+export interface Line {
+  label: string;
+  colour: string;
+  /** One value per sample from t = 0. */
+  values: number[];
+  dash: number[];
+}
+
+export interface ChartContent {
+  title: string;
+  lines: Line[];
+  dt: number;
+  /** Format of a value at the cursor. */
+  show: (value: number) => string;
+  /** The range to be shown at least. */
+  from?: number;
+  to?: number;
+  /** A level to be seen: [value, words]. */
+  levels?: [number, string][];
+  /** Samples to be marked on the first line. */
+  marked?: number[];
+  steps?: boolean;
+}
+
+export const LEFT = 40;
+export const RIGHT = 18;
+const TOP = 22;
+const BOTTOM = 5;
+
+export const DASHES = [[], [6, 3], [2, 3], [9, 3, 2, 3]];
+
+/** A canvas over time with a cursor; clicks and drags on it set the time. */
+export abstract class TimeCanvas {
+  readonly canvas = document.createElement("canvas");
+  protected readonly pen = this.canvas.getContext("2d")!;
+  private readonly still = document.createElement("canvas");
+  protected width = 0;
+  protected height = 0;
+
+  constructor(title: string, private readonly duration: number, seek: (time: number) => void) {
+    this.canvas.className = "chart";
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", title);
+    const seekTo = (event: PointerEvent) => {
+      const across = (event.offsetX - LEFT) / (this.width - LEFT - RIGHT);
+      seek(across * duration);
+    };
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      seekTo(event);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (this.canvas.hasPointerCapture(event.pointerId)) seekTo(event);
+    });
+  }
+
+  /** Draw what does not change with time. */
+  resize(): void {
+    this.width = this.canvas.clientWidth;
+    this.height = this.canvas.clientHeight;
+    const ratio = Math.min(devicePixelRatio, 2);
+    for (const canvas of [this.canvas, this.still]) {
+      canvas.width = Math.round(this.width * ratio);
+      canvas.height = Math.round(this.height * ratio);
+    }
+    this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.pen.clearRect(0, 0, this.width, this.height);
+    this.drawStill();
+    this.still.getContext("2d")!.drawImage(this.canvas, 0, 0);
+  }
+
+  draw(time: number): void {
+    if (this.width === 0 || this.height === 0) return;
+    this.pen.clearRect(0, 0, this.width, this.height);
+    this.pen.drawImage(this.still, 0, 0, this.width, this.height);
+    const x = this.x(time);
+    stroke(this.pen, x, TOP - 4, x, this.height - BOTTOM, 1.2, colour("--ink"));
+    this.drawAt(time);
+  }
+
+  protected abstract drawStill(): void;
+  protected abstract drawAt(time: number): void;
+
+  protected x(time: number): number {
+    return LEFT + (time / Math.max(this.duration, 1e-9)) * (this.width - LEFT - RIGHT);
+  }
+
+  protected write(
+    text: string,
+    x: number,
+    y: number,
+    ink: string,
+    align: CanvasTextAlign = "left",
+    weight = 400,
+  ): number {
+    const { pen } = this;
+    pen.font = `${weight} 11px system-ui, sans-serif`;
+    pen.textAlign = align;
+    pen.textBaseline = "middle";
+    pen.fillStyle = ink;
+    pen.fillText(text, x, y);
+    return pen.measureText(text).width;
+  }
+}
+
+export class Chart extends TimeCanvas {
+  private readonly low: number;
+  private readonly high: number;
+  private readonly step: number;
+
+  constructor(private readonly content: ChartContent, duration: number, seek: (t: number) => void) {
+    super(content.title, duration, seek);
+    const values = content.lines.flatMap((line) => line.values);
+    const low = values.reduce((a, b) => Math.min(a, b), content.from ?? Infinity);
+    const high = values.reduce((a, b) => Math.max(a, b), content.to ?? -Infinity);
+    const range = Number.isFinite(high - low) && high > low ? high - low : 1;
+    this.step = roundStep(range / 1.6);
+    this.low = Number.isFinite(low) ? low : 0;
+    this.high = this.low + range;
+  }
+
+  protected drawStill(): void {
+    const { pen, content } = this;
+    const [left, right] = [LEFT, this.width - RIGHT];
+    this.write(content.title, 2, 9, colour("--ink"), "left", 600);
+    pen.setLineDash([]);
+    const first = Math.ceil(this.low / this.step - 1e-6);
+    for (let n = first; n * this.step <= this.high * (1 + 1e-6); n++) {
+      const y = this.y(n * this.step);
+      stroke(pen, left, y, right, y, 1, colour("--grid"));
+      const digits = Math.max(0, -Math.floor(Math.log10(this.step) + 1e-9));
+      this.write((n * this.step).toFixed(digits), left - 5, y, colour("--faint"), "right");
+    }
+    for (const [level, words] of content.levels ?? []) {
+      const y = this.y(level);
+      pen.setLineDash([3, 3]);
+      stroke(pen, left, y, right, y, 1, colour("--discharged"));
+      pen.setLineDash([]);
+      this.write(words, left + 4, y + 7, colour("--faint"));
+    }
+    for (const line of content.lines) this.line(line);
+    this.names();
+    const marked = content.lines[0]?.values ?? [];
+    for (const k of content.marked ?? []) {
+      pen.fillStyle = colour("--discharged");
+      pen.fillRect(this.x(k * content.dt) - 2, this.y(marked[k] ?? 0) - 2, 4, 4);
+    }
+  }
+
+  protected drawAt(time: number): void {
+    const { pen, content } = this;
+    let right = this.width - RIGHT;
+    for (const line of [...content.lines].reverse()) {
+      const k = Math.min(line.values.length - 1, Math.floor(time / content.dt + 1e-6));
+      if (k < 0) continue;
+      const ink = bright(line.colour);
+      pen.fillStyle = ink;
+      pen.beginPath();
+      pen.arc(this.x(k * content.dt), this.y(line.values[k]), 3, 0, 2 * Math.PI);
+      pen.fill();
+      // in a large swarm only as many values as there is room for
+      if (right > 150) right -= this.write(content.show(line.values[k]), right, 9, ink, "right", 600) + 10;
+    }
+  }
+
+  private line(line: Line): void {
+    const { pen, content } = this;
+    pen.strokeStyle = bright(line.colour);
+    pen.lineWidth = 1.6;
+    pen.lineJoin = "round";
+    pen.setLineDash(line.dash);
+    pen.beginPath();
+    line.values.forEach((value, k) => {
+      const x = this.x(k * content.dt);
+      if (content.steps && k > 0) pen.lineTo(x, this.y(line.values[k - 1]));
+      pen.lineTo(x, this.y(value));
+    });
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  /** The number of each line where it ends, moved apart where two end together. */
+  private names(): void {
+    const { content } = this;
+    if (content.lines.length < 2) return;
+    const ends = content.lines
+      .filter((line) => line.values.length > 0)
+      .map((line) => ({
+        line,
+        x: this.x((line.values.length - 1) * content.dt) + 3,
+        y: this.y(line.values.at(-1)!),
+      }))
+      .sort((a, b) => a.y - b.y);
+    ends.forEach((end, i) => {
+      if (i > 0) end.y = Math.max(end.y, ends[i - 1].y + 11);
+    });
+    let room = this.height - BOTTOM - 4;
+    for (const { line, x, y } of ends.reverse()) {
+      const apart = Math.min(y, room);
+      room = apart - 11;
+      this.write(line.label, x, apart, bright(line.colour), "left", 600);
+    }
+  }
+
+  private y(value: number): number {
+    const bottom = this.height - BOTTOM - 4;
+    return bottom - ((value - this.low) / (this.high - this.low)) * (bottom - TOP - 2);
+  }
+}

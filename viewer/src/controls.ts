@@ -1,0 +1,204 @@
+// The bar at the foot of the page: play, time, speed, and how the flight is looked at; and keys.
+
+import { type Clock, SPEEDS } from "./clock";
+import { element } from "./dom";
+import type { Flight } from "./flight";
+
+export interface ViewChoice {
+  threeD: boolean;
+  followed: number | null;
+}
+
+export interface ControlEvents {
+  show(threeD: boolean): void;
+  follow(uas: number | null): void;
+  overview(): void;
+  top(): void;
+}
+
+const KEYS: [string, string][] = [
+  ["Space", "play, pause"],
+  ["← →", "one step back, on (with Shift ten)"],
+  ["Home End", "start, end"],
+  ["+ −", "faster, slower"],
+  ["1 … 9", "follow a UAS"],
+  ["O", "whole area"],
+  ["T", "from above"],
+  ["M", "map or 3D"],
+  ["?", "this list"],
+];
+
+export class Controls {
+  readonly element: HTMLElement;
+  private readonly play = button("", "Play or pause (space)");
+  private readonly slider = element("input", {
+    type: "range",
+    min: "0",
+    step: "any",
+    "aria-label": "Time",
+  });
+  private readonly clockText = element("output", { class: "time" });
+  private readonly speed = element("select", { "aria-label": "Speed", title: "Speed (+ −)" });
+  private readonly kind = button("", "Map or 3D (M)");
+  private readonly top: HTMLButtonElement;
+  private readonly followed = element("select", { "aria-label": "Follow", title: "Follow (1 … 9)" });
+  private readonly help = helpDialog();
+
+  constructor(
+    private readonly clock: Clock,
+    flights: Flight[],
+    private readonly choice: ViewChoice,
+    private readonly has3d: boolean,
+    private readonly events: ControlEvents,
+  ) {
+    this.slider.max = String(clock.duration);
+    this.speed.append(...SPEEDS.map((n) => element("option", { value: String(n) }, `${n}×`)));
+    const names = flights.reduce((a, b) => (a.uas >= b.uas ? a : b)).scene.uas;
+    this.followed.append(
+      element("option", { value: "" }, "Follow"),
+      ...names.map(({ name }, i) => element("option", { value: String(i) }, `Follow ${name}`)),
+    );
+    const overview = button("Overview", "Whole area (O)");
+    this.top = button("Top", "From above (T)");
+    const question = button("?", "Keys (?)");
+    question.className = "keys";
+    this.element = element(
+      "footer",
+      { class: "controls" },
+      element("div", { class: "row" }, this.play, this.track(flights), this.clockText, this.speed),
+      element("div", { class: "row views" }, this.kind, overview, this.top, this.followed, question),
+      this.help,
+    );
+    this.kind.hidden = !has3d;
+    this.play.addEventListener("click", () => clock.toggle());
+    this.slider.addEventListener("input", () => {
+      clock.playing = false;
+      clock.seek(Number(this.slider.value));
+    });
+    this.speed.addEventListener("change", () => {
+      clock.speed = Number(this.speed.value);
+      this.draw();
+    });
+    this.followed.addEventListener("change", () => {
+      const { value } = this.followed;
+      events.follow(value === "" ? null : Number(value));
+    });
+    this.kind.addEventListener("click", () => events.show(!choice.threeD));
+    overview.addEventListener("click", () => events.overview());
+    this.top.addEventListener("click", () => events.top());
+    question.addEventListener("click", () => this.toggleHelp());
+    // a button that was clicked must not catch the next space
+    this.element.addEventListener("click", (event) => {
+      const target = event.target as HTMLElement;
+      if (event.detail > 0 && target instanceof HTMLButtonElement) target.blur();
+    });
+    addEventListener("keydown", (event) => this.key(event));
+  }
+
+  draw(): void {
+    const { clock } = this;
+    this.play.textContent = clock.playing ? "❚❚" : "▶";
+    this.play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    this.slider.value = String(clock.time);
+    const time = `${clock.time.toFixed(1)} s`;
+    this.slider.setAttribute("aria-valuetext", time);
+    this.slider.style.setProperty("--done", `${(100 * clock.time) / (clock.duration || 1)}%`);
+    this.clockText.value = `${time} / ${clock.duration.toFixed(0)} s`;
+    this.speed.value = String(clock.speed);
+    this.top.hidden = !this.choice.threeD;
+    this.kind.textContent = this.choice.threeD ? "Map" : "3D";
+    this.followed.value = this.choice.followed === null ? "" : String(this.choice.followed);
+  }
+
+  /** The slider, with a mark where a violation happened. */
+  private track(flights: Flight[]): HTMLElement {
+    const track = element("div", { class: "track" }, this.slider);
+    for (const { t_s } of flights.flatMap((flight) => flight.data.violations)) {
+      const mark = element("i", { class: "violation" });
+      mark.style.left = `${(100 * t_s) / (this.clock.duration || 1)}%`;
+      track.append(mark);
+    }
+    return track;
+  }
+
+  private toggleHelp(): void {
+    if (this.help.open) this.help.close();
+    else this.help.showModal();
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const target = event.target as HTMLElement;
+    // lists and buttons have keys of their own
+    if (target instanceof HTMLSelectElement) return;
+    if (target instanceof HTMLButtonElement && [" ", "Enter"].includes(event.key)) return;
+    if (this.help.open && event.key !== "?") return;
+    const action = this.action(event);
+    if (!action) return;
+    event.preventDefault();
+    action();
+  }
+
+  private action(event: KeyboardEvent): (() => void) | undefined {
+    const { clock, events, choice } = this;
+    const move = (samples: number) => () => this.step(event.shiftKey ? 10 * samples : samples);
+    if (/^[1-9]$/.test(event.key)) {
+      const uas = Number(event.key) - 1;
+      const known = uas < this.followed.options.length - 1;
+      return known ? () => events.follow(choice.followed === uas ? null : uas) : undefined;
+    }
+    const actions: Record<string, () => void> = {
+      " ": () => clock.toggle(),
+      ArrowRight: move(1),
+      ArrowLeft: move(-1),
+      Home: () => clock.seek(0),
+      End: () => clock.seek(clock.duration),
+      "+": () => clock.faster(1),
+      "=": () => clock.faster(1),
+      "-": () => clock.faster(-1),
+      o: () => events.overview(),
+      t: () => events.top(),
+      m: () => this.has3d && events.show(!choice.threeD),
+      "?": () => this.toggleHelp(),
+    };
+    return actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  }
+
+  /** To the next whole samples before or after. */
+  private step(samples: number): void {
+    const { clock } = this;
+    clock.playing = false;
+    const at = clock.time / this.sampleTime;
+    const from = samples > 0 ? Math.floor(at + 1e-6) : Math.ceil(at - 1e-6);
+    clock.seek((from + samples) * this.sampleTime);
+  }
+
+  /** Time between samples [s]; the shorter one of two flights. */
+  sampleTime = 1;
+}
+
+function button(text: string, title: string): HTMLButtonElement {
+  return element("button", { type: "button", title }, text);
+}
+
+function helpDialog(): HTMLDialogElement {
+  const rows = KEYS.flatMap(([key, does]) => [
+    element("dt", {}, element("kbd", {}, key)),
+    element("dd", {}, does),
+  ]);
+  const close = element("form", { method: "dialog" }, element("button", {}, "Close"));
+  return element(
+    "dialog",
+    { "aria-label": "Keys" },
+    element("dl", {}, ...rows),
+    element(
+      "p",
+      {},
+      "A ring is a waypoint, a double ring one that counts more; it is filled and ticked once " +
+        "covered. The ring around a UAS is as long as its charge, green, yellow, red. Dots are " +
+        "where the planner means to fly.",
+    ),
+    element("p", {}, "Drag to turn, wheel or two fingers to come closer, right button to move."),
+    close,
+  );
+}

@@ -1,0 +1,179 @@
+// A flight as the page holds it (uas_coverage_env/replay/flight_data.py writes it), and what is
+// to be seen at a moment of it. Frame: NED in metres; angles in radians.
+
+export type Point2 = [number, number];
+export type Point3 = [number, number, number];
+
+export interface Series {
+  unit: number;
+  values: number[];
+}
+
+export interface Body {
+  corners: Point3[];
+  triangles: Point3[];
+  outline: Point2[];
+}
+
+export interface Obstacle extends Body {
+  name: string;
+  kind: string;
+  colour: string;
+}
+
+export interface Scene {
+  name: string;
+  fence: Body;
+  obstacles: Obstacle[];
+  decorations: { kind: string; colour: string; outline: Point2[] }[];
+  waypoints: { at: Point3; radius: number; heavy: boolean }[];
+  moving: { name: string; kind: string; radius: number; height: number; safe: number }[];
+  uas: { name: string; colour: string; start: Point3; lowest_soc: number }[];
+}
+
+export interface Violation {
+  t_s: number;
+  uas: string;
+  kind: string;
+  with: string | null;
+}
+
+export interface FlightData {
+  planner: string;
+  seed: number;
+  dynamics: string;
+  dt_s: number;
+  samples: number;
+  scene: Scene;
+  position: Series;
+  attitude: Series;
+  soc: Series;
+  voltage: Series;
+  current: Series;
+  moving: Series;
+  duration: Series;
+  modes: string[];
+  mode: number[];
+  last: number[];
+  covered: number[];
+  covered_at: number[];
+  fallbacks: number[];
+  plan: { unit: number; steps: number[][][] };
+  violations: Violation[];
+  summary: {
+    coverage: number;
+    steps: number;
+    energy_Wh: number;
+    all_home: boolean;
+    breaches: number;
+  };
+}
+
+export interface VehicleMoment {
+  position: Point3;
+  attitude: Point3;
+  soc: number;
+  speed: number;
+  mode: string;
+}
+
+export interface Moment {
+  time: number;
+  /** The last whole sample. */
+  sample: number;
+  vehicles: VehicleMoment[];
+  moving: Point3[];
+  covered: number;
+}
+
+export class Flight {
+  readonly scene: Scene;
+  readonly uas: number;
+  readonly duration: number;
+
+  constructor(readonly data: FlightData) {
+    this.scene = data.scene;
+    this.uas = data.scene.uas.length;
+    this.duration = (data.samples - 1) * data.dt_s;
+  }
+
+  /** What is to be seen at a time; between samples, positions are on straight lines. */
+  moment(time: number): Moment {
+    const last = this.data.samples - 1;
+    const exact = Math.min(Math.max(time / this.data.dt_s, 0), last);
+    // a time that was computed from a sample may fall short of it by a rounding error
+    const sample = Math.min(last, Math.floor(exact + 1e-6));
+    const part = Math.min(1, Math.max(0, exact - sample));
+    return {
+      time: exact * this.data.dt_s,
+      sample,
+      vehicles: this.scene.uas.map((_, i) => this.vehicle(sample, part, i)),
+      moving: this.scene.moving.map((_, i) =>
+        this.between(this.data.moving, sample, part, i, this.scene.moving.length),
+      ),
+      covered: this.data.covered[sample],
+    };
+  }
+
+  position(sample: number, i: number): Point3 {
+    return point(this.data.position, sample * this.uas + i);
+  }
+
+  /** One UAS's series until it landed or was lost. */
+  column(series: Series, i: number): number[] {
+    const values = [];
+    for (let k = 0; k <= this.data.last[i]; k++) {
+      values.push(series.values[k * this.uas + i] * series.unit);
+    }
+    return values;
+  }
+
+  mode(sample: number, i: number): string {
+    return this.data.modes[this.data.mode[sample * this.uas + i]];
+  }
+
+  /** Positions that the planner predicted at a sample, x, y, z, x, y, z, ...; often none. */
+  predicted(sample: number, i: number): number[] {
+    const { unit, steps } = this.data.plan;
+    return (steps[sample]?.[i] ?? []).map((value) => value * unit);
+  }
+
+  where(violation: Violation): Point3 {
+    const i = this.scene.uas.findIndex((uas) => uas.name === violation.uas);
+    const sample = Math.min(Math.round(violation.t_s / this.data.dt_s), this.data.samples - 1);
+    return this.position(sample, Math.max(0, i));
+  }
+
+  private vehicle(sample: number, part: number, i: number): VehicleMoment {
+    const { attitude, soc, dt_s, samples } = this.data;
+    const next = Math.min(sample + 1, samples - 1);
+    const from = this.position(sample, i);
+    const to = this.position(next, i);
+    const [before, after] = [sample, next].map((k) => soc.values[k * this.uas + i] * soc.unit);
+    return {
+      position: mix(from, to, part),
+      attitude: this.between(attitude, sample, part, i, this.uas),
+      soc: before + part * (after - before),
+      speed: Math.hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]) / dt_s,
+      mode: this.mode(sample, i),
+    };
+  }
+
+  private between(series: Series, sample: number, part: number, i: number, width: number): Point3 {
+    const next = Math.min(sample + 1, this.data.samples - 1);
+    return mix(point(series, sample * width + i), point(series, next * width + i), part);
+  }
+}
+
+function point(series: Series, row: number): Point3 {
+  const { values, unit } = series;
+  return [values[3 * row] * unit, values[3 * row + 1] * unit, values[3 * row + 2] * unit];
+}
+
+function mix(a: Point3, b: Point3, part: number): Point3 {
+  return [
+    a[0] + part * (b[0] - a[0]),
+    a[1] + part * (b[1] - a[1]),
+    a[2] + part * (b[2] - a[2]),
+  ];
+}

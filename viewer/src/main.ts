@@ -1,0 +1,98 @@
+// The page: reads the flights it was given, and draws them when something has changed.
+
+import { Clock } from "./clock";
+import { Controls, type ViewChoice } from "./controls";
+import { element } from "./dom";
+import { Flight, type FlightData } from "./flight";
+import { onThemeChange } from "./palette";
+import { Panel } from "./panel";
+
+const data: FlightData[] = JSON.parse(document.getElementById("flights")!.textContent!);
+const flights = data.map((each) => new Flight(each));
+const duration = Math.max(...flights.map((flight) => flight.duration));
+
+let dirty = true;
+const invalidate = () => (dirty = true);
+const clock = new Clock(duration, invalidate);
+const choice: ViewChoice = { threeD: true, followed: null };
+
+const panels = flights.map(
+  (flight) =>
+    new Panel(flight, flights, duration, {
+      seek: (time) => {
+        clock.playing = false;
+        clock.seek(time);
+      },
+      follow: (uas) => follow(choice.followed === uas ? null : uas),
+      invalidate,
+      moved: (from, pose) => panels.forEach((panel) => panel !== from && panel.take(pose)),
+      lost: () => show(false),
+    }),
+);
+const has3d = panels.every((panel) => panel.has3d);
+const controls = new Controls(clock, flights, choice, has3d, {
+  show,
+  follow,
+  overview: () => frame("overview"),
+  top: () => frame("top"),
+});
+controls.sampleTime = Math.min(...data.map((each) => each.dt_s));
+
+const main = element("main", { class: panels.length === 2 ? "two" : "one" });
+main.append(...panels.map((panel) => panel.element));
+document.body.append(main, controls.element);
+
+function show(threeD: boolean): void {
+  choice.threeD = threeD && has3d;
+  for (const panel of panels) panel.show(choice.threeD);
+  resize();
+}
+
+function follow(uas: number | null): void {
+  const ended = uas === null && choice.followed !== null;
+  choice.followed = uas;
+  if (ended) for (const panel of panels) panel.overview();
+  invalidate();
+}
+
+function frame(how: "overview" | "top"): void {
+  choice.followed = null;
+  for (const panel of panels) panel[how]();
+  invalidate();
+}
+
+function resize(): void {
+  for (const panel of panels) panel.resize();
+  invalidate();
+}
+
+// "#t=60&follow=2&view=map": a moment to link to
+function readAddress(): void {
+  const wanted = new URLSearchParams(location.hash.slice(1));
+  const number = (name: string) => Number(wanted.get(name) ?? NaN);
+  if (number("t") >= 0) clock.seek(number("t"));
+  if (number("follow") >= 1 && number("follow") <= flights[0].uas) {
+    choice.followed = number("follow") - 1;
+  }
+  show(wanted.get("view") !== "map");
+}
+
+function loop(now: number): void {
+  if (clock.playing) clock.tick(now);
+  if (dirty) {
+    dirty = false;
+    for (const panel of panels) panel.draw(clock.time, choice.followed);
+    controls.draw();
+  }
+  requestAnimationFrame(loop);
+}
+
+const observer = new ResizeObserver(resize);
+for (const panel of panels) observer.observe(panel.element);
+onThemeChange(() => {
+  for (const panel of panels) panel.repaint();
+  invalidate();
+});
+addEventListener("hashchange", readAddress);
+readAddress();
+requestAnimationFrame(loop);

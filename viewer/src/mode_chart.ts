@@ -1,0 +1,70 @@
+// What each UAS was doing when: a band per UAS, with words where there is room for them.
+
+import { RIGHT, TimeCanvas } from "./chart";
+import type { Flight } from "./flight";
+import { shortName } from "./marks";
+import { bright, colour } from "./palette";
+
+const TOP = 20;
+
+/** [custom property of the style, colour of words on it] */
+const PAINT: Record<string, [string, string]> = {
+  covering: ["--covering", "#ffffff"],
+  transit: ["--transit", "#1b1b1b"],
+  return: ["--return", "#1b1b1b"],
+  landed: ["--landed", "#1b1b1b"],
+  lost: ["--discharged", "#ffffff"],
+};
+
+export class ModeChart extends TimeCanvas {
+  constructor(private readonly flight: Flight, duration: number, seek: (time: number) => void) {
+    super("Operation modes", duration, seek);
+    this.canvas.style.minHeight = `${TOP + 8 + flight.uas * 15}px`;
+  }
+
+  protected drawStill(): void {
+    this.write("Operation mode", 2, 9, colour("--ink"), "left", 600);
+    let right = this.width - RIGHT;
+    for (const mode of [...this.flight.data.modes].reverse()) {
+      if (!this.flight.data.mode.includes(this.flight.data.modes.indexOf(mode))) continue;
+      right -= this.write(mode, right, 9, colour("--faint"), "right") + 14;
+      this.pen.fillStyle = colour(PAINT[mode][0]);
+      this.pen.fillRect(right, 4, 10, 10);
+      right -= 10;
+    }
+    const height = Math.min(26, (this.height - TOP - 6) / this.flight.uas);
+    this.flight.scene.uas.forEach((uas, i) => {
+      const y = TOP + i * height;
+      const ink = bright(uas.colour);
+      this.write(shortName(uas.name), 35, y + height / 2, ink, "right", 600);
+      for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - 3);
+    });
+  }
+
+  protected drawAt(): void {}
+
+  private band(mode: string, from: number, to: number, y: number, height: number): void {
+    const { pen } = this;
+    const { dt_s } = this.flight.data;
+    const [x, end] = [this.x(from * dt_s), this.x(to * dt_s)];
+    const [paint, ink] = PAINT[mode] ?? ["--landed", "#1b1b1b"];
+    pen.fillStyle = colour(paint);
+    pen.fillRect(x, y, Math.max(1.5, end - x - 1), height);
+    pen.font = "400 11px system-ui, sans-serif";
+    if (pen.measureText(mode).width + 8 < end - x) this.write(mode, x + 4, y + height / 2, ink);
+  }
+
+  /** [mode, first sample, first sample of the next], in order of time. */
+  private runs(i: number): [string, number, number][] {
+    const runs: [string, number, number][] = [];
+    for (let k = 0; k < this.flight.data.samples; k++) {
+      const mode = this.flight.mode(k, i);
+      const last = runs.at(-1);
+      if (last?.[0] === mode) last[2] = k + 1;
+      else runs.push([mode, k, k + 1]);
+    }
+    // the last sample is a moment, not a second of flight
+    if (runs.length > 0) runs.at(-1)![2] = Math.max(runs.at(-1)![1], this.flight.data.samples - 1);
+    return runs;
+  }
+}

@@ -1,0 +1,52 @@
+// Colours: those of the page are custom properties of style.css, light and dark; those of things
+// on the map come with the flight and are fitted to the dark ground here.
+
+const DARK = matchMedia("(prefers-color-scheme: dark)");
+
+const known = new Map<string, string>();
+
+export function isDark(): boolean {
+  return DARK.matches;
+}
+
+export function onThemeChange(changed: () => void): void {
+  DARK.addEventListener("change", () => {
+    known.clear();
+    changed();
+  });
+}
+
+/** A custom property of the style, as "--ink". */
+export function colour(name: string): string {
+  let value = known.get(name);
+  if (value === undefined) {
+    value = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+    known.set(name, value);
+  }
+  return value;
+}
+
+/** The colour of a line or mark: lighter on the dark ground. */
+export function bright(hex: string): string {
+  return isDark() ? mixed(hex, 255, 0.3) : hex;
+}
+
+/** The colour of a large area: darker on the dark ground. */
+export function dim(hex: string): string {
+  return isDark() ? mixed(hex, 0, 0.3) : hex;
+}
+
+export function darker(hex: string, share: number): string {
+  return mixed(hex, 0, share);
+}
+
+/** Green, yellow or red for a charged, half-charged or discharged battery, as in the paper. */
+export function ofCharge(soc: number): string {
+  return colour(soc > 0.6 ? "--charged" : soc > 0.35 ? "--half" : "--discharged");
+}
+
+function mixed(hex: string, towards: number, share: number): string {
+  const parts = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+  const result = parts.map((part) => Math.round(part + share * (towards - part)));
+  return "#" + result.map((part) => part.toString(16).padStart(2, "0")).join("");
+}

@@ -1,0 +1,22 @@
+// A view draws one flight at a moment: the 3D scene, or the map where there is no WebGL.
+
+import type { Moment } from "./flight";
+
+/** Where a 3D camera looks from: its offset from what it looks at, and that point. */
+export interface Pose {
+  offset: [number, number, number];
+  target: [number, number, number];
+}
+
+export interface View {
+  readonly canvas: HTMLCanvasElement;
+  draw(moment: Moment): void;
+  /** The canvas has changed its size. */
+  resize(): void;
+  /** Light has become dark, or dark light. */
+  repaint(): void;
+  /** Keep a UAS in the middle; null: the whole area. */
+  follow(uas: number | null): void;
+  overview(): void;
+  top(): void;
+}
