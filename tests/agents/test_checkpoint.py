@@ -45,6 +45,7 @@ def test_what_was_put_aside_is_taken_up_again(tmp_path):
 
 def test_the_last_two_are_kept(tmp_path):
     for steps in range(1, 6):
+        (tmp_path / f".{steps:06}.safetensors.77").write_bytes(b"half written when it was killed")
         put_aside(tmp_path, steps)
     assert files(tmp_path) == [
         "000004.json",

@@ -166,15 +166,29 @@ def test_without_the_extra_one_line_names_it(monkeypatch, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_model_is_put_aside_and_taken_up_bit_for_bit():
-    order = Order("tiny", load_config(TINY), seed=0)
+SAC = ["scenarios.pool=1", "lanes=1", "learning.first_samples=10", "learning.buffer_size=1000"]
+
+
+@pytest.mark.parametrize("name", [TINY, "sac"])
+def test_a_model_that_is_taken_up_again_learns_on_bit_for_bit(name):
+    config = load_config(name, changes=["player.hidden=[8]", *(SAC if name == "sac" else ())])
+    order = Order("tiny", config, seed=0)
     first, second = Trainee.untrained(order), Trainee.untrained(order)
-    first.model.learn(64)
+    first.model.learn(256)
     arrays = frozen(first.model, first.lanes)
     thaw(arrays, second.model, second.lanes)
-    again = frozen(second.model, second.lanes)
-    assert set(again) == set(arrays)
-    assert all(np.array_equal(again[name], array) for name, array in arrays.items())
+    assert same(frozen(second.model, second.lanes), arrays)
+    first.model.learn(128, reset_num_timesteps=False)
+    # both draw from the same global generators: back to where they were
+    undisturbed = frozen(first.model, first.lanes)
+    thaw(arrays, second.model, second.lanes)
+    second.model.learn(128, reset_num_timesteps=False)
+    assert same(frozen(second.model, second.lanes), undisturbed)
+    assert not same(arrays, undisturbed)
+
+
+def same(some: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> bool:
+    return set(some) == set(others) and all(np.array_equal(some[k], others[k]) for k in some)
 
 
 def test_a_checkpoint_of_another_network_is_refused():

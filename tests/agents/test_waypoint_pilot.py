@@ -4,14 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from waypoint_missions import PRIOR, tensors, town, with_something_parked
-
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
 from uas_coverage_agents.waypoint.pilot import WaypointPilot, network, observation
 from uas_coverage_agents.waypoint.scorer import score, weights_of
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NOBODY, TIME
+from waypoint_missions import PRIOR, tensors, town, with_something_parked
+
 from uas_coverage_env import rollout
 from uas_coverage_env.flight import Assistants, coverage, energy_Wh, home
 from uas_coverage_env.world.pool import pool_arenas

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from waypoint_missions import town, with_something_parked
-
 from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import (
     CANDIDATE_HIGH,
@@ -27,6 +25,8 @@ from uas_coverage_agents.waypoint.team import (
     TIME,
     find_blocked,
 )
+from waypoint_missions import town, with_something_parked
+
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import build_arena, initial_state
 from uas_coverage_env.world.pool import pool_arenas
@@ -43,7 +43,7 @@ SCENARIOS = [
 class Teams:
     """Lanes that fly SCENARIOS, one each."""
 
-    def __init__(self, order=range(len(SCENARIOS)), covered=0.0, seed=0):
+    def __init__(self, order=(0, 1, 2, 3, 4), covered=0.0, seed=0):
         scenarios = [SCENARIOS[s] for s in order]
         self.arenas, self.legs = pool_arenas(scenarios), pool_legs(scenarios)
         n = len(scenarios)

@@ -1,9 +1,9 @@
 """Small missions for the waypoint policies, and an untrained network to fly them."""
 
 import numpy as np
-
 from uas_coverage_agents.policy.pointer import HOME_AT_FIRST
 from uas_coverage_agents.waypoint.pilot import network
+
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.scenario import MovingObstacle, ScheduledVelocity
 

@@ -168,6 +168,24 @@ def test_a_flight_that_is_stopped_by_hand_is_not_kept(yard, capsys, with_planner
     assert flights().height == 4
 
 
+def test_a_process_that_dies_loses_no_finished_flight(yard, capsys, monkeypatch):
+    def one_then_death(**_):
+        def fly(tasks):
+            task, arguments, named = next(iter(tasks))
+            yield task(*arguments, **named)
+            raise workers.TerminatedWorkerError("signal 9")
+
+        return fly
+
+    with monkeypatch.context() as patch:
+        patch.setattr(workers, "Parallel", one_then_death)
+        assert compare(yard) == 1
+    assert "error: a process that flew was killed or crashed" in capsys.readouterr().err
+    assert flights().height == 1
+    assert compare(yard) == 0
+    assert flights().height == 4
+
+
 def test_a_policy_that_changes_under_way_fails(yard, with_planners):
     class Policy:
         fingerprint = "other weights"
@@ -195,6 +213,19 @@ def test_options_and_labels_reach_who_flies(yard):
     assert frame["trajectory_sha256"].n_unique() == 2
 
 
+def test_flights_that_another_sweep_has_in_common_are_taken_over(yard, two_yards, capsys):
+    assert compare(yard, planners="hover,random-walk", out="old") == 0
+    before = flights("old")
+    capsys.readouterr()
+    # more scenarios, other players: hover on the yard is in both
+    assert compare(two_yards, "--reuse", "old", "--reuse", "old") == 0
+    assert "2 of 8 flights are there" in capsys.readouterr().out
+    assert flights().filter(player="hover", scenario="yard").equals(before.filter(player="hover"))
+    assert flights("old").equals(before)
+    assert compare(yard, "--filter", "--reuse", "old", out="filtered") == 0
+    assert "4 flights to fly" in capsys.readouterr().out
+
+
 MISTAKES = {
     "no scenario": (["--scenarios", ","], "names none"),
     "unknown scenario": (["--scenarios", "villagge"], "villagge"),
@@ -213,6 +244,7 @@ MISTAKES = {
     "unknown reference": (["--reference", "tour"], "tour"),
     "unknown backend": (["--backend", "dask"], "dask"),
     "no jobs": (["--jobs", "0"], "jobs"),
+    "nothing to reuse": (["--reuse", "nowhere"], "holds no sweep"),
     "a file": (["--out", "taken.txt"], "is a file"),
 }
 

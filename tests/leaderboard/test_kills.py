@@ -7,7 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -81,23 +81,56 @@ def result(out: Path) -> polars.DataFrame:
     return frame.drop(*TIMES, "source_sha256")
 
 
+def children(process: int) -> set[int]:
+    """The processes that a process has begun; none where there is no /proc."""
+    return {int(path.parent.name) for path in _stats() if _stat(path)[1:2] == [str(process)]}
+
+
+def alive(processes: set[int]) -> set[int]:
+    """Which of them still run; a zombie does not."""
+    return {n for n in processes if _stat(Path(f"/proc/{n}/stat"))[:1] not in ([], ["Z"], ["X"])}
+
+
+def _stats() -> list[Path]:
+    return list(Path("/proc").glob("[0-9]*/stat"))
+
+
+def _stat(path: Path) -> list[str]:
+    """State, parent, ... of a process; empty where it is gone."""
+    try:
+        return path.read_text().rpartition(")")[2].split()
+    except OSError:
+        return []
+
+
+def soon(condition: Callable[[], bool]) -> bool:
+    """Wait until it is so, or until it has taken too long."""
+    until = time.monotonic() + DEADLINE_S
+    while not condition() and time.monotonic() < until:
+        time.sleep(0.001)
+    return condition()
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="os.fork is of POSIX systems")
 def test_ten_kills_at_random_moments_change_nothing(nursery, two_yards, tmp_path):
     total = 2 * len(PLANNERS.split(",")) * SEEDS
     lots = random.Random(0)
     killed, counts = tmp_path / "killed", [0]
-    # some in the middle of a flight, some right at the start; processes side by side in between
+    # right at the start, and in the middle; once with processes side by side
     targets = [0, 0, *sorted(lots.sample(range(total - 4), KILLS - 2))]
     for n, target in enumerate(targets):
-        child = started(nursery, two_yards, killed, jobs=2 if n == 5 else 1)
-        until = time.monotonic() + DEADLINE_S
-        while count(killed) < target and time.monotonic() < until:
-            time.sleep(0.001)
+        jobs = 2 if n == KILLS // 2 else 1
+        child = started(nursery, two_yards, killed, jobs)
+        least = target if jobs == 1 else max(target, counts[-1] + 1)
+        assert soon(lambda least=least: count(killed) >= least)
         time.sleep(lots.uniform(0.0, 0.03))
+        helpers = children(child)
+        assert jobs == 1 or helpers or not _stats()
         os.kill(child, signal.SIGKILL)
         assert ended(nursery) == -signal.SIGKILL, "it was over before it was killed"
+        assert soon(lambda helpers=helpers: not alive(helpers)), "they outlive their owner"
         counts.append(count(killed))
-        assert target <= counts[-1] < total
+        assert least <= counts[-1] < total
     assert counts == sorted(counts), "something was lost"
     assert not (killed / "table.md").exists()
 

@@ -161,8 +161,9 @@ def with_little_charge(scenario, seconds):
     return type(scenario).model_validate(data)
 
 
-@pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
-@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
+@pytest.mark.parametrize(
+    ("planner", "dynamics"), [("milp-mpc-guided", "lpv"), ("milp-mpc", "nonlinear")]
+)
 def test_where_the_solver_is_dead_for_good_everybody_comes_home(
     monkeypatch, tmp_path, town, planner, dynamics
 ):

@@ -126,7 +126,7 @@ def test_decision_times_are_drawn_with_fallbacks_and_the_limit(flight):
     series, shares = figure.axes
     durations = [decision.duration_s for decision in decisions]
     assert any(np.array_equal(line[:, 1], durations) for line in lines(series))
-    assert any(np.array_equal(line, [[7, 0.57], [9, 0.59]]) for line in lines(series))
+    assert any(line[:, 0].tolist() == [7, 9] for line in lines(series)), "the fallbacks"
     assert any((line[:, 1] == 1.0).all() for line in lines(series)), "the limit"
     assert series.get_ylabel() == "Decision time, s"
     assert "50 %: 0.795 s" in {text.get_text() for text in shares.texts}

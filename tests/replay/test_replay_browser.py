@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(
 
 DESKTOP, PHONE = (1400, 900), (390, 844)
 # fewer pixels to compute where the size does not matter
-SMALL = (860, 560)
+SMALL = (1020, 560)
 HOSTILE = '</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 1">'
 
 
@@ -187,12 +187,16 @@ def test_keys_step_play_and_change_the_view(browser, page, flight):
     pressed(browser, Keys.HOME)
     assert time_s(browser) == 0.0
 
+    speed = browser.find_element(By.CSS_SELECTOR, "select[aria-label=Speed]")
     pressed(browser, "+")
-    assert browser.find_element(By.CSS_SELECTOR, "select[aria-label=Speed]").text  # it is there
+    assert speed.get_property("value") == "20"
+    pressed(browser, "----")
+    assert speed.get_property("value") == "1"
     pressed(browser, Keys.SPACE)
-    WebDriverWait(browser, 20).until(lambda _: time_s(browser) > 1)
+    WebDriverWait(browser, 20).until(lambda _: time_s(browser) > 0.5)
     pressed(browser, Keys.SPACE)
     stopped = time_s(browser)
+    assert stopped < flight.steps
     settled(browser)
     assert time_s(browser) == stopped
 
@@ -276,6 +280,18 @@ def test_two_flights_are_played_side_by_side(browser, flight, plain, tmp_path):
     ActionChains(browser).drag_and_drop_by_offset(stage, 120, 30).perform()
     settled(browser)
     assert (pixels(browser, ".flight:last-child .stage") != before).any(axis=2).mean() > 0.3
+    assert complaints(browser) == []
+
+
+def test_a_flight_of_one_sample_can_be_looked_at(browser, plain, tmp_path):
+    """What is left where a person stops a flight before its first step."""
+    series = ("x", "u", "voltage_V", "current_A", "mode", "covered", "moving_position_m")
+    start = {name: getattr(plain, name)[:1] for name in series}
+    nothing = dataclasses.replace(plain, **start, decisions=())
+    opened(browser, write_replay([nothing], tmp_path / "replay.html"))
+    pressed(browser, Keys.END, Keys.ARROW_RIGHT, Keys.SPACE)
+    assert time_s(browser) == 0.0
+    assert cards(browser)[0].startswith("uas_1\ncovering\n100.0 %")
     assert complaints(browser) == []
 
 

@@ -1,5 +1,6 @@
 """`uas-coverage replay` and `figure`, in this process: what they write, and what they refuse."""
 
+import re
 import sys
 
 import pytest
@@ -12,6 +13,14 @@ def directory(flight, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
     return flight.save(tmp_path / "flown")
+
+
+def without_line(n):
+    def change(text):
+        lines = text.splitlines(keepends=True)
+        return "".join(lines[:n] + lines[n + 1 :])
+
+    return change
 
 
 def refused(capsys, *command: str) -> str:
@@ -86,10 +95,22 @@ def test_a_mistake_is_answered_by_one_line(arguments, word, directory, capsys):
     [
         ("flight.csv", lambda text: text.replace("covering", "dancing", 1), "flight.csv"),
         ("flight.csv", lambda text: text[: len(text) // 2], "flight.csv"),
-        ("flight.csv", lambda text: text.replace(",1.0,", ",nan,", 1), "not finite"),
+        ("flight.csv", lambda text: text.replace(",-1.0,", ",nan,", 1), "not finite"),
+        ("flight.csv", lambda text: text.replace("covering", "x" * 200_000, 1), "flight.csv"),
+        ("run.json", lambda text: "[" * 100_000, "run.json"),
         ("plan.csv", lambda text: text.replace("uas_1", "uas_9", 1), "plan.csv"),
         ("plan.csv", lambda text: text + "9999.0,uas_1,0,0.0,0.0,0.0\n", "plan.csv"),
+        ("plan.csv", lambda text: text.replace("0.0,uas_1", "-3.0,uas_1", 1), "plan.csv"),
+        ("flight.csv", lambda text: text.replace("\n60.0,", "\n1e9,"), "flight.csv"),
+        ("flight.csv", without_line(12), "sample 5 of uas_2 is missing"),
         ("run.json", lambda text: text[:-20], "run.json"),
+        ("run.json", lambda text: text.replace('_s": ', '_s": "soon", "x": ', 1), "run.json"),
+        ("run.json", lambda text: re.sub('_s": [^,]+', '_s": NaN', text, count=1), "run.json"),
+        ("run.json", lambda text: re.sub(r"\{[^{}]*\},", "", text, count=1), "59 decisions"),
+        ("summary.json", lambda text: text.replace('"t_s": 30.0', '"t_s": -3'), "summary.json"),
+        ("summary.json", lambda text: text.replace('"t_s": 30.0', '"t_s": []'), "summary.json"),
+        ("summary.json", lambda text: text.replace('"uas": "uas_1"', '"uas": "x"'), "no UAS"),
+        ("summary.json", lambda text: text.replace('"seed": 0', '"seed": "x"'), "summary.json"),
         ("summary.json", lambda text: "[]", "summary.json"),
         ("scenario.json", lambda text: text.replace('"village"', '"</script>"', 1), "name"),
     ],

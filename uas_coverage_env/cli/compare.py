@@ -15,6 +15,7 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
 from uas_coverage_env.leaderboard import (
+    FLOWN,
     Backend,
     Comparison,
     Entry,
@@ -24,6 +25,7 @@ from uas_coverage_env.leaderboard import (
     Sweep,
     WorkerLostError,
     failures,
+    flights_in,
     fly_all,
     jobs_of,
     opened,
@@ -87,6 +89,10 @@ def compare(
             min=1, help="Flights side by side; as many as there are cores.", show_default=False
         ),
     ] = None,
+    reuse: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="DIR", help="Take the flights that another sweep has in common."),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Forget the flights that --out holds.")
     ] = False,
@@ -118,8 +124,10 @@ def compare(
         *("--out", str(out)),
     )
     screen = console()
+    entries = list(sweep.entries())
+    others = [row for directory in reuse or () for row in flights_in(directory)]
     with opened(out, sweep.description(), overwrite=overwrite) as store:
-        entries = list(sweep.entries())
+        _take(others, entries, store)
         _warn(sweep)
         source = source_of(sweep.players.values())
         trouble = _fly(entries, store, screen, side_by_side, backend, source)
@@ -131,7 +139,7 @@ def compare(
     comparison = Comparison.of(rows, len(entries), reference, command, how)
     names = write(comparison, out)
     _report(screen, comparison, out, names)
-    failed = [row for row in rows if row.status != "flown"]
+    failed = [row for row in rows if row.status != FLOWN]
     for line in [*failures(failed), *([trouble] if trouble else [])]:
         sys.stderr.write(f"error: {one_line(line)}\n")
     raise typer.Exit(FAILED if failed or trouble else DONE)
@@ -143,6 +151,15 @@ def _reference(asked: str | None, labels: Sequence[str]) -> str:
     if asked not in labels:
         raise InputError(f"--reference {asked!r}: is none of --planners {','.join(labels)}")
     return asked
+
+
+def _take(rows: Sequence[Row], entries: Sequence[Entry], store: Store) -> None:
+    """Keep the flights of other sweeps that belong to this one, too."""
+    lacking = {entry.key for entry in entries} - store.keys()
+    for row in rows:
+        if row.key in lacking and row.status == FLOWN:
+            store.add(row)
+            lacking.remove(row.key)
 
 
 def _fly(

@@ -86,7 +86,8 @@ class CoverageBatch:
         threads: int = 1,
     ) -> None:
         _check_count("num_envs", num_lanes, _MOST_LANES)
-        _check_count("threads", threads, numba.config.NUMBA_NUM_THREADS)
+        if threads != 1:
+            _check_count("threads", threads, numba.get_num_threads())
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
         for name, switch in (("return_mode", return_mode), ("safety_filter", safety_filter)):
@@ -102,7 +103,7 @@ class CoverageBatch:
         self.filters = bool(safety_filter)
         self.autoreset = AUTORESET[autoreset]
         self.worlds = lanes_of(self.num_lanes, self.pool.arenas)
-        self.lanes = _empty_lanes(self.pool, self.num_lanes)
+        self.lanes = _empty_lanes(self.pool, self.num_lanes, int(threads))
         self._settings = (
             self.actions.kind,
             weights_of(reward_weights),
@@ -355,7 +356,7 @@ def masks_of(candidates: NDArray[np.int64]) -> NDArray[np.bool_]:
     return masks
 
 
-def _empty_lanes(pool: ScenarioPool, n: int) -> Lanes:
+def _empty_lanes(pool: ScenarioPool, n: int, threads: int) -> Lanes:
     n_uas, n_waypoints = int(pool.n_uas.max()), int(pool.n_waypoints.max())
     return Lanes(
         seed=np.random.default_rng().integers(_SEEDS, size=n, dtype=np.uint64),
@@ -366,8 +367,8 @@ def _empty_lanes(pool: ScenarioPool, n: int) -> Lanes:
         targets=np.zeros((n, n_uas), dtype=np.int64),
         candidates=np.zeros((n, n_uas, K_WAYPOINTS), dtype=np.int64),
         company=np.zeros((n, n_waypoints, 2)),
-        commands=np.zeros((n, n_uas), dtype=COMMAND_DTYPE),
-        outcome=np.zeros((n, n_uas), dtype=OUTCOME_DTYPE),
+        commands=np.zeros((threads, n_uas), dtype=COMMAND_DTYPE),
+        outcome=np.zeros((threads, n_uas), dtype=OUTCOME_DTYPE),
         report=np.zeros((n, n_uas, REPORT_SIZE)),
         rewards=np.zeros((n, n_uas)),
         swarm=np.zeros((n, SWARM_SIZE)),

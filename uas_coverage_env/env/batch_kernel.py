@@ -1,9 +1,11 @@
 """One step of many missions, compiled: every lane is flown by `step_learners`, as a single one."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
+from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import first_not_finite
@@ -37,10 +39,11 @@ ABSENT = -1
 
 N_TERMS = len(REWARD_TERMS)
 
-SWARM_COVERED = ENERGY + 1
-"""Column of the swarm's sums: waypoints covered. Before it the reward terms and ENERGY."""
+SWARM_COVERED, SWARM_REWARD = ENERGY + 1, ENERGY + 2
+"""Columns of a swarm's report behind the sums of the reward terms and of ENERGY: waypoints covered,
+and the sum of all terms."""
 
-SWARM_SIZE = SWARM_COVERED + 1
+SWARM_SIZE = SWARM_REWARD + 1
 
 
 class Lanes(NamedTuple):
@@ -61,21 +64,22 @@ class Lanes(NamedTuple):
     asked: NDArray[np.float64]
     """(L, U, size) actions."""
     targets: NDArray[np.int64]
-    """(L, U) see `step_learners`, also the next four."""
+    """(L, U) see `step_learners`, also the next two."""
     candidates: NDArray[np.int64]
     """(L, U, K_WAYPOINTS)."""
     company: NDArray[np.float64]
     """(L, W, 2)."""
     commands: NDArray[np.void]
-    """(L, U)."""
+    """(threads, U) of the lane that a thread flew last: all lanes share them, so they stay in its
+    cache."""
     outcome: NDArray[np.void]
-    """(L, U)."""
+    """(threads, U), likewise."""
     report: NDArray[np.float64]
     """(L, U, REPORT_SIZE)."""
     rewards: NDArray[np.float64]
     """(L, U) of each UAS for the latest step."""
     swarm: NDArray[np.float64]
-    """(L, SWARM_SIZE) sums of the report over the UAS."""
+    """(L, SWARM_SIZE) sums over the UAS, see SWARM_COVERED."""
     terminated: NDArray[np.bool_]
     """(L,) no UAS flies any more."""
     truncated: NDArray[np.bool_]
@@ -155,17 +159,28 @@ def _settle(worlds, lanes, lane, n_uas, max_steps):
 
     The order matters: sums of floats depend on it, and a lane must equal a single mission.
     """
-    report, rewards, swarm = lanes.report[lane], lanes.rewards[lane], lanes.swarm[lane]
+    report = borrow(lanes.report, lane, (n_uas, REPORT_SIZE))
+    rewards = borrow(lanes.rewards, lane, (lanes.rewards.shape[1],))
+    swarm = borrow(lanes.swarm, lane, (SWARM_SIZE,))
     flies = False
-    rewards[:] = 0.0
-    swarm[:] = 0.0
     for i in range(n_uas):
         flies = flies or worlds.status[lane, i] == FLYING
+        reward = 0.0
         for term in range(N_TERMS):
-            rewards[i] += report[i, term]
-        for column in range(SWARM_COVERED):
-            swarm[column] += report[i, column]
+            reward += report[i, term]
+        rewards[i] = reward
+    for i in range(n_uas, rewards.shape[0]):
+        rewards[i] = 0.0
+    reward = 0.0
+    for column in range(SWARM_COVERED):
+        total = 0.0
+        for i in range(n_uas):
+            total += report[i, column]
+        swarm[column] = total
+        if column < N_TERMS:
+            reward += total
     swarm[SWARM_COVERED] = report[0, COVERED]
+    swarm[SWARM_REWARD] = reward
     lanes.terminated[lane] = not flies
     lanes.truncated[lane] = flies and worlds.step[lane, 0] >= max_steps
     return lanes.terminated[lane] or lanes.truncated[lane]
@@ -173,7 +188,7 @@ def _settle(worlds, lanes, lane, n_uas, max_steps):
 
 @njit(cache=True, error_model="numpy")
 def step_lane(
-    pool, tables, worlds, lanes, lane, order, kind, weights, nonlinear, return_mode,
+    pool, tables, worlds, lanes, lane, order, thread, kind, weights, nonlinear, return_mode,
     safety_filter, autoreset, before, observation,
 ):  # fmt: skip
     """One lane of `step_batch`."""
@@ -194,16 +209,18 @@ def step_lane(
     for i in range(observation.shape[1]):
         # what is not written below: a UAS that did not fly keeps its last observation
         if i >= n_uas:
-            observation[lane, i] = 0.0
+            for k in range(OBSERVATION_SIZE):
+                observation[lane, i, k] = 0.0
         elif state.status[i] != FLYING:
-            observation[lane, i] = before[lane, i]
+            for k in range(OBSERVATION_SIZE):
+                observation[lane, i, k] = before[lane, i, k]
     step_learners(
         arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode,
         safety_filter, borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
         borrow(lanes.targets, lane, (n_uas,)),
         borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
-        borrow(lanes.company, lane, (n_waypoints, 2)), borrow(lanes.commands, lane, (n_uas,)),
-        borrow(lanes.outcome, lane, (n_uas,)), borrow(lanes.report, lane, (n_uas, REPORT_SIZE)),
+        borrow(lanes.company, lane, (n_waypoints, 2)), borrow(lanes.commands, thread, (n_uas,)),
+        borrow(lanes.outcome, thread, (n_uas,)), borrow(lanes.report, lane, (n_uas, REPORT_SIZE)),
         max_steps, borrow(observation, lane, (n_uas, OBSERVATION_SIZE)),
     )  # fmt: skip
     over = _settle(worlds, lanes, lane, n_uas, max_steps)
@@ -218,8 +235,19 @@ def step_lane(
 
 
 @njit(cache=True, error_model="numpy")
+def _all_finite(numbers):
+    finite = True
+    for k in range(numbers.shape[0]):
+        # no early end: so it is a few vector instructions
+        finite &= math.isfinite(numbers[k])
+    return finite
+
+
+@njit(cache=True, error_model="numpy")
 def _first_refused(pool, lanes, orders):
     """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
+    if _all_finite(lanes.asked.reshape(-1)):
+        return ACCEPTED
     for lane in range(lanes.scenario.shape[0]):
         if orders[lane] != FLY:
             continue
@@ -263,7 +291,7 @@ def step_batch(
     if refused == ACCEPTED:
         for lane in range(lanes.scenario.shape[0]):
             step_lane(
-                pool, tables, worlds, lanes, lane, orders[lane], kind, weights, nonlinear,
+                pool, tables, worlds, lanes, lane, orders[lane], 0, kind, weights, nonlinear,
                 return_mode, safety_filter, autoreset, before, observation,
             )  # fmt: skip
     return refused
@@ -283,7 +311,7 @@ def step_batch_in_threads(
     if refused == ACCEPTED:
         for lane in prange(lanes.scenario.shape[0]):
             step_lane(
-                pool, tables, worlds, lanes, lane, orders[lane], kind, weights, nonlinear,
-                return_mode, safety_filter, autoreset, before, observation,
+                pool, tables, worlds, lanes, lane, orders[lane], get_thread_id(), kind, weights,
+                nonlinear, return_mode, safety_filter, autoreset, before, observation,
             )  # fmt: skip
     return refused

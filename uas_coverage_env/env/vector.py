@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.batch import CoverageBatch, masks_of
-from uas_coverage_env.env.batch_kernel import SWARM_COVERED
+from uas_coverage_env.env.batch_kernel import SWARM_COVERED, SWARM_REWARD
 from uas_coverage_env.env.kernel import CONTACT, ENERGY, FILTERED, RETURNING, STATUS
 from uas_coverage_env.env.layout import observation_bounds
 from uas_coverage_env.env.rewards import REWARD_TERMS
@@ -187,9 +187,9 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         lanes = self._batch.lanes
         infos = self._infos(lanes.report, lanes.swarm, lanes.candidates, self._all)
         ended = lanes.terminated | lanes.truncated
-        rewards = _row_sums(lanes.swarm)
+        rewards = lanes.swarm[:, SWARM_REWARD].copy()
         if self._same_step and ended.any():
-            rewards[ended] = _row_sums(lanes.final_swarm[ended])
+            rewards[ended] = lanes.final_swarm[ended, SWARM_REWARD]
             self._add_final(infos, ended)
         return (
             self._shown(observation),
@@ -322,11 +322,3 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
                 self._screens[lane] = Screen(batch.scenario_of(lane), self.render_mode)
             n_uas = len(batch.scenario_of(lane).uas)
             self._screens[lane].see(batch.worlds.x[lane, :n_uas, :3])
-
-
-def _row_sums(swarm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rewards: the terms of each row added from left to right, as a single mission does it."""
-    rewards = np.zeros(len(swarm))
-    for term in range(len(REWARD_TERMS)):
-        rewards += swarm[:, term]
-    return rewards

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from uas_coverage_env.flight.metrics import summary
 from uas_coverage_env.flight.record import (
@@ -37,6 +38,24 @@ FLIGHT_COLUMNS = (
     *("t_s", "uas", *STATE_COLUMNS, "soc", "voltage_V", "current_A", "mode"),
     *(*INPUT_COLUMNS, "covered"),
 )
+_SUMMARY_FIELDS = {
+    "planner": str,
+    "planner_options": dict[str, Any],
+    "violations": tuple[Violation, ...],
+    "seed": int,
+    "breaches": int,
+    "min_separation_m": float | None,
+    "min_obstacle_clearance_m": float | None,
+    "wall_time_s": float,
+    "versions": dict[str, str],
+}
+_RUN_FIELDS = {
+    "dynamics": str,
+    "return_mode": bool,
+    "safety_filter": bool,
+    "ended": str,
+    "decisions": tuple[DecisionRecord, ...],
+}
 MOVING_COLUMNS = ("t_s", "name", "x_m", "y_m", "z_m")
 PLAN_COLUMNS = ("t_s", "uas", "n", "x_m", "y_m", "z_m")
 
@@ -91,11 +110,12 @@ def read_flight(directory: Path) -> dict[str, Any]:
         _read(directory, "scenario.json", json.loads), Scenario, str(directory / "scenario.json")
     )
     samples = _read(directory, "flight.csv", lambda text: _flight_arrays(text, scenario))
-    shape = (len(samples["x"]), len(scenario.moving_obstacles), 3)
+    steps = len(samples["x"]) - 1
+    shape = (steps + 1, len(scenario.moving_obstacles), 3)
     return {
         "scenario": scenario,
-        **_read(directory, "summary.json", _summary_fields),
-        **_read(directory, "run.json", _run_fields),
+        **_read(directory, "summary.json", lambda text: _summary_fields(text, scenario)),
+        **_read(directory, "run.json", lambda text: _run_fields(text, steps)),
         **samples,
         "moving_position_m": _read(
             directory, "moving_obstacles.csv", lambda text: _moving_array(text).reshape(shape)
@@ -132,6 +152,7 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     mode, covered = np.zeros(shape, np.int8), np.zeros(samples, np.int64)
     first_input = FLIGHT_COLUMNS.index(INPUT_COLUMNS[0])
     last = np.zeros(len(index), np.int64)
+    found = np.zeros(shape, np.bool_)
     for row in rows:
         k, i = _step(row[0], scenario), index[row[1]]
         x[k, i] = [_number(value) for value in row[2 : 2 + N_STATES]]
@@ -140,6 +161,10 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
         u[k, i] = [_number(value) for value in row[first_input : first_input + N_INPUTS]]
         covered[k] = int(row[-1])
         last[i] = k
+        found[k, i] = True
+    for i, name in enumerate(index):
+        if not found[: last[i] + 1, i].all():
+            raise ValueError(f"sample {found[:, i].argmin()} of {name} is missing")
     for i, k in enumerate(last):  # after the end of a UAS its last sample is repeated
         for series in (x, u, voltage_V, current_A, mode):
             series[k + 1 :, i] = series[k, i]
@@ -193,34 +218,59 @@ def _run(flight: Flight) -> dict[str, Any]:
     }
 
 
-def _run_fields(text: str) -> dict[str, Any]:
-    run = json.loads(text)
-    decisions = tuple(DecisionRecord(**decision) for decision in run.pop("decisions"))
-    return {**run, "decisions": decisions}
+def _run_fields(text: str, steps: int) -> dict[str, Any]:
+    run = _fields(_object(text), _RUN_FIELDS)
+    if len(run["decisions"]) != steps:
+        raise ValueError(f"it holds {len(run['decisions'])} decisions for {steps} steps")
+    return run
 
 
-def _summary_fields(text: str) -> dict[str, Any]:
+def _summary_fields(text: str, scenario: Scenario) -> dict[str, Any]:
     """What the summary alone holds; the rest of it follows from the other files."""
-    data = json.loads(text)
-    return {
-        "planner": data["planner"]["name"],
-        "planner_options": data["planner"]["options"],
-        "violations": tuple(
-            Violation(entry["t_s"], entry["uas"], entry["kind"], entry["with"])
-            for entry in data["violations"]
-        ),
-        **{
-            key: data[key]
-            for key in (
-                *("seed", "breaches", "min_separation_m", "min_obstacle_clearance_m"),
-                *("wall_time_s", "versions"),
-            )
+    data = _object(text)
+    entries = [
+        {
+            "time_s": entry["t_s"],
+            "uas": entry["uas"],
+            "kind": entry["kind"],
+            "partner": entry["with"],
+        }
+        for entry in data["violations"]
+    ]
+    summary_fields = _fields(
+        {
+            **data,
+            "violations": entries,
+            "planner": data["planner"]["name"],
+            "planner_options": data["planner"]["options"],
         },
-    }
+        _SUMMARY_FIELDS,
+    )
+    names = {uas.name for uas in scenario.uas}
+    for violation in summary_fields["violations"]:
+        if violation.uas not in names:
+            raise ValueError(f"a violation names {violation.uas[:80]!r}, which is no UAS")
+        _step(violation.time_s, scenario)
+    return summary_fields
 
 
-def _step(time_s: str, scenario: Scenario) -> int:
-    return round(float(time_s) / scenario.dt_s)
+def _object(text: str) -> dict[str, Any]:
+    data = json.loads(text, parse_constant=_number)
+    if not isinstance(data, dict):
+        raise ValueError("it should hold one object, { ... }")
+    return data
+
+
+def _fields(data: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
+    """Some fields of an object, each of the kind that a `Flight` holds."""
+    return {name: TypeAdapter(kind).validate_python(data[name]) for name, kind in kinds.items()}
+
+
+def _step(time_s: str | float, scenario: Scenario) -> int:
+    step = round(float(time_s) / scenario.dt_s)
+    if not 0 <= step <= scenario.max_steps:
+        raise ValueError(f"{time_s} s is not within the {scenario.max_steps} steps of the mission")
+    return step
 
 
 def _number(text: str) -> float:
@@ -256,7 +306,7 @@ def _read(directory: Path, name: str, reader: Callable[[str], T]) -> T:
         return reader(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); is it a flight?") from error
-    except (ValueError, KeyError, IndexError, TypeError) as error:
+    except (ValueError, KeyError, IndexError, TypeError, RecursionError, csv.Error) as error:
         raise InputError(f"{path}: was damaged: {' '.join(str(error).split())}") from error
 
 

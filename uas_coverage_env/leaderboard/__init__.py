@@ -11,7 +11,7 @@ from uas_coverage_env.leaderboard.scenario_sets import (
     seed_range,
 )
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
-from uas_coverage_env.leaderboard.store import STORE, Store, opened
+from uas_coverage_env.leaderboard.store import STORE, Store, flights_in, opened
 from uas_coverage_env.leaderboard.sweep import Entry, Sweep, source_of
 from uas_coverage_env.leaderboard.workers import (
     Backend,
@@ -40,6 +40,7 @@ __all__ = [
     "WorkerLostError",
     "benchmark_scenario",
     "failures",
+    "flights_in",
     "fly",
     "fly_all",
     "jobs_of",

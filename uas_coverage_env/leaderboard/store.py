@@ -116,6 +116,21 @@ def opened(
             ) from error
 
 
+def flights_in(directory: Path) -> list[Row]:
+    """The flights of a sweep that may still be under way; nothing there is changed.
+
+    Raises:
+        InputError: The directory holds no sweep, or a damaged one.
+    """
+    path = directory / STORE
+    try:
+        connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
+        with Store(path, connection) as store:
+            return store.rows()
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"{directory}: holds no sweep that can be read ({error})") from error
+
+
 def _make_sure_it_is(store: Store, directory: Path, description: Mapping[str, Any]) -> None:
     asked = json.loads(json.dumps(description))
     kept = store.description()

@@ -76,6 +76,12 @@ def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
         (steps until it stands, slack [m]): the slack is PLENTY_M, but negative where the UAS has
         not come to rest at the end of the path.
     """
+    return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m)
+
+
+@njit(cache=True, error_model="numpy")
+def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m):
+    """Like `fly_and_brake`, with the command flown for n_held steps."""
     n_steps = path_m.shape[0] - 1
     vehicle = arena.vehicles[i]
     x = start.copy()
@@ -85,7 +91,7 @@ def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
     path_m[0, 1] = x[Y]
     path_m[0, 2] = x[Z]
     for k in range(n_steps):
-        if k == 0:
+        if k < n_held:
             command_wrench(vehicle, x, governed, command, u)
         else:
             command_wrench(vehicle, x, governed, arena.rules[0].brake, u)
@@ -93,12 +99,12 @@ def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
             plant_step(vehicle, x, u, x)
         else:
             fly_kinematics(vehicle, x, u)
-        if k == 0 and command.kind == WRENCH:
+        if k < n_held and command.kind == WRENCH:
             reseed_reference(x, governed)
         path_m[k + 1, 0] = x[X]
         path_m[k + 1, 1] = x[Y]
         path_m[k + 1, 2] = x[Z]
-        if _is_still(x):
+        if k + 1 >= n_held and _is_still(x):
             for later in range(k + 2, n_steps + 1):
                 path_m[later, 0] = x[X]
                 path_m[later, 1] = x[Y]

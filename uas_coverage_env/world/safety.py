@@ -4,7 +4,9 @@ A command is safe if it can be flown for one step, and braking then keeps the UA
 that count as a breach: from the geofence, fixed obstacles, moving obstacles that go on as they go
 now, and the paths of the other UAS. UAS decide in order; those that have decided are committed to
 what they chose, the later ones to braking. So every UAS always has a safe choice, braking, except
-where a moving obstacle comes at it; then it tries to get out of the way.
+where a moving obstacle comes at it; then it gets out of the way as best it can (`evasion`), but
+never at the cost of what can be proved: one step of the evasive flight, and braking after it, is
+clear of all that stands still and of the other UAS.
 """
 
 import math
@@ -15,6 +17,7 @@ from numba import njit
 from uas_coverage_env.vehicle import VX, VY, Z
 from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.world.control import write_brake, write_command
+from uas_coverage_env.world.evasion import evade
 from uas_coverage_env.world.lookahead import (
     TOLERANCE_M,
     fixed_slack,
@@ -100,8 +103,8 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     """Put the nearest safe command in the place of an unsafe one, or else the least harmful.
 
     The order is: the deflections; braking; where even braking is not safe, because something
-    moving comes near, whatever keeps most distance. `path_m` is left as the path to which the UAS
-    is then committed.
+    moving comes near, an evasive flight; and where not even what stands still is far enough away,
+    whatever keeps most distance. `path_m` is left as the path to which the UAS is then committed.
     """
     n_deflections = _DEFLECTIONS.shape[0]
     wish_mps = _wish(arena, state, i, command)
@@ -113,6 +116,9 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     write_brake(command)
     best_m = _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
     if best_m >= -TOLERANCE_M:
+        return
+    heading_rad = math.atan2(wish_mps[1], wish_mps[0])
+    if evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m):
         return
     best = -1
     for d in range(n_deflections):

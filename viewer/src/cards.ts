@@ -4,11 +4,14 @@ import { element } from "./dom";
 import type { Flight, Moment } from "./flight";
 import { bright, ofCharge } from "./palette";
 
+const FEW = 6;
+
 export class Cards {
-  readonly element = element("div", { class: "cards" });
+  readonly element: HTMLElement;
   private readonly parts: { card: HTMLButtonElement; level: HTMLElement; texts: Text[] }[];
 
   constructor(private readonly flight: Flight, follow: (i: number) => void) {
+    this.element = element("div", { class: flight.uas > FEW ? "cards many" : "cards" });
     this.parts = flight.scene.uas.map((uas, i) => {
       const texts = [0, 1, 2, 3].map(() => document.createTextNode(""));
       const level = element("i");

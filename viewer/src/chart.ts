@@ -32,6 +32,7 @@ export interface ChartContent {
 export const LEFT = 40;
 export const RIGHT = 18;
 const TOP = 22;
+const FEW = 4;
 const BOTTOM = 5;
 
 export const DASHES = [[], [6, 3], [2, 3], [9, 3, 2, 3]];
@@ -156,7 +157,7 @@ export class Chart extends TimeCanvas {
 
   protected drawAt(time: number): void {
     const { pen, content } = this;
-    let right = this.width - RIGHT;
+    const shown: [number, string][] = [];
     for (const line of [...content.lines].reverse()) {
       const k = Math.min(line.values.length - 1, Math.floor(time / content.dt + 1e-6));
       if (k < 0) continue;
@@ -165,8 +166,17 @@ export class Chart extends TimeCanvas {
       pen.beginPath();
       pen.arc(this.x(k * content.dt), this.y(line.values[k]), 3, 0, 2 * Math.PI);
       pen.fill();
-      // in a large swarm only as many values as there is room for
-      if (right > 150) right -= this.write(content.show(line.values[k]), right, 9, ink, "right", 600) + 10;
+      shown.push([line.values[k], ink]);
+    }
+    let right = this.width - RIGHT;
+    if (shown.length > FEW) {
+      const [low, high] = [Math.min, Math.max].map((pick) => pick(...shown.map(([value]) => value)));
+      const range = `${content.show(low)} to ${content.show(high)}`;
+      this.write(range, right, 9, colour("--ink"), "right", 600);
+      return;
+    }
+    for (const [value, ink] of shown) {
+      right -= this.write(content.show(value), right, 9, ink, "right", 600) + 10;
     }
   }
 
@@ -189,7 +199,8 @@ export class Chart extends TimeCanvas {
   /** The number of each line where it ends, moved apart where two end together. */
   private names(): void {
     const { content } = this;
-    if (content.lines.length < 2) return;
+    // the names of many would cover each other
+    if (content.lines.length < 2 || content.lines.length > 2 * FEW) return;
     const ends = content.lines
       .filter((line) => line.values.length > 0)
       .map((line) => ({

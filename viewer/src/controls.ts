@@ -115,7 +115,7 @@ export class Controls {
     const track = element("div", { class: "track" }, this.slider);
     for (const { t_s } of flights.flatMap((flight) => flight.data.violations)) {
       const mark = element("i", { class: "violation" });
-      mark.style.left = `${(100 * t_s) / (this.clock.duration || 1)}%`;
+      mark.style.left = `${100 * Math.min(1, t_s / (this.clock.duration || 1))}%`;
       track.append(mark);
     }
     return track;

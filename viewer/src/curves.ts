@@ -19,7 +19,9 @@ export function curves(
   });
   const modes = new ModeChart(flight, duration, seek);
   if (!decisions) return [...charts, modes];
-  const longest = Math.max(...all.flatMap((each) => each.data.duration.values)) || 1;
+  const longest = all
+    .flatMap((each) => each.data.duration.values)
+    .reduce((a, b) => Math.max(a, b), 0);
   const [unit, scale] = longest * all[0].data.duration.unit < 0.1 ? ["ms", 1000] : ["s", 1];
   const content = (each: Flight) => decisionTime(each, unit as string, scale as number);
   const shared = all.flatMap((each) => values(content(each)));
@@ -73,15 +75,16 @@ function coverage(flight: Flight): ChartContent {
 
 function decisionTime(flight: Flight, unit: string, scale: number): ChartContent {
   const { values: whole, unit: step } = flight.data.duration;
+  const { fallbacks } = flight.data;
   return {
-    title: `Decision time, ${unit}`,
+    title: `Decision time, ${unit}${fallbacks.length > 0 ? ` (■ fallbacks: ${fallbacks.length})` : ""}`,
     lines: [
       { label: "", colour: "#aa4b8c", values: whole.map((value) => value * step * scale), dash: [] },
     ],
     dt: flight.data.dt_s,
     show: (value) => `${value.toFixed(2)} ${unit}`,
     from: 0,
-    marked: flight.data.fallbacks,
+    marked: fallbacks,
   };
 }
 

@@ -88,7 +88,7 @@ function loop(now: number): void {
 }
 
 const observer = new ResizeObserver(resize);
-for (const panel of panels) observer.observe(panel.element);
+for (const panel of panels) observer.observe(panel.stage);
 onThemeChange(() => {
   for (const panel of panels) panel.repaint();
   invalidate();

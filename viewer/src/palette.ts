@@ -28,7 +28,9 @@ export function colour(name: string): string {
 
 /** The colour of a line or mark: lighter on the dark ground. */
 export function bright(hex: string): string {
-  return isDark() ? mixed(hex, 255, 0.3) : hex;
+  if (!isDark()) return hex;
+  const light = [1, 3, 5].reduce((sum, i) => sum + parseInt(hex.slice(i, i + 2), 16), 0);
+  return mixed(hex, 255, light < 200 ? 0.65 : 0.3);
 }
 
 /** The colour of a large area: darker on the dark ground. */

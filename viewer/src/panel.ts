@@ -21,6 +21,7 @@ export interface PanelEvents {
 
 export class Panel {
   readonly element: HTMLElement;
+  readonly stage = element("div", { class: "stage" });
   private readonly sceneCanvas = element("canvas", { class: "scene", "aria-label": "3D scene" });
   private readonly scene: SceneView | null;
   private readonly map: MapView;
@@ -47,14 +48,15 @@ export class Panel {
     this.view = this.scene ?? this.map;
     this.cards = new Cards(flight, (i) => events.follow(i));
     this.charts = curves(flight, all, duration, events.seek);
+    this.stage.append(this.sceneCanvas, mapCanvas);
     this.element = element(
       "section",
       { class: "flight" },
       element("header", {}, element("h1", {}, title(flight)), element("p", {}, outcome(flight))),
-      element("div", { class: "stage" }, this.sceneCanvas, mapCanvas),
+      this.stage,
       element(
         "div",
-        { class: "side" },
+        { class: "side", "data-title": title(flight) },
         this.cards.element,
         ...this.violations(),
         element("div", { class: "charts" }, ...this.charts.map((chart) => chart.canvas)),
@@ -123,6 +125,7 @@ function title(flight: Flight): string {
 function outcome(flight: Flight): string {
   const { summary, covered, violations } = flight.data;
   const contacts = violations.length;
+  const { seed, dynamics } = flight.data;
   return [
     `${covered.at(-1)} of ${flight.scene.waypoints.length} waypoints`,
     `${summary.steps} steps`,
@@ -130,6 +133,7 @@ function outcome(flight: Flight): string {
     `${summary.energy_Wh.toFixed(2)} Wh`,
     contacts === 0 ? "no violation" : `${contacts} violation${contacts === 1 ? "" : "s"}`,
     `${summary.breaches || "no"} breach${summary.breaches === 1 ? "" : "es"}`,
+    `seed ${seed}, ${dynamics}`,
   ].join(" · ");
 }
 

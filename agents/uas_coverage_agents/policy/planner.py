@@ -60,6 +60,11 @@ class PolicyPlanner:
         except ValueError as error:
             raise InputError(f"{self.argument}: cannot be flown: {error}") from error
 
+    @property
+    def fingerprint(self) -> str:
+        """What the flights depend on beside the options: the checksum of the weights."""
+        return self.policy.description.weights_sha256
+
     def warm_up(self, scenario: Scenario) -> None:
         """Compile what needs compiling."""
         self._pilot.warm_up(scenario)

@@ -80,6 +80,8 @@ class Checkpoint:
 def write_checkpoint(directory: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint and remove those that are no longer kept."""
     directory.mkdir(parents=True, exist_ok=True)
+    for torn in directory.glob(".*"):
+        torn.unlink()  # a kill has left it half written
     content = safetensors.save(
         {name: np.array(array, order="C") for name, array in checkpoint.tensors.items()}
     )

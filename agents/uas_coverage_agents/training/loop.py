@@ -74,8 +74,7 @@ def train(
         model.lr_schedule = watch.learning_rate
         model.set_logger(configure(str(directory / "tensorboard"), ["tensorboard"]))
         end = order.config.steps if order.minutes is None else _NO_END
-        if end > model.num_timesteps:
-            model.learn(end - model.num_timesteps, callback=watch, reset_num_timesteps=False)
+        model.learn(end - model.num_timesteps, callback=watch, reset_num_timesteps=False)
         watch.finish()
     trainee.lanes.close()
     return trainee.publish(directory / POLICY)

@@ -8,7 +8,7 @@ from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Interval, Policy, Score
 from uas_coverage_agents.policy.planner import PILOTS
-from uas_coverage_env.flight import coverage, energy_Wh, home, rollout
+from uas_coverage_env.flight import Flight, coverage, energy_Wh, home, rollout
 from uas_coverage_env.scenario import Scenario
 
 MEASURES = ("coverage", "all_home", "violations", "energy_Wh", "flight_steps")
@@ -31,19 +31,23 @@ def fly(
         (missions, measures) in the order of MEASURES.
     """
     pilot = PILOTS[policy.description.interface](policy)
-    rows = []
-    for scenario in scenarios:
-        flight = rollout(scenario, pilot, safety_filter=safety_filter, return_mode=return_mode)
-        rows.append(
-            (
-                coverage(flight),
-                float(home(flight).all()),
-                len(flight.violations),
-                energy_Wh(flight).sum(),
-                flight.steps,
-            )
-        )
-    return np.array(rows, dtype=np.float64)
+    return np.array(
+        [
+            measured(rollout(scenario, pilot, safety_filter=safety_filter, return_mode=return_mode))
+            for scenario in scenarios
+        ]
+    )
+
+
+def measured(flight: Flight) -> tuple[float, ...]:
+    """One flight, in the order of MEASURES."""
+    return (
+        coverage(flight),
+        float(home(flight).all()),
+        float(len(flight.violations)),
+        float(energy_Wh(flight).sum()),
+        float(flight.steps),
+    )
 
 
 def score(results: NDArray[np.float64], scenarios: str) -> Score:

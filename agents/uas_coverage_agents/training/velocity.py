@@ -19,6 +19,7 @@ from uas_coverage_agents.training.config import SacSettings, TrainingConfig
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
 from uas_coverage_agents.velocity.pilot import OUTPUTS, observation
+from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
 from uas_coverage_env.env.layout import NEARBY_M
 
@@ -112,7 +113,7 @@ class VelocityLearner:
 
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
         """The environment to learn in."""
-        player = config.player
+        player = _player(config)
         lanes = CoverageVecEnv(
             config.lanes,
             training_scenarios(config.scenarios, seed),
@@ -125,7 +126,7 @@ class VelocityLearner:
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
         """The untrained model."""
-        player, learning = config.player, config.learning
+        player, learning = _player(config), config.learning
         activation = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[player.activation]
         network: dict[str, Any] = {"net_arch": list(player.hidden), "activation_fn": activation}
         if isinstance(learning, SacSettings):
@@ -183,6 +184,12 @@ class VelocityLearner:
     def observation(self, config: TrainingConfig) -> Observation:
         """What that network reads."""
         return observation()
+
+
+def _player(config: TrainingConfig) -> VelocitySettings:
+    if not isinstance(config.player, VelocitySettings):
+        raise TypeError(f"the learner of velocities cannot train {config.player.interface}s")
+    return config.player
 
 
 def _actor(model: BaseAlgorithm) -> list[torch.nn.Module]:

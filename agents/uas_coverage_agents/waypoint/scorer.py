@@ -81,10 +81,11 @@ def score(weights, observation, scores):
         offered += t[a] * weights.score_team[a]
     scores[:] = -np.inf
     hidden = np.empty(h)
+    nearest = np.float64(observation[N_TEAM + WAY])
     for k in range(n):
         _layer(e[k], weights.score_candidate, offered, hidden)
-        way = observation[N_TEAM + k * N_CANDIDATE + WAY] - observation[N_TEAM + WAY]
-        total = -weights.prior[0] * way
+        farther = np.float64(observation[N_TEAM + k * N_CANDIDATE + WAY]) - nearest
+        total = -weights.prior[0] * farther
         for a in range(h):
             total += hidden[a] * weights.score_out[a, 0]
         scores[k] = total

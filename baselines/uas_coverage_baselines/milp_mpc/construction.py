@@ -122,29 +122,32 @@ def teams(
         for pool in pools
     ]
     clashes = _clashes(problem, pools)
+    undecided = [uas for uas, pool in enumerate(pools) if len(pool) > 1]
     found: dict[tuple[int, ...], float] = {}
-    for leader in range(len(pools)):
+    for leader in undecided or [0]:
         for first in range(min(keep, len(pools[leader]))):
             chosen = [0] * len(pools)
             chosen[leader] = first
             for _ in range(4):
                 before = list(chosen)
-                for uas in range(len(pools)):
+                for uas in undecided:
                     if uas == leader:
                         continue
                     others = [rewards[j][chosen[j]] for j in range(len(pools)) if j != uas]
                     covered = np.max(others, axis=0) if others else 0.0
                     gain = np.maximum(rewards[uas] - covered, 0.0).sum(axis=1) - costs[uas]
-                    for j in range(len(pools)):
-                        if j != uas:
-                            gain = gain - clashes[uas][j][:, chosen[j]]
+                    for j, clash in clashes[uas].items():
+                        gain = gain - clash[:, chosen[j]]
                     chosen[uas] = int(np.argmax(gain))
                 if chosen == before:
                     break
             together = np.max([rewards[j][chosen[j]] for j in range(len(pools))], axis=0).sum()
             together -= sum(costs[j][chosen[j]] for j in range(len(pools)))
             together -= sum(
-                clashes[j][k][chosen[j], chosen[k]] for j in range(len(pools)) for k in range(j)
+                clash[chosen[j], chosen[k]]
+                for j in range(len(pools))
+                for k, clash in clashes[j].items()
+                if k < j
             )
             found[tuple(chosen)] = float(together)
     ranked = sorted(found, key=lambda key: -found[key])
@@ -174,18 +177,25 @@ def target_cost(
     return target.weight * np.maximum(distance, 0.0).sum(axis=1)
 
 
-def _clashes(problem: PlanningProblem, pools: Sequence[Sequence[Flight]]) -> list[list[FloatArray]]:
-    """[j][k] (flights of j, flights of k) how deep they come too close, summed over samples."""
+def _clashes(
+    problem: PlanningProblem, pools: Sequence[Sequence[Flight]]
+) -> list[dict[int, FloatArray]]:
+    """[j][k] (flights of j, flights of k) how deep they come too close, summed over samples.
+
+    Only where any two flights of j and k do.
+    """
     paths = [np.array([f.positions_m[1:] for f in pool]) for pool in pools]
-    result = []
-    for j, mine in enumerate(paths):
-        row = []
-        for k, theirs in enumerate(paths):
-            apart = np.abs(mine[:, None] - theirs[None])
-            distance = np.maximum(np.hypot(apart[..., 0], apart[..., 1]), apart[..., 2])
-            short = np.maximum(problem.separation_m[j, k] - distance, 0.0)
-            row.append(10.0 * short.sum(axis=2))
-        result.append(row)
+    low = np.array([path.min(axis=(0, 1)) for path in paths])
+    high = np.array([path.max(axis=(0, 1)) for path in paths])
+    apart_m = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
+    result: list[dict[int, FloatArray]] = [{} for _ in pools]
+    for j, k in np.argwhere(np.triu(apart_m < problem.separation_m, 1)):
+        apart = np.abs(paths[j][:, None] - paths[k][None])
+        distance = np.maximum(np.hypot(apart[..., 0], apart[..., 1]), apart[..., 2])
+        short = np.maximum(problem.separation_m[j, k] - distance, 0.0)
+        clash = 10.0 * short.sum(axis=2)
+        if clash.any():
+            result[int(j)][int(k)], result[int(k)][int(j)] = clash, clash.T
     return result
 
 

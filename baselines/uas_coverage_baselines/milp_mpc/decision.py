@@ -30,7 +30,7 @@ from uas_coverage_baselines.milp_mpc.solvers import (
 )
 from uas_coverage_baselines.milp_mpc.standby import as_flight, standby_plans, visits
 from uas_coverage_baselines.milp_mpc.turns import Turns
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.verify import first_trouble, trouble_between
 
 FloatArray = NDArray[np.float64]
 
@@ -100,9 +100,7 @@ def decide(
         constructing = {uas: side_by_side.submit(flights, problem, uas, dt_s) for uas in turn}
         search.formulate(turn)
         pools = [
-            constructing[uas].result()
-            if uas in turn
-            else [as_flight(problem, uas, left[uas][0])]
+            constructing[uas].result() if uas in turn else [as_flight(problem, uas, left[uas][0])]
             for uas in everyone
         ]
         tasks = [
@@ -199,7 +197,7 @@ class _Search:
 
     @property
     def plan(self) -> Plan | None:
-        """The best verified plan, with the bound that was proven; None where nobody has a new one."""
+        """The best verified plan, with the bound proven; None where nobody has a new one."""
         if self._best is None or not self._best.renewed:
             return None
         return replace(self._best, bound=min(self._bound, self._best.objective))
@@ -296,11 +294,18 @@ class _Search:
         """From a team on standby towards one with plans, while it holds as a whole."""
         for uas, plans in enumerate(self._plans):
             for plan in sorted(plans, key=lambda one: one.objective):
-                trial = [*team[:uas], plan, *team[uas + 1 :]]
-                if first_trouble(self.problem, self._joined(trial)) is None:
-                    team = trial
+                if self._fits(team, uas, plan):
+                    team = [*team[:uas], plan, *team[uas + 1 :]]
                     break
         self._offer(self._joined(team))
+
+    def _fits(self, team: Sequence[Plan], uas: int, plan: Plan) -> bool:
+        """Whether a UAS's plan, clear of what stands and moves, is clear of the others' too."""
+        return all(
+            trouble_between(self.problem, uas, other, plan.x[0, :, :3], theirs.x[0, :, :3]) is None
+            for other, theirs in enumerate(team)
+            if other != uas
+        )
 
     def _joined(self, plans: list[Plan]) -> Plan:
         """One plan of all, which says who has a new one."""

@@ -62,7 +62,11 @@ class WayHome:
         self._row = {uas.name: row for row, uas in enumerate(scenario.uas)}
 
     def turned_home(
-        self, problem: PlanningProblem, swarm: SwarmState, out: Plan | None, planned: Collection[str]
+        self,
+        problem: PlanningProblem,
+        swarm: SwarmState,
+        out: Plan | None,
+        planned: Collection[str],
     ) -> tuple[Plan, frozenset[str]] | None:
         """The ways out of all, some of them replaced by ways home; None where none is.
 
@@ -117,7 +121,7 @@ class WayHome:
     ) -> Plan:
         """The ways out with that of one UAS replaced by its way home."""
         dt_s = self._scenario.dt_s
-        pursued = max(int(round(pursued_s / dt_s)), 1)
+        pursued = max(round(pursued_s / dt_s), 1)
         steps = pursued + int(np.ceil(BRAKING_S / dt_s))
         steps = steps if out is None else max(steps, out.u.shape[1])
         flown = []

@@ -21,6 +21,8 @@ from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
 FloatArray = NDArray[np.float64]
 _NEIGHBOURS = 24
 """Legs to so many nearest waypoints are routed past obstacles; longer ones are taken straight."""
+_FROM_HERE = 64
+"""Likewise from where a UAS is."""
 _OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
@@ -55,13 +57,21 @@ class Legs:
         )
 
     def from_here_s(self, uas: int, position_m: FloatArray) -> FloatArray:
-        """(W,) leg times from a position of a UAS to every waypoint."""
-        ends = np.broadcast_to(position_m, self.waypoints_m.shape)
-        targets = np.arange(len(self.waypoints_m))
+        """(W,) leg times from a position of a UAS to every waypoint, past obstacles to near ones."""
         speeds = self._speeds[self.kind[uas]]
-        return _legs_s(
-            self._arena, targets, ends, self.waypoints_m, self._credit_m, speeds, _OCTAGON
+        here = np.broadcast_to(position_m, self.waypoints_m.shape)
+        result = _straight_s(here, self.waypoints_m, self._credit_m, speeds)
+        near = np.argpartition(result, min(_FROM_HERE, len(result)) - 1)[:_FROM_HERE]
+        result[near] = _legs_s(
+            self._arena,
+            near,
+            here[near],
+            self.waypoints_m[near],
+            self._credit_m[near],
+            speeds,
+            _OCTAGON,
         )
+        return result
 
     def way_home_s(self, uas: int, position_m: FloatArray) -> float:
         """Leg time from a position of a UAS to its start."""

@@ -40,7 +40,7 @@ _STEPS_AT_MOST = 60
 _COVERED_WITHIN_M = 0.3  # nearer than the radius by this, or by a fiftieth of it
 _NEAR = 0.7  # share of the radius at which the leg to a waypoint is expected to end
 _WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
-_PER_WAYPOINT_S = 2.0  # what a turn takes beyond that: there is no gain in putting one off
+_PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putting one off
 _MOVING_MARGIN_M = 6.0
 _SURPRISE_MPS = 0.3  # a velocity off by this was flown by somebody else: the filter, return mode
 

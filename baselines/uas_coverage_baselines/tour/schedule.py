@@ -18,7 +18,7 @@ LANDING_S = 3.0  # from full speed over the start to rest on it
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 _RESERVE_S = 30.0  # what return mode asks for beyond the way home at full speed
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
-_OPENS_AFTER = 0.75  # share of the flight that is left, after which what is blocked may be open
+_OPENS_AFTER = 0.9  # share of the flight that is left, after which what is blocked may be open
 _OPENS_AFTER_S = 10.0  # and at least so long
 _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 200_000  # of a search on an event
@@ -59,8 +59,8 @@ class Schedule:
         self.acceleration_mps2 = _AGILITY * np.array(
             [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
         )
-        radius_m = np.array([w.radius_m for w in scenario.waypoints])
-        self._turn_s = radius_m / self.speed_mps[:, None]
+        # flown by these plans, a turn costs about what cutting through the sphere gains
+        self._turn_s = np.zeros((len(limits), len(scenario.waypoints)))
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
         self.order = no_order(len(limits))
         self._home_at_s = np.zeros(len(limits))

@@ -20,6 +20,7 @@ FloatArray = NDArray[np.float64]
 Start = tuple[NDArray[np.int64], FloatArray]
 """A point to start from, as (columns, values); columns left out are the solver's to complete."""
 
+
 class SolverError(Exception):
     """The solver failed where it should have solved: this solve gives nothing."""
 

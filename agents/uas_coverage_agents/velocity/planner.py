@@ -1,0 +1,15 @@
+"""The shipped policy that commands velocities, as a planner: `learned-velocity`."""
+
+from pathlib import Path
+
+from uas_coverage_agents.policy.planner import PolicyPlanner
+from uas_coverage_env.flight import AssistedOptions
+
+SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-velocity"
+
+
+class LearnedVelocity(PolicyPlanner):
+    """Flies each UAS with velocities from a trained network that sees only what is around it."""
+
+    def __init__(self, options: AssistedOptions | None = None) -> None:
+        super().__init__(options, SHIPPED)

@@ -1,0 +1,230 @@
+"""What the shipped policies cost and how they fly: trains, scores and draws what is published.
+
+    python benchmarks/learners.py                # everything in agents/README.md, some hours
+    python benchmarks/learners.py ppo --seeds 3  # one learner
+    python benchmarks/learners.py --publish      # and ship the policy of seed 0
+
+Trains each learner with each seed by `uas-coverage train` (a finished training is not repeated, a
+killed one goes on), flies 100 unseen towns with and without the safety filter, beside
+nearest-waypoint on the same towns, and fills what stands between the marks of agents/README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from uas_coverage_agents.policy import Policy, load_policy
+from uas_coverage_agents.training import curve
+from uas_coverage_agents.training.checkpoint import CurvePoint
+from uas_coverage_agents.training.scenarios import VALIDATION, town
+from uas_coverage_agents.training.score import MEASURES, fly, interval, measured
+
+from uas_coverage_env import Scenario, load_planner, rollout
+
+ROOT = Path(__file__).parents[1]
+README = ROOT / "agents" / "README.md"
+PICTURES = ROOT / "docs" / "pictures"
+SHIPPED = ROOT / "agents" / "uas_coverage_agents" / "shipped"
+COVERAGE, HOME, VIOLATIONS, ENERGY, STEPS = range(len(MEASURES))
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is trained and published.
+
+    Attributes:
+        config: Name of the configuration.
+        shipped: Name of the planner that flies the policy of seed 0; empty: none.
+        seeds: How many.
+        assisted: Whether filter and return mode fly along.
+    """
+
+    config: str
+    shipped: str = ""
+    seeds: int = 3
+    assisted: bool = True
+
+
+STUDIES = (
+    Study("maskable-ppo", "learned-waypoint"),
+    Study("ppo", "learned-velocity"),
+    Study("sac", seeds=1),
+    Study("ppo-end-to-end", seeds=1, assisted=False),
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the studies; the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    names = [study.config for study in STUDIES]
+    parser.add_argument("studies", nargs="*", metavar="STUDY", help=f"of {', '.join(names)}")
+    parser.add_argument("--seeds", type=int, help="how many; default: as published")
+    parser.add_argument("--missions", type=int, default=100, help="towns that are flown")
+    parser.add_argument("--trainings", type=Path, default=Path("trainings"), help="where they lie")
+    parser.add_argument("--publish", action="store_true", help="ship the policies of seed 0")
+    arguments = parser.parse_args(argv)
+    unknown = set(arguments.studies) - set(names)
+    if unknown or not 1 <= arguments.missions <= 100:
+        parser.error(f"unknown study {min(unknown)}" if unknown else "--missions: 1 to 100")
+    towns = [town(VALIDATION, number) for number in range(arguments.missions)]
+    reference = nearest_waypoint(towns)
+    for study in STUDIES:
+        if arguments.studies and study.config not in arguments.studies:
+            continue
+        directories = [
+            trained(study, seed, arguments.trainings)
+            for seed in range(arguments.seeds or study.seeds)
+        ]
+        text = report(study, directories, towns, reference)
+        sys.stdout.write(f"{text}\n")
+        put(study.config, text)
+        if arguments.publish and study.shipped:
+            shutil.copytree(directories[0] / "policy", SHIPPED / study.shipped, dirs_exist_ok=True)
+    return 0
+
+
+def trained(study: Study, seed: int, folder: Path) -> Path:
+    """Train, or find what was trained before."""
+    directory = folder / f"{study.config}-{seed}"
+    if not (directory / "policy" / "policy.json").exists():
+        script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
+        command = ["train", study.config, "--seed", str(seed), "--out", str(directory)]
+        subprocess.run([sys.executable, "-c", script, *command], check=True)
+    return directory
+
+
+def nearest_waypoint(towns: Sequence[Scenario]) -> NDArray[np.float64]:
+    """(missions, measures) of the simplest planner."""
+    planner = load_planner("nearest-waypoint")
+    return np.array([measured(rollout(scenario, planner)) for scenario in towns])
+
+
+def report(
+    study: Study,
+    directories: Sequence[Path],
+    towns: Sequence[Scenario],
+    reference: NDArray[np.float64],
+) -> str:
+    """The section of a study, and its picture."""
+    policies = [load_policy(directory / "policy") for directory in directories]
+    results = [
+        fly(policy, towns, safety_filter=study.assisted, return_mode=study.assisted)
+        for policy in policies
+    ]
+    lines = [
+        f"`uas-coverage train {study.config} --seed K`, "
+        f"scored by `python benchmarks/learners.py {study.config}`; {machine()}.",
+        "",
+        f"![Learning curves](../docs/pictures/learning-{study.config}.png)",
+        "",
+        table_head(),
+        table_row("`nearest-waypoint`", None, reference, None),
+    ]
+    for policy, result in zip(policies, results, strict=True):
+        name = f"seed {policy.description.training.seed}"
+        if study.shipped and policy is policies[0]:
+            name += f" = `{study.shipped}`"
+        lines.append(table_row(name, policy, result, reference))
+    if study.assisted:
+        for policy in policies:
+            name = f"seed {policy.description.training.seed}, filter off"
+            bare = fly(policy, towns, safety_filter=False, return_mode=True)
+            lines.append(table_row(name, policy, bare, None))
+    runs = {f"seed {k}": curve_of(directory) for k, directory in enumerate(directories)}
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    curve.draw(runs).savefig(PICTURES / f"learning-{study.config}.png", dpi=110)
+    return "\n".join(lines)
+
+
+def table_head() -> str:
+    """The first two lines of a table."""
+    names = (
+        "policy", "training", "covered, %", "all home, %", "violations per mission", "energy, Wh",
+        "steps", "Δ energy, %", "Δ steps, %",
+    )  # fmt: skip
+    return f"| {' | '.join(names)} |\n|---|---|{'---:|' * (len(names) - 2)}"
+
+
+def table_row(
+    name: str,
+    policy: Policy | None,
+    result: NDArray[np.float64],
+    reference: NDArray[np.float64] | None,
+) -> str:
+    """Means with 95 % intervals; differences to the reference are paired, town by town."""
+    cells = [name, "" if policy is None else training_of(policy)]
+    cells += [
+        shown(100 * result[:, COVERAGE], 2),
+        shown(100 * result[:, HOME], 1),
+        shown(result[:, VIOLATIONS], 2),
+        shown(result[:, ENERGY], 2),
+        shown(result[:, STEPS], 1),
+    ]
+    for measure in (ENERGY, STEPS):
+        if reference is None:
+            cells.append("")
+        else:
+            apart = (result - reference)[:, measure] / reference[:, measure].mean()
+            cells.append(shown(100 * apart, 1))
+    return f"| {' | '.join(cells)} |"
+
+
+def shown(values: NDArray[np.float64], digits: int) -> str:
+    """A mean and its interval, where there is one."""
+    found = interval(values)
+    if found.low == found.high:
+        return f"{found.mean:.{digits}f}"
+    return f"{found.mean:.{digits}f} [{found.low:.{digits}f}, {found.high:.{digits}f}]"
+
+
+def training_of(policy: Policy) -> str:
+    """What the training took."""
+    training = policy.description.training
+    return (
+        f"{training.steps / 1e6:.2f} M steps, {training.process_s:.0f} s of one core "
+        f"({training.wall_s:.0f} s)"
+    )
+
+
+def curve_of(directory: Path) -> list[CurvePoint]:
+    """The learning curve of a training."""
+    lines = (directory / curve.TABLE).read_text(encoding="utf-8").splitlines()
+    whole = {"steps"}
+    return [
+        CurvePoint(**{k: int(v) if k in whole else float(v) for k, v in row.items()})
+        for row in csv.DictReader(lines)
+    ]
+
+
+def machine() -> str:
+    """Where this was measured, in words."""
+    return f"{platform.machine()} virtual machine with {os.cpu_count()} cores"
+
+
+def put(name: str, text: str) -> None:
+    """Fill what stands between the marks of a study in the README.
+
+    Raises:
+        ValueError: There are no such marks.
+    """
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    before, found, rest = README.read_text(encoding="utf-8").partition(begin)
+    _, ended, after = rest.partition(end)
+    if not found or not ended:
+        raise ValueError(f"{README} has no {begin} ... {end}")
+    README.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,272 @@
+"""Agent-steps per second and peak memory, beside other libraries' environments, in one run.
+
+    python benchmarks/throughput.py                          ours alone
+    python benchmarks/throughput.py --peers all --cache DIR  beside mpe2, VMAS and JaxMARL
+    python benchmarks/throughput.py --threads 2 --json FILE
+    python benchmarks/throughput.py --profile                where the time of our step goes
+
+Each environment is a process of its own (`throughput_case.py`). They take turns, so that whatever
+else the machine does meets all of them alike; ratios are taken turn by turn. Peers come from PyPI
+into virtual environments of their own, made where they are missing. The models differ (a peer's
+step is a point mass in the plane over 0.1 s; ours two UAS with battery, 49 waypoints and 11
+obstacles over 1 s): the ratios say what a learner waits for, not who computes better.
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import venv
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from throughput_profile import profile_table
+
+CASE_PROGRAM = Path(__file__).with_name("throughput_case.py")
+
+PEERS = {
+    "mpe2": ("mpe2==1.1.1", "pettingzoo==1.27.0"),
+    "vmas": ("vmas==1.5.2",),
+    "jaxmarl": ("jaxmarl==0.2.0",),
+}
+"""What pip installs for each."""
+
+SYNC_ENVS = 64
+
+console = Console(width=130)
+
+
+@dataclass
+class Case:
+    """One environment, and what it did in each of its turns.
+
+    Attributes:
+        name: A case of `throughput_case.py`.
+        num_envs: How many in one.
+        threads: How many it may use.
+        peer: The library; None: ours.
+        rates: Agent-steps per second, turn by turn.
+        peak_MB: Largest memory of its process so far [MB].
+    """
+
+    name: str
+    num_envs: int
+    threads: int
+    peer: str | None = None
+    rates: list[float] = field(default_factory=list)
+    peak_MB: float = 0.0
+
+
+class CaseFailedError(Exception):
+    """An environment ended instead of answering."""
+
+
+class Player:
+    """The process of a case."""
+
+    def __init__(self, case: Case, python: Path) -> None:
+        self.case = case
+        command = [python, CASE_PROGRAM, case.name, str(case.num_envs), str(case.threads)]
+        self._process = subprocess.Popen(
+            [str(part) for part in command],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def answer(self) -> dict[str, Any]:
+        """What it says next.
+
+        Raises:
+            CaseFailedError: Nothing; with the end of what it wrote.
+        """
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            _, errors = self._process.communicate()
+            last = errors.strip().splitlines()[-1:] or ["no message"]
+            raise CaseFailedError(f"{self.case.name} x {self.case.num_envs}: {last[0]}")
+        return json.loads(line)
+
+    def play(self, seconds: float, clock: str) -> None:
+        """Let it step for some seconds, and note how fast it was."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{seconds}\n")
+        self._process.stdin.flush()
+        answer = self.answer()
+        self.case.rates.append(answer["agent_steps"] / answer[f"{clock}_s"])
+        self.case.peak_MB = answer["peak_MB"]
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.communicate()
+
+
+def cases_of(envs: list[int], threads: list[int], peers: list[str]) -> list[Case]:
+    """What is measured: dictionaries on one thread, the vector environments on each number."""
+    cases = [Case("village-dict", 1, 1)]
+    if "mpe2" in peers:
+        cases.append(Case("mpe2-dict", 1, 1, "mpe2"))
+    if SYNC_ENVS in envs:
+        cases.append(Case("village-sync", SYNC_ENVS, 1))
+    for n_threads in threads:
+        for num_envs in envs:
+            cases.append(Case("village", num_envs, n_threads))
+            cases += [
+                Case(peer, num_envs, n_threads, peer) for peer in peers if peer in ("vmas", "jaxmarl")
+            ]
+    return cases
+
+
+def python_of(peer: str | None, cache: Path) -> Path:
+    """The interpreter with a peer's library, which is installed if it is not there yet.
+
+    Raises:
+        CaseFailedError: pip could not install it.
+    """
+    if peer is None:
+        return Path(sys.executable)
+    folder = cache / "-".join(PEERS[peer]).replace("==", "-")
+    python = folder / ("Scripts" if sys.platform == "win32" else "bin") / "python"
+    installed = folder / "installed"
+    if not installed.exists():
+        console.print(f"installing {', '.join(PEERS[peer])} into {folder}")
+        venv.create(folder, with_pip=True, clear=True)
+        done = subprocess.run(
+            [str(python), "-m", "pip", "install", "-q", *PEERS[peer]],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        if done.returncode:
+            last = done.stderr.strip().splitlines()[-1:] or ["no message"]
+            raise CaseFailedError(f"{peer} could not be installed: {last[0]}")
+        installed.touch()
+    return python
+
+
+def measure(
+    cases: list[Case], turns: int, seconds: float, cache: Path, clock: str
+) -> list[tuple[Case, str]]:
+    """Let all cases take turns; what they did is in them.
+
+    A group of cases that are compared (same numbers of environments and threads) takes its turns
+    together: not more processes are kept in memory than that.
+
+    Returns:
+        The cases that failed, and why.
+    """
+    failed: list[tuple[Case, str]] = []
+    for group in dict.fromkeys((case.num_envs, case.threads) for case in cases):
+        players: list[Player] = []
+        for case in cases:
+            if (case.num_envs, case.threads) != group:
+                continue
+            try:
+                player = Player(case, python_of(case.peer, cache))
+                players.append(player)
+                player.answer()
+                # the first turn is not kept: it finds how many steps a turn has
+                player.play(seconds / 2, clock)
+                case.rates.clear()
+            except CaseFailedError as error:
+                failed.append((case, str(error)))
+        alive = [player for player in players if player.case not in (case for case, _ in failed)]
+        for _ in range(turns):
+            for player in alive:
+                player.play(seconds, clock)
+        for player in players:
+            player.close()
+    return failed
+
+
+def _spread(values: list[float], shown: str) -> str:
+    middle = format(statistics.median(values), shown)
+    return f"{middle} [{format(min(values), shown)} .. {format(max(values), shown)}]"
+
+
+def ratios(case: Case, cases: list[Case]) -> dict[str, list[float]]:
+    """How many times as fast as each peer of its group one of ours is, turn by turn."""
+    if case.peer is not None:
+        return {}
+    return {
+        other.peer: [ours / theirs for ours, theirs in zip(case.rates, other.rates, strict=True)]
+        for other in cases
+        if other.peer is not None
+        and other.rates
+        and case.name.endswith("-dict") == other.name.endswith("-dict")
+        and (other.num_envs, other.threads) == (case.num_envs, case.threads)
+    }
+
+
+def table_of(cases: list[Case]) -> Table:
+    """One row for each case."""
+    table = Table("environment", "envs", "threads", "agent-steps/s [k]", "times a peer", "peak MB")
+    for case in cases:
+        if not case.rates:
+            continue
+        beside = "\n".join(
+            f"{peer}: {_spread(values, '.2f')}" for peer, values in ratios(case, cases).items()
+        )
+        rates = [rate / 1e3 for rate in case.rates]
+        table.add_row(
+            case.name, str(case.num_envs), str(case.threads), _spread(rates, ",.0f"), beside,
+            f"{case.peak_MB:.0f}",
+        )  # fmt: skip
+    return table
+
+
+def main(
+    envs: Annotated[str, typer.Option(help="Numbers of environments.")] = "1,64,1024,16384",
+    threads: Annotated[str, typer.Option(help="Numbers of threads.")] = "1",
+    peers: Annotated[str, typer.Option(help="none, all, or some of mpe2,vmas,jaxmarl.")] = "none",
+    turns: Annotated[int, typer.Option(min=1, help="Turns of each case.")] = 5,
+    seconds: Annotated[float, typer.Option(min=0.01, help="Length of a turn [s].")] = 1.0,
+    clock: Annotated[
+        str, typer.Option(help="wall, or cpu: a process's own time, for one thread when busy.")
+    ] = "wall",
+    cache: Annotated[
+        Path, typer.Option(help="Folder for the virtual environments of peers.")
+    ] = Path(typer.get_app_dir("uas-coverage")) / "peers",
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Also write what was measured.")
+    ] = None,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Only show where the time of our step goes.")
+    ] = False,
+) -> None:
+    """Measure our environments, and peers beside them."""
+    if profile:
+        console.print(profile_table(turns))
+        return
+    chosen = {"none": [], "all": list(PEERS)}.get(peers, peers.split(","))
+    unknown = [peer for peer in chosen if peer not in PEERS]
+    if unknown or clock not in ("wall", "cpu"):
+        wrong = f"peer {unknown[0]!r}" if unknown else f"clock {clock!r}"
+        console.print(f"there is no {wrong}; peers: none, all, {', '.join(PEERS)}; clock: wall, cpu")
+        raise typer.Exit(2)
+    cases = cases_of(
+        [int(part) for part in envs.split(",")], [int(part) for part in threads.split(",")], chosen
+    )
+    failed = measure(cases, turns, seconds, cache, clock)
+    console.print(table_of(cases))
+    for _, why in failed:
+        console.print(f"failed: {why}", markup=False)
+    if json_file is not None:
+        rows = [
+            {**asdict(case), "clock": clock, "ratios": ratios(case, cases)}
+            for case in cases
+            if case.rates
+        ]
+        json_file.write_text(json.dumps(rows, indent=1) + "\n")
+    raise typer.Exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    typer.run(main)
