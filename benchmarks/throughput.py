@@ -2,7 +2,8 @@
 
     python benchmarks/throughput.py                          ours alone
     python benchmarks/throughput.py --peers all --cache DIR  beside mpe2, VMAS and JaxMARL
-    python benchmarks/throughput.py --threads 2 --json FILE
+    python benchmarks/throughput.py --threads 1,2 --json FILE
+    python benchmarks/throughput.py --cuda --envs 1024,16384,131072     on a GPU too
     python benchmarks/throughput.py --profile                where the time of our step goes
 
 Each environment is a process of its own (`throughput_case.py`). They take turns, so that whatever
@@ -24,7 +25,6 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.table import Table
-from throughput_profile import profile_table
 
 CASE_PROGRAM = Path(__file__).with_name("throughput_case.py")
 
@@ -35,7 +35,12 @@ PEERS = {
 }
 """What pip installs for each."""
 
+VECTOR_PEERS = ("vmas", "jaxmarl")
+
 SYNC_ENVS = 64
+"""So many single environments stand for the naive way, `SyncVectorEnv`."""
+
+DEFAULT_CACHE = Path(typer.get_app_dir("uas-coverage")) / "peers"
 
 console = Console(width=130)
 
@@ -50,7 +55,7 @@ class Case:
         threads: How many it may use.
         peer: The library; None: ours.
         rates: Agent-steps per second, turn by turn.
-        peak_MB: Largest memory of its process so far [MB].
+        peak_mb: Largest memory of its process so far [MB].
     """
 
     name: str
@@ -58,7 +63,7 @@ class Case:
     threads: int
     peer: str | None = None
     rates: list[float] = field(default_factory=list)
-    peak_MB: float = 0.0
+    peak_mb: float = 0.0
 
 
 class CaseFailedError(Exception):
@@ -100,7 +105,7 @@ class Player:
         self._process.stdin.flush()
         answer = self.answer()
         self.case.rates.append(answer["agent_steps"] / answer[f"{clock}_s"])
-        self.case.peak_MB = answer["peak_MB"]
+        self.case.peak_mb = answer["peak_mb"]
 
     def close(self) -> None:
         """End the process."""
@@ -108,7 +113,9 @@ class Player:
         self._process.communicate()
 
 
-def cases_of(envs: list[int], threads: list[int], peers: list[str]) -> list[Case]:
+def cases_of(
+    envs: list[int], threads: list[int], peers: list[str], cuda: bool = False
+) -> list[Case]:
     """What is measured: dictionaries on one thread, the vector environments on each number."""
     cases = [Case("village-dict", 1, 1)]
     if "mpe2" in peers:
@@ -119,8 +126,10 @@ def cases_of(envs: list[int], threads: list[int], peers: list[str]) -> list[Case
         for num_envs in envs:
             cases.append(Case("village", num_envs, n_threads))
             cases += [
-                Case(peer, num_envs, n_threads, peer) for peer in peers if peer in ("vmas", "jaxmarl")
+                Case(peer, num_envs, n_threads, peer) for peer in peers if peer in VECTOR_PEERS
             ]
+    if cuda:
+        cases += [Case("village-cuda", num_envs, 1) for num_envs in envs]
     return cases
 
 
@@ -217,7 +226,7 @@ def table_of(cases: list[Case]) -> Table:
         rates = [rate / 1e3 for rate in case.rates]
         table.add_row(
             case.name, str(case.num_envs), str(case.threads), _spread(rates, ",.0f"), beside,
-            f"{case.peak_MB:.0f}",
+            f"{case.peak_mb:.0f}",
         )  # fmt: skip
     return table
 
@@ -233,27 +242,32 @@ def main(
     ] = "wall",
     cache: Annotated[
         Path, typer.Option(help="Folder for the virtual environments of peers.")
-    ] = Path(typer.get_app_dir("uas-coverage")) / "peers",
+    ] = DEFAULT_CACHE,
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write what was measured.")
     ] = None,
+    cuda: Annotated[bool, typer.Option("--cuda", help="On the GPU of this machine too.")] = False,
     profile: Annotated[
         bool, typer.Option("--profile", help="Only show where the time of our step goes.")
     ] = False,
 ) -> None:
     """Measure our environments, and peers beside them."""
     if profile:
+        # only here: it compiles what it measures
+        from throughput_profile import profile_table
+
         console.print(profile_table(turns))
         return
     chosen = {"none": [], "all": list(PEERS)}.get(peers, peers.split(","))
     unknown = [peer for peer in chosen if peer not in PEERS]
     if unknown or clock not in ("wall", "cpu"):
         wrong = f"peer {unknown[0]!r}" if unknown else f"clock {clock!r}"
-        console.print(f"there is no {wrong}; peers: none, all, {', '.join(PEERS)}; clock: wall, cpu")
+        console.print(
+            f"there is no {wrong}; peers: none, all, {', '.join(PEERS)}; clock: wall, cpu"
+        )
         raise typer.Exit(2)
-    cases = cases_of(
-        [int(part) for part in envs.split(",")], [int(part) for part in threads.split(",")], chosen
-    )
+    numbers = [[int(part) for part in text.split(",")] for text in (envs, threads)]
+    cases = cases_of(*numbers, chosen, cuda)
     failed = measure(cases, turns, seconds, cache, clock)
     console.print(table_of(cases))
     for _, why in failed:

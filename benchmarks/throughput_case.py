@@ -18,6 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 N_DRAWN = 32
+N_ON_GPU = 4
 N_AGENTS = 2
 
 Steps = Callable[[int], Callable[[], float]]
@@ -105,10 +106,34 @@ def _village_sync(num_envs: int, threads: int) -> Steps:
     import uas_coverage_env  # noqa: F401  # registers the names
 
     env = gymnasium.make_vec("UASCoverage-v0", num_envs=num_envs, vectorization_mode="sync")
-    return _vector(
-        env,
-        lambda infos: float(sum((uas["status"] == "flying").sum() for uas in infos["uas"].values())),
-    )
+
+    def flying(infos: dict[str, Any]) -> float:
+        fleet = (uas for name, uas in infos["uas"].items() if not name.startswith("_"))
+        return float(sum((uas["status"] == "flying").sum() for uas in fleet))
+
+    return _vector(env, flying)
+
+
+def _village_cuda(num_envs: int, threads: int) -> Steps:
+    import numpy as np
+    from numba import cuda
+    from uas_coverage_env.env.cuda import CudaMissions
+
+    flown = CudaMissions(num_envs)
+    rng = np.random.default_rng(0)
+    # actions lie on the GPU already, as those of a learner there would
+    drawn = [
+        cuda.to_device(rng.uniform(-1, 1, flown.missions.asked.shape)) for _ in range(N_ON_GPU)
+    ]
+
+    def steps(n_steps: int) -> Callable[[], float]:
+        before = int(flown.missions.acted.copy_to_host().sum())
+        for step in range(n_steps):
+            flown.step(drawn[step % N_ON_GPU])
+        cuda.synchronize()
+        return lambda: int(flown.missions.acted.copy_to_host().sum()) - before
+
+    return steps
 
 
 def _mpe2_dict(num_envs: int, threads: int) -> Steps:
@@ -179,13 +204,14 @@ CASES: dict[str, Callable[[int, int], Steps]] = {
     "village-dict": _village_dict,
     "village-sync": _village_sync,
     "village": _village,
+    "village-cuda": _village_cuda,
     "mpe2-dict": _mpe2_dict,
     "vmas": _vmas,
     "jaxmarl": _jaxmarl,
 }
 
 
-def _peak_MB() -> float:
+def _peak_mb() -> float:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1024 if sys.platform != "darwin" else 1024 * 1024)
 
@@ -214,7 +240,7 @@ def main() -> None:
             acted += count()
             wanted_s = min(max(seconds - wall_s, 0.1 * seconds), 0.25 * seconds)
             n_steps = max(1, min(int(n_steps * wanted_s / max(took_s, 1e-6)), 4 * n_steps))
-        answer = {"agent_steps": acted, "wall_s": wall_s, "cpu_s": cpu_s, "peak_MB": _peak_MB()}
+        answer = {"agent_steps": acted, "wall_s": wall_s, "cpu_s": cpu_s, "peak_mb": _peak_mb()}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
 

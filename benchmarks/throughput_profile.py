@@ -46,7 +46,8 @@ def _whole(arena, state, tables, lanes, lane, weights, spare, row):
     step_learners(
         arena, state, VELOCITY, ranges, scales, neighbours, weights, False, False, False,
         lanes.asked[lane], lanes.targets[lane], lanes.candidates[lane], lanes.company[lane],
-        lanes.commands[lane], lanes.outcome[lane], lanes.report[lane], arena.rules[0].max_steps, row,
+        lanes.commands[lane], lanes.outcome[lane], lanes.report[lane],
+        arena.rules[0].max_steps, row,
     )  # fmt: skip
 
 
@@ -107,9 +108,7 @@ def _coverage(arena, state, tables, lanes, lane, weights, spare, row):
 
 @compiled
 def _reward(arena, state, tables, lanes, lane, weights, spare, row):
-    pay(
-        arena, state, lanes.commands[lane], lanes.outcome[lane], weights, False, lanes.report[lane]
-    )
+    pay(arena, state, lanes.commands[lane], lanes.outcome[lane], weights, False, lanes.report[lane])
 
 
 @compiled

@@ -166,7 +166,14 @@ def test_without_the_extra_one_line_names_it(monkeypatch, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
-SAC = ["scenarios.pool=1", "lanes=1", "learning.first_samples=10", "learning.buffer_size=1000"]
+SAC = [
+    "scenarios.pool=1",
+    "lanes=1",
+    "learning.first_samples=10",
+    "learning.buffer_size=1000",
+    "learning.batch_size=16",
+    "learning.updates_per_step=1",
+]
 
 
 @pytest.mark.parametrize("name", [TINY, "sac"])

@@ -9,6 +9,7 @@ from uas_coverage_agents.training.scenarios import (
     validation_scenarios,
 )
 
+from uas_coverage_env.leaderboard.scenario_sets import benchmark_scenario
 from uas_coverage_env.strict_toml import InputError
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
@@ -101,9 +102,7 @@ def test_training_and_validation_share_no_town():
     assert len(seeds[0] | seeds[1] | unseen) == 2 + 2 + 3
 
 
-def test_validation_towns_are_those_of_the_missions_benchmark():
-    scenario = town(VALIDATION, 7)
-    assert 1 <= len(scenario.uas) <= 4
-    assert 20 <= len(scenario.waypoints) <= 60
-    assert 5 <= len(scenario.obstacles) <= 20
-    assert scenario == town(VALIDATION, 7)
+def test_towns_are_drawn_as_the_leaderboard_draws_them():
+    assert [town(VALIDATION, n) for n in (0, 7)] == [
+        benchmark_scenario(VALIDATION.first_seed + n) for n in (0, 7)
+    ]

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
+from uas_coverage_baselines.order import (
+    Beginning,
+    Effort,
+    Order,
+    Task,
+    improved,
+    no_order,
+)
 from uas_coverage_baselines.order import search as search_module
 
 SOME = Effort(20_000)
@@ -237,3 +244,30 @@ def test_one_waypoint_alone_goes_to_somebody():
     assert isinstance(found, Order)
     assert visits(found) == [0]
     assert not len(found.left_out)
+
+
+@few
+@given(seed=seeds, most=st.integers(2, 5))
+def test_searching_the_beginnings_is_searching_the_whole_with_the_rests_as_they_are(seed, most):
+    whole = task(seed, waypoints=14, turn_s=np.zeros((2, 14)))
+    order = improved(whole, no_order(2), Effort(200), seed)
+    part = Beginning.of(whole, order, most)
+    as_it_is = improved(part.task, part.order, Effort(0), 0)
+    assert as_it_is.seconds == pytest.approx(order.seconds)
+    assert as_it_is.cost_s == pytest.approx(order.cost_s)
+    better = improved(part.task, as_it_is, SOME, seed)
+    joined = part.joined(better)
+    assert sorted(np.concatenate(joined.routes)) == list(range(14))
+    if all(map(len, better.routes)):  # setting off for the rest at once is not in `idle_s`
+        assert improved(whole, joined, Effort(0), 0).cost_s == pytest.approx(better.cost_s)
+    for old, new in zip(order.routes, joined.routes, strict=True):
+        if len(old) > most:
+            assert new[len(new) - len(old) + most :].tolist() == old[most:].tolist()
+
+
+def test_short_routes_are_searched_as_a_whole():
+    whole = task(3)
+    order = improved(whole, no_order(2), SOME, 0)
+    part = Beginning.of(whole, order, 8)
+    assert part.task is whole
+    assert [r.tolist() for r in part.joined(order).routes] == [r.tolist() for r in order.routes]

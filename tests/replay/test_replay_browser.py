@@ -174,8 +174,9 @@ def test_a_click_on_a_curve_sets_the_time(browser, page):
     assert 25 < time_s(browser) < 35
 
 
-def test_keys_step_play_and_change_the_view(browser, page, flight):
-    opened(browser, page)
+def test_keys_step_and_play(browser, page, flight):
+    # on the map, which is drawn faster without a graphics card
+    opened(browser, page, moment="#view=map")
     pressed(browser, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
     assert time_s(browser) == 2.0
     pressed(browser, Keys.SHIFT, Keys.ARROW_RIGHT)
@@ -200,6 +201,11 @@ def test_keys_step_play_and_change_the_view(browser, page, flight):
     settled(browser)
     assert time_s(browser) == stopped
 
+    assert complaints(browser) == []
+
+
+def test_keys_change_the_view(browser, page):
+    opened(browser, page)
     overview = pixels(browser, ".stage")
     pressed(browser, "2")
     assert browser.find_elements(By.CSS_SELECTOR, ".card[aria-pressed=true] b")[0].text == "uas_2"
@@ -237,6 +243,19 @@ def test_without_webgl_the_map_is_drawn_with_the_same_slider(browser_without_web
     assert "N 250 m, E 10 m" not in cards(driver)[0]
     assert complaints(driver) == []
     assert requests(driver) == [page.as_uri()]
+
+
+def test_where_the_graphics_card_goes_the_map_comes(browser, page):
+    opened(browser, page)
+    browser.execute_script(
+        "document.querySelector('canvas.scene').getContext('webgl2')"
+        ".getExtension('WEBGL_lose_context').loseContext()"
+    )
+    shown = browser.find_element(By.CSS_SELECTOR, "canvas.map")
+    WebDriverWait(browser, 20).until(lambda _: shown.is_displayed())
+    settled(browser)
+    assert colours(pixels(browser, ".stage")) > 100
+    assert complaints(browser) == []
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])

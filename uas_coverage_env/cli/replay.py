@@ -16,7 +16,7 @@ _PAGE = "replay.html"
 def replay(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
     other: Annotated[
-        Path | None, typer.Argument(metavar="[DIR2]", help="A second flight, shown beside it.")
+        Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
     ] = None,
     video: Annotated[
         Path | None, typer.Option(metavar="FILE.mp4", help="Write a video too (extra `view`).")

@@ -151,3 +151,4 @@ def _report(screen: Console, flight: Flight, directory: Path) -> None:
         )
         screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks", markup=False)
     screen.print(f"flight in {directory}", markup=False)
+    screen.print(f"to watch it: uas-coverage replay {directory}", markup=False)

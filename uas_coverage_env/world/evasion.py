@@ -22,6 +22,7 @@ from uas_coverage_env.world.lookahead import (
     fly_and_brake,
     fly_hold_and_brake,
     peer_slack,
+    required_from,
 )
 
 _TURNS = 12
@@ -43,7 +44,7 @@ def _room_m(arena, step, i, path_m):
     least_m, shortfall_m = _ENOUGH_M, 0.0
     for m in range(arena.moving.shape[0]):
         obstacle = arena.moving[m]
-        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
+        required_m = required_from(arena, step, i, m)
         north_m, east_m, down_m = arena.moving_path_m[step, m]
         north_mps, east_mps, down_mps = arena.moving_velocity_mps[step, m]
         for k in range(n_steps):

@@ -33,6 +33,9 @@ TOLERANCE_M = 1e-3
 PLENTY_M = 2.0
 """More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
 
+SURPRISE_S = 1.0
+"""What moves may turn: its keep-out is widened by how far it goes in this time [s]."""
+
 _STILL = 0.02
 
 
@@ -201,8 +204,20 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
 
 
 @njit(cache=True, error_model="numpy")
+def required_from(arena, step, i, m):
+    """The clearance that UAS i keeps from moving obstacle m [m]: more, the faster that moves."""
+    velocity_mps = arena.moving_velocity_mps[step, m]
+    north_mps, east_mps, down_mps = velocity_mps[0], velocity_mps[1], velocity_mps[2]
+    speed_mps = math.sqrt(north_mps * north_mps + east_mps * east_mps + down_mps * down_mps)
+    required_m = arena.uas[i].radius_m + arena.moving[m].safe_distance_m
+    return required_m + SURPRISE_S * speed_mps
+
+
+@njit(cache=True, error_model="numpy")
 def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     """Least distance to spare from moving obstacles that keep their present velocities.
+
+    What moves may also turn without warning: see `required_from`.
 
     Args:
         arena: The arena.
@@ -221,7 +236,7 @@ def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     velocity_mps = arena.moving_velocity_mps[step]
     for m in range(arena.moving.shape[0]):
         obstacle = arena.moving[m]
-        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
+        required_m = required_from(arena, step, i, m)
         now_m = moving_clearance(
             arena.moving, centre_m, centre_m, m,
             path_m[0, 0], path_m[0, 1], path_m[0, 2], path_m[0, 0], path_m[0, 1], path_m[0, 2],

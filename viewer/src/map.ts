@@ -13,7 +13,10 @@ export class MapView implements View {
   private readonly pen: CanvasRenderingContext2D;
   private readonly low: Point2;
   private readonly high: Point2;
+  private readonly gridStep: number;
   private followed: number | null = null;
+  /** Size of marks: smaller on a small map. */
+  private unit = 1;
   private scale = 1;
   private middle: Point2 = [0, 0];
 
@@ -23,6 +26,8 @@ export class MapView implements View {
     const [north, east] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
     this.low = [Math.min(...north), Math.min(...east)];
     this.high = [Math.max(...north), Math.max(...east)];
+    const extent = Math.max(this.high[0] - this.low[0], this.high[1] - this.low[1]);
+    this.gridStep = roundStep(extent / 4);
   }
 
   resize(): void {
@@ -70,6 +75,7 @@ export class MapView implements View {
 
   private frame(moment: Moment): void {
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    this.unit = Math.min(1, Math.max(0.65, Math.min(width, height) / 500));
     const fit = Math.min(
       (width - 28) / (this.high[1] - this.low[1]),
       (height - 28) / (this.high[0] - this.low[0]),
@@ -119,13 +125,13 @@ export class MapView implements View {
     this.polygon(scene.fence.outline, null, colour("--fence"), 1.8);
     for (const { start, colour: hex } of scene.uas) {
       const [x, y] = this.pixel(start);
-      this.circle(x, y, 5, bright(hex), 1.5);
+      this.circle(x, y, 5 * this.unit, bright(hex), 1.5);
     }
+    this.scaleBar();
   }
 
   private grid(): void {
-    const extent = Math.max(this.high[0] - this.low[0], this.high[1] - this.low[1]);
-    const step = roundStep(extent / 4);
+    const step = this.gridStep;
     for (const axis of [0, 1] as const) {
       const first = Math.ceil(this.low[axis] / step) * step;
       for (let at = first; at <= this.high[axis]; at += step) {
@@ -135,6 +141,10 @@ export class MapView implements View {
         marks.stroke(this.pen, x1, y1, x2, y2, 1, colour("--grid"));
       }
     }
+  }
+
+  private scaleBar(): void {
+    const step = this.gridStep;
     const [x, y] = this.pixel(this.low);
     const end = x + 8 + step * this.scale;
     marks.stroke(this.pen, x + 8, y - 8, end, y - 8, 2, colour("--ink"));
@@ -185,7 +195,7 @@ export class MapView implements View {
       this.circle(x, y, (radius + safe) * this.scale, red, 1.5);
       pen.setLineDash([]);
       const above = y - (radius + safe) * this.scale - 9;
-      marks.words(pen, (kind || name).replaceAll("_", " "), x, above, 11, colour("--ink"));
+      marks.words(pen, (kind || name).replaceAll("_", " "), x, above, 11 * this.unit, colour("--ink"));
     });
   }
 
@@ -194,11 +204,12 @@ export class MapView implements View {
     const { position, attitude, soc, mode } = moment.vehicles[i];
     const { name, colour: hex } = this.flight.scene.uas[i];
     const [x, y] = this.pixel(position);
-    if (mode === "lost") marks.cross(pen, x, y, 10);
-    else if (mode === "landed") marks.landed(pen, x, y, 5, hex);
+    const { unit } = this;
+    if (mode === "lost") marks.cross(pen, x, y, 10 * unit);
+    else if (mode === "landed") marks.landed(pen, x, y, 5 * unit, hex);
     else {
-      marks.charge(pen, x, y, 14, soc, marks.shortName(name), hex);
-      marks.vehicle(pen, x, y, 8, attitude[2], hex);
+      marks.charge(pen, x, y, 14 * unit, soc, marks.shortName(name), hex);
+      marks.vehicle(pen, x, y, 8 * unit, attitude[2], hex);
     }
   }
 }

@@ -71,7 +71,7 @@ export function terrain(scene: Scene, extent: Extent): Group {
   const west = Math.min(...extent.corners.map((corner) => corner.x));
   group.add(sign("N", new Vector3(centre.x, ground, -north - 0.09 * half), 0.16 * half));
   const step = `grid ${roundStep(half / 2)} m`;
-  group.add(sign(step, new Vector3(west + 0.5 * roundStep(half / 2), ground, -south + 0.06 * half), 0.17 * half));
+  group.add(sign(step, new Vector3(west + 0.5 * roundStep(half / 2), ground, -south + 0.08 * half), 0.26 * half));
   const fence = new EdgesGeometry(bodyGeometry(scene.fence), 1);
   group.add(new LineSegments(fence, new LineBasicMaterial({ color: colour("--fence") })));
   return group;

@@ -33,7 +33,6 @@ from uas_coverage_env.world import (
     Command,
     GoTo,
     SwarmState,
-    Velocity,
     World,
     WorldState,
     build_arena,
@@ -121,17 +120,13 @@ class WaypointPilot:
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Keep the targets that are still good, and choose those that are missing."""
         self._decide(swarm)
-        return {
-            name: self._command(int(self._targets[i]), -float(swarm.x[i, Z]))
-            for i, name in enumerate(swarm.names)
-            if name in swarm.active
-        }
+        return {name: self._command(swarm.names.index(name)) for name in swarm.active}
 
-    @staticmethod
-    def _command(target: int, altitude_m: float) -> Command:
-        if target == NO_TARGET:  # return mode has taken over before there was one
-            return Velocity(0.0, 0.0, altitude_m, mode="return")
-        return GoTo(None) if target == HOME else GoTo(target, mode="covering")
+    def _command(self, i: int) -> Command:
+        # whom return mode has called is sent home by us too: the world may fly without it
+        if self._returning[i] or self._targets[i] == HOME:
+            return GoTo(None)
+        return GoTo(int(self._targets[i]), mode="covering")
 
     def _decide(self, swarm: SwarmState) -> None:
         """Let everybody choose who needs a target now."""

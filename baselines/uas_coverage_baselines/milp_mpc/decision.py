@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.construction import Flight, flights, target_cost, teams
+from uas_coverage_baselines.milp_mpc.construction import Flight, flights, teams
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.program import ALONG, NARROW, NEVER, WIDE, Nearness, Program
 from uas_coverage_baselines.milp_mpc.solvers import (
@@ -28,7 +28,12 @@ from uas_coverage_baselines.milp_mpc.solvers import (
     Start,
     solver_named,
 )
-from uas_coverage_baselines.milp_mpc.standby import as_flight, standby_plans, visits
+from uas_coverage_baselines.milp_mpc.standby import (
+    as_flight,
+    left_over_flights,
+    standby_plans,
+    visits,
+)
 from uas_coverage_baselines.milp_mpc.turns import Turns
 from uas_coverage_baselines.milp_mpc.verify import first_trouble, trouble_between
 
@@ -370,27 +375,6 @@ class _Search:
         """Until the decision's time is up, less what is kept for afterwards."""
         limit = (1.0 - _RESERVE) * self.effort.time_limit_s
         return limit - (time.perf_counter() - self._began)
-
-
-def left_over_flights(problem: PlanningProblem, left: Plan, dt_s: float) -> list[Flight]:
-    """What is left of the previous plan as flights; beyond its end at falling velocity."""
-    result = []
-    for row, name in enumerate(problem.names):
-        path = problem.x0[row, None, :3]
-        velocity = np.zeros(3)
-        visit = np.full(problem.n_waypoints, NEVER, np.int64)
-        if name in left.names:
-            old = left.of(name)
-            path, velocity = left.x[old, : problem.horizon + 1, 0:3], left.x[old, -1, 3:6]
-            for w, index in enumerate(problem.waypoint_index):
-                steps = np.flatnonzero(left.covers[old, :, index])
-                if len(steps):
-                    visit[w] = steps[0]
-        beyond = np.arange(1, problem.horizon + 2 - len(path))[:, None]
-        path = np.vstack([path, path[-1] + 0.5 * dt_s * velocity * beyond])
-        cost = float(target_cost(problem, row, path[None], visit[None])[0])
-        result.append(Flight(path, visit, cost, 0.0))
-    return result
 
 
 def _joined(problem: PlanningProblem, plans: Sequence[Plan]) -> Plan:

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.problem import Tour
 from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
-from uas_coverage_baselines.order import Effort, Legs, Order, Task, improved, no_order
+from uas_coverage_baselines.order import (
+    Beginning,
+    Effort,
+    Legs,
+    Order,
+    Task,
+    improved,
+    no_order,
+)
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import SwarmState
@@ -22,6 +30,7 @@ _MOVES_AT_MOST = 4_000_000
 _MOVES_AFTERWARDS = 60_000  # of each decision's, at most
 _MOVES_PER_S = 30_000  # of the decision's time limit, over all threads
 _FIRST_SEARCHES = 3
+_SEARCHED_AGAIN = 60  # waypoints of each route, at most, at every decision
 _WORTH_CHANGING_S = 0.5
 _RESERVE_S = 25.0  # flight time to come home with, as the OCP's reserve asks for
 _WAIT_WHEN_LEFT_S = 60.0  # with less than this still to go, blocked waypoints are waited for
@@ -97,9 +106,11 @@ class OrderGuide:
         task = self._task(swarm)
         effort = Effort(self._moves, hottest_s=1.5, window=24)
         kept = improved(task, previous, Effort(0), 0)
-        better = improved(task, kept, effort, swarm.step)
-        worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
-        self._order = better if worthwhile else kept
+        part = Beginning.of(task, kept, _SEARCHED_AGAIN)
+        first = kept if part.task is task else improved(part.task, part.order, Effort(0), 0)
+        better = improved(part.task, first, effort, swarm.step)
+        worthwhile = better.cost_s < first.cost_s - _WORTH_CHANGING_S
+        self._order = part.joined(better) if worthwhile else kept
 
     def tours(self, names: Sequence[str]) -> list[NDArray[np.int64]]:
         """Per UAS the waypoints (the scenario's rows) that its next decision is about."""

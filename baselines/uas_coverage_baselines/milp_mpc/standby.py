@@ -61,6 +61,25 @@ def as_flight(problem: PlanningProblem, uas: int, plan: Plan) -> Flight:
     return Flight(plan.x[0, :, 0:3], visit, plan.objective + float(gained.sum()), 0.0)
 
 
+def left_over_flights(problem: PlanningProblem, left: Plan, dt_s: float) -> list[Flight]:
+    """What is left of the previous plan as flights; beyond its end at falling velocity."""
+    result = []
+    for row, name in enumerate(problem.names):
+        path = problem.x0[row, None, :3]
+        velocity = np.zeros(3)
+        visit = np.full(problem.n_waypoints, NEVER, np.int64)
+        if name in left.names:
+            old = left.of(name)
+            path, velocity = left.x[old, : problem.horizon + 1, 0:3], left.x[old, -1, 3:6]
+            covers = left.covers[old][:, problem.waypoint_index]
+            visit = np.where(covers.any(axis=0), covers.argmax(axis=0), NEVER)
+        beyond = np.arange(1, problem.horizon + 2 - len(path))[:, None]
+        path = np.vstack([path, path[-1] + 0.5 * dt_s * velocity * beyond])
+        cost = float(target_cost(problem, row, path[None], visit[None])[0])
+        result.append(Flight(path, visit, cost, 0.0))
+    return result
+
+
 def visits(problem: PlanningProblem, plan: Plan) -> NDArray[np.int64]:
     """(U, W) step at which the plan covers each of the problem's waypoints, `NEVER` if not."""
     covers = plan.covers[:, :, problem.waypoint_index]

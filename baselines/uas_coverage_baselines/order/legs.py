@@ -57,7 +57,7 @@ class Legs:
         )
 
     def from_here_s(self, uas: int, position_m: FloatArray) -> FloatArray:
-        """(W,) leg times from a position of a UAS to every waypoint, past obstacles to near ones."""
+        """(W,) leg times from a position to every waypoint; to near ones past obstacles."""
         speeds = self._speeds[self.kind[uas]]
         here = np.broadcast_to(position_m, self.waypoints_m.shape)
         result = _straight_s(here, self.waypoints_m, self._credit_m, speeds)

@@ -8,15 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from uas_coverage_baselines.tour.flight_plan import (
-    LEGS,
-    SAFE_BELOW_S,
-    SLOWER,
-    Task,
-    brake_seconds,
-    empty_plan,
-    improve,
-)
+from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
+from uas_coverage_baselines.tour.flight_plan import improve
+from uas_coverage_baselines.tour.pursuit import LEGS, Task, brake_seconds, empty_plan
 from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision

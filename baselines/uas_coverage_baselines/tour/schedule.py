@@ -18,8 +18,8 @@ LANDING_S = 3.0  # from full speed over the start to rest on it
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 _RESERVE_S = 30.0  # what return mode asks for beyond the way home at full speed
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
-_OPENS_AFTER = 0.9  # share of the flight that is left, after which what is blocked may be open
-_OPENS_AFTER_S = 10.0  # and at least so long
+_WAIT_WHEN_LEFT_S = 60.0  # with less than this still to fly, blocked waypoints are waited for
+_WAIT_S = 30.0  # how long is then expected
 _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 200_000  # of a search on an event
 _WORTH_CHANGING_S = 1.0
@@ -63,13 +63,11 @@ class Schedule:
         self._turn_s = np.zeros((len(limits), len(scenario.waypoints)))
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
         self.order = no_order(len(limits))
-        self._home_at_s = np.zeros(len(limits))
+        self._waits = False  # whether blocked waypoints are waited for: little else is left
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
         self._seed = seed
-        if view.blocked.any():  # how late is late, is known once there is an order
-            self._take(improved(self.task(view), self.order, Effort(self._moves), seed), view)
         task = self.task(view)
         orders = [
             improved(task, no_order(task.n_uas), Effort(self._moves), seed + attempt)
@@ -83,7 +81,10 @@ class Schedule:
         routes = tuple(route[open_[route]] for route in self.order.routes)
         left_out = self.order.left_out[open_[self.order.left_out]]
         self.order = Order(routes, left_out, self.order.seconds, self.order.cost_s)
-        if self._has_changed(view):
+        waits = self._waits
+        left_s = (self._expected_home_s(view) - view.time_s)[view.may_work]
+        self._waits |= bool((left_s < _WAIT_WHEN_LEFT_S).all())
+        if self._has_changed(view) or (self._waits and not waits and view.blocked.any()):
             task = self.task(view)
             kept = improved(task, self.order, Effort(0), 0)
             effort = Effort(_MOVES_AGAIN, hottest_s=1.5)
@@ -93,7 +94,6 @@ class Schedule:
 
     def _take(self, order: Order, view: View) -> None:
         self.order = order
-        self._home_at_s = view.time_s + order.seconds
         self._taken_under = view
         self._expected_s = self._expected_home_s(view)
 
@@ -136,7 +136,9 @@ class Schedule:
         if not len(route):
             return self._legs.way_home_s(uas, position_m)
         first_m = self._legs.waypoints_m[route[0]] - position_m
-        return float(np.linalg.norm(first_m[:2]) / self.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0])
+        return float(
+            np.linalg.norm(first_m[:2]) / self.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
+        )
 
     def task(self, view: View) -> Task:
         """The routing problem of a moment."""
@@ -146,13 +148,13 @@ class Schedule:
         idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
         uas = self._arena.uas
         budget_s = (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"] - _RESERVE_S
-        opens_s = np.zeros(len(view.blocked))
-        # nobody knows when: late enough not to be waited for, soon enough to be thought of
-        work_s = (self._expected_home_s(view) - view.time_s)[view.may_work]
-        if len(work_s):
-            opens_s[view.blocked] = max(_OPENS_AFTER * work_s.mean(), _OPENS_AFTER_S)
+        # nobody knows when a blocked waypoint opens: it is left aside as long as there is other
+        # work, since an order that waits has no reason to be quick with the rest
+        wanted = view.uncovered
+        if not self._waits and (wanted & ~view.blocked).any():
+            wanted = wanted & ~view.blocked
         return Task(
-            open_waypoints=np.flatnonzero(view.uncovered),
+            open_waypoints=np.flatnonzero(wanted),
             first_s=first_s,
             between_s=legs.between_s,
             kind=legs.kind,
@@ -167,6 +169,6 @@ class Schedule:
             turn_s=self._turn_s,
             neighbours=legs.neighbours,
             weight=self._weight,
-            not_before_s=opens_s,
+            not_before_s=np.where(view.blocked, _WAIT_S, 0.0),
             budget_s=np.where(view.may_work, budget_s, -np.inf),
         )

@@ -1,0 +1,60 @@
+"""The beginning of an order as a task of its own: what comes much later need not be searched again.
+
+Evaluating a route takes as long as it is, so that searching at every decision would cost the more
+the larger the mission. The order of what comes later was searched before take-off; here it stays as
+it is, and the routes' first waypoints are ordered towards it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.order.search import Order
+from uas_coverage_baselines.order.task import Task
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """The first waypoints of every route, each UAS's home being what follows them.
+
+    Attributes:
+        task: the routing problem of these waypoints alone.
+        order: their order.
+        rests: (U) what follows in each route.
+    """
+
+    task: Task
+    order: Order
+    rests: tuple[NDArray[np.int64], ...]
+
+    @classmethod
+    def of(cls, task: Task, order: Order, most: int) -> Beginning:
+        """The first `most` waypoints of each route of an order."""
+        rests = tuple(route[most:] for route in order.routes)
+        if not any(map(len, rests)):
+            return cls(task, order, rests)
+        first = tuple(route[:most] for route in order.routes)
+        home_s, idle_s, start_m = task.home_s.copy(), task.idle_s.copy(), task.start_m.copy()
+        for uas, rest in enumerate(rests):
+            if len(rest):
+                between = task.between_s[task.kind[uas]]
+                rest_s = between[rest[:-1], rest[1:]].sum() + task.home_s[uas, rest[-1]]
+                home_s[uas] = between[:, rest[0]] + rest_s
+                idle_s[uas] = task.first_s[uas, rest[0]] + rest_s
+                start_m[uas] = task.waypoints_m[rest[0], :2]
+        part = replace(
+            task,
+            open_waypoints=np.concatenate([*first, order.left_out]),
+            home_s=home_s,
+            idle_s=idle_s,
+            start_m=start_m,
+        )
+        return cls(part, replace(order, routes=first), rests)
+
+    def joined(self, order: Order) -> Order:
+        """The whole order again, with the beginnings as `order` has them."""
+        routes = zip(order.routes, self.rests, strict=True)
+        return replace(order, routes=tuple(np.concatenate(parts) for parts in routes))

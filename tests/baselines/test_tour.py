@@ -1,0 +1,134 @@
+import numpy as np
+import pytest
+
+from uas_coverage_baselines.tour import Tour, TourOptions
+from uas_coverage_baselines.tour.schedule import Schedule, View
+from uas_coverage_env import load_scenario, rollout
+from uas_coverage_env.flight import Assistants
+from uas_coverage_env.scenario import Scenario, generate_scenario
+from uas_coverage_env.world import LOST, World, build_arena
+
+QUICK = {"moves": 20_000, "changes": 60}
+
+
+@pytest.fixture(scope="module")
+def village():
+    return load_scenario("village")
+
+
+@pytest.fixture(scope="module")
+def small_town():
+    return generate_scenario(3, n_uas=2, n_waypoints=12, n_obstacles=4)
+
+
+def changed(scenario, **fields):
+    return Scenario.model_validate(scenario.model_dump(by_alias=True) | fields)
+
+
+def view_of(scenario, **changes):
+    swarm = World(scenario).swarm_state()
+    flies = np.ones(len(swarm.names), np.bool_)
+    fields = {
+        "x": swarm.x,
+        "may_work": flies,
+        "flies": flies,
+        "uncovered": swarm.uncovered,
+        "blocked": np.zeros_like(swarm.uncovered),
+        "time_s": 0.0,
+    }
+    return View(**(fields | changes))
+
+
+def schedule_of(scenario, view, moves=20_000):
+    schedule = Schedule(scenario, build_arena(scenario), moves)
+    schedule.begin(view, 0)
+    return schedule
+
+
+def test_it_accomplishes_a_small_town_without_coming_too_near_to_anything(small_town):
+    flight = rollout(small_town, Tour(TourOptions(**QUICK)))
+    assert flight.covered[-1] == 12
+    assert flight.violations == ()
+    assert flight.breaches == 0
+    assert all(modes[-1] == "landed" for modes in np.array(flight.mode).T)
+
+
+def test_it_is_faster_than_flying_to_the_nearest_waypoint(small_town):
+    ours = rollout(small_town, Tour(TourOptions(**QUICK)))
+    assert ours.steps < rollout(small_town, "nearest-waypoint").steps
+
+
+def test_the_same_seed_flies_the_same_mission(small_town):
+    flights = [rollout(small_town, Tour(TourOptions(**QUICK)), seed=5, max_steps=25) for _ in "ab"]
+    np.testing.assert_array_equal(flights[0].x, flights[1].x)
+
+
+def test_every_waypoint_is_on_one_route(village):
+    schedule = schedule_of(village, view_of(village))
+    on_routes = np.concatenate([*schedule.order.routes, schedule.order.left_out])
+    assert sorted(on_routes) == list(range(49))
+    assert len(schedule.order.left_out) == 0
+
+
+def test_a_weak_battery_gets_a_short_route(village):
+    weak = [village.uas[0].model_dump(), {**village.uas[1].model_dump(), "soc_0": 0.33}]
+    scenario = changed(village, uas=weak)
+    first, second = schedule_of(scenario, view_of(scenario)).order.routes
+    assert len(second) < 15 < len(first)
+
+
+def test_a_blocked_waypoint_waits_until_little_else_is_left(village):
+    blocked = np.zeros(49, np.bool_)
+    blocked[27] = True
+    schedule = schedule_of(village, view_of(village, blocked=blocked))
+    assert 27 not in np.concatenate(schedule.order.routes)
+    few = np.zeros(49, np.bool_)
+    few[[26, 27, 28]] = True
+    schedule.update(view_of(village, blocked=blocked, uncovered=few, time_s=100.0))
+    assert 27 in np.concatenate(schedule.order.routes)
+
+
+def test_who_is_lost_leaves_its_waypoints_to_the_others(village):
+    schedule = schedule_of(village, view_of(village))
+    alone = np.array([True, False])
+    schedule.update(view_of(village, may_work=alone, flies=alone, time_s=1.0))
+    assert len(schedule.order.routes[1]) == 0
+    assert len(schedule.order.routes[0]) + len(schedule.order.left_out) == 49
+
+
+def test_a_lost_uas_gets_no_command_and_the_other_goes_on(small_town):
+    planner = Tour(TourOptions(**QUICK))
+    planner.reset(small_town, 0)
+    world = World(small_town)
+    assert set(planner.act(world.swarm_state())) == {"uas_1", "uas_2"}
+    world.state.status[1] = LOST
+    assert set(planner.act(world.swarm_state())) == {"uas_1"}
+
+
+def test_a_predicted_flight_begins_where_the_uas_is_and_comes_true(small_town):
+    planner = Tour(TourOptions(**QUICK))
+    planner.reset(small_town, 0)
+    world = World(small_town, safety_filter=True)
+    for _ in range(6):
+        swarm = world.swarm_state()
+        commands = planner.act(swarm)
+        assert planner.last_decision is not None
+        for i, name in enumerate(swarm.names):
+            predicted_m = planner.last_decision.predicted_m[name]
+            np.testing.assert_allclose(predicted_m[0], swarm.x[i, :3])
+        expected_m = [planner.last_decision.predicted_m[n][1] for n in swarm.names]
+        world.step(commands)
+        np.testing.assert_allclose(world.state.x[:, :3], expected_m, atol=1e-6)
+
+
+def test_it_flies_with_the_filter_and_brings_everybody_home_itself():
+    assert Tour().assistants == Assistants(return_mode=False, safety_filter=True)
+
+
+@pytest.mark.slow
+def test_the_village_is_covered_in_little_more_than_the_best_plan_known(village):
+    flight = rollout(village, Tour())
+    assert flight.covered[-1] == 49
+    assert flight.violations == ()
+    assert flight.breaches == 0
+    assert flight.steps <= 195
