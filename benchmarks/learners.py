@@ -1,6 +1,6 @@
 """What the shipped policies cost and how they fly: trains, scores and draws what is published.
 
-    python benchmarks/learners.py                # everything in agents/README.md, some hours
+    python benchmarks/learners.py                # everything in agents/README.md, an hour
     python benchmarks/learners.py ppo --seeds 3  # one learner
     python benchmarks/learners.py --publish      # and ship the policy of seed 0
 

@@ -364,3 +364,9 @@ def test_flights_that_come_too_close_make_no_good_team():
 
 def _as_flight(x):
     return Flight(x[:, :3], np.zeros(0, np.int64), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("sides", [0, 3, 6, 10])
+def test_norms_are_limited_by_faces_that_a_quarter_turn_maps_onto_each_other(problem, sides):
+    with pytest.raises(ValueError, match=f"physical_sides = {sides}: give a multiple of 4"):
+        dataclasses.replace(problem, physical_sides=sides)

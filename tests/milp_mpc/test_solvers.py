@@ -4,6 +4,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from uas_coverage_baselines.milp_mpc.ocp import formulate
 from uas_coverage_baselines.milp_mpc.solvers import (
     SOLVERS,
     TOLERANCE,
+    SolverError,
     SolverLimits,
     SolveStatus,
     interface,
@@ -24,6 +26,7 @@ from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 from uas_coverage_env import InputError
 from uas_coverage_env.cli import main
+from uas_coverage_env.flight.rollout import _versions
 
 PACKAGES = {"highs": "highspy", "scip": "pyscipopt", "gurobi": "gurobipy"}
 
@@ -291,3 +294,17 @@ def test_a_program_beyond_gurobis_licence_is_one_line():
         return
     assert "2001 columns and 0 rows" in message
     assert "\n" not in message
+
+
+def test_a_program_that_highs_refuses_is_the_solver_s_error():
+    milp = Milp()
+    milp.variables("x", (2,), lower=0.0, upper=1.0)
+    built = milp.build()
+    broken = replace(built, cost=built.cost[:1])
+    with pytest.raises(SolverError, match="refuses"):
+        solver_named("highs")(broken, SolverLimits(), lower=built.lower, upper=built.upper)
+
+
+def test_the_flight_record_names_the_version_of_every_solver_installed():
+    installed = {name for name in ("highspy", "pyscipopt", "gurobipy") if find_spec(name)}
+    assert installed <= set(_versions())
