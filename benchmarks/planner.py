@@ -262,14 +262,23 @@ def growth(
         ("UAS", [(count, max(waypoint_counts[0], 8 * count)) for count in uas_counts]),
     ):
         table = _decision_table(f"{planner} against the number of {title}")
+        table.add_column("planned anew")
         p95_s = []
         for n_uas, n_waypoints in sizes:
             pilot = load_planner(planner, _options(option))
             town = _town(seed, n_uas, n_waypoints)
             with console.status(town.name):
-                flight = rollout(town, pilot, seed=seed, max_steps=steps)
+                anew: list[int] = []
+                flight = rollout(
+                    *(town, pilot),
+                    seed=seed,
+                    max_steps=steps,
+                    on_step=lambda _, pilot=pilot, anew=anew: anew.append(_planned_anew(pilot)),
+                )
             table.add_row(
-                f"{n_uas} UAS, {n_waypoints} waypoints", *_decision_cells(flight, _limit_s(pilot))
+                *(f"{n_uas} UAS, {n_waypoints} waypoints",),
+                *_decision_cells(flight, _limit_s(pilot)),
+                f"{np.mean(anew[1:]):.1f} of {n_uas}",
             )
             p95_s.append(np.percentile([d.duration_s for d in flight.decisions], 95))
         console.print(table)
@@ -307,6 +316,12 @@ def _decision_cells(flight: Flight, limit_s: float) -> list[str]:
         f"{sum(decision.fallback for decision in flight.decisions)}",
         f"{len(flight.violations)}",
     ]
+
+
+def _planned_anew(planner: object) -> int:
+    """How many UAS have a new plan from the last decision; planners without plans have none."""
+    plan = getattr(planner, "plan", None)
+    return 0 if plan is None else len(plan.renewed)
 
 
 def _limit_s(planner: object) -> float:

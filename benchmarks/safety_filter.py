@@ -33,9 +33,9 @@ from missions import mission_scenario
 from rich.console import Console
 from rich.table import Table
 from scipy.stats import beta
-
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
+
 from uas_coverage_env import Scenario
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import CONTACT_NAMES, Command, SwarmState, World

@@ -68,6 +68,19 @@ def test_a_policy_that_nobody_can_fly_is_refused(tmp_path, changes, words):
         load_planner(f"policy:{tmp_path / 'policy'}")
 
 
+def test_the_words_about_an_observation_may_change_and_its_numbers_may_not():
+    view = describe().observation
+    group = view.groups[0]
+    reworded = group.features[0].model_copy(update={"meaning": "said in another way"})
+    narrowed = group.features[0].model_copy(update={"low": -0.5})
+    for feature, same in ((reworded, True), (narrowed, False)):
+        features = (feature, *group.features[1:])
+        groups = (group.model_copy(update={"features": features}), *view.groups[1:])
+        assert view.model_copy(update={"groups": groups}).has_the_numbers_of(view) == same
+    scales = view.scales | {"ray_m": 81.0}
+    assert not view.model_copy(update={"scales": scales}).has_the_numbers_of(view)
+
+
 def test_planners_of_a_kind_are_named_with_their_argument(directory):
     assert "policy" not in registry.planner_names()
     described = {planner.name: planner for planner in describe_planners()}

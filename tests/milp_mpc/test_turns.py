@@ -58,13 +58,13 @@ def test_one_after_the_other_gets_a_new_plan_and_the_others_go_on(problem):
 
 
 def test_a_mixed_fleet_whose_uas_take_turns_covers_everything_and_comes_home():
-    places = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]
-    scenario = mission(places, [(20.0, 20.0, -1.0), (20.0, 180.0, -1.0)])
+    places = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(4)]
+    scenario = mission(places, [(20.0, 20.0, -1.0), (20.0, 150.0, -1.0)])
     data = scenario.model_dump(by_alias=True)
     data["uas"][1].update(vehicle="hexacopter", radius_m=0.6)
     scenario = type(scenario).model_validate(data)
     assert scenario.vehicles == (load_vehicle("s500_v2"), load_vehicle("hexacopter"))
-    planner = MilpMpcGuided(Options(deterministic=True, horizon=10, at_once=1))
+    planner = MilpMpcGuided(Options(deterministic=True, horizon=8, at_once=1))
     flight = rollout(scenario, planner, seed=0)
     assert accomplished(flight)
     assert not flight.breaches

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, mover
 
-from uas_coverage_env.scenario import generate_scenario, load_scenario
+from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
 from uas_coverage_env.vehicle import VX, VY, X, Y
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
+    CONTACT_NAMES,
     KIND_NAMES,
     LANDED,
     Acceleration,
@@ -181,6 +182,70 @@ def test_a_uas_gets_out_of_the_way_of_a_moving_obstacle():
         outcomes = list(fly(world, Velocity(0.0, 0.0, 8.0), 25))
         hit.append(any(outcome["contact"].any() for outcome in outcomes))
     assert hit == [False, True]
+
+
+@pytest.mark.parametrize("speed_mps", [4.0, 8.0])
+@pytest.mark.parametrize("aside_m", [0.0, 6.0, -12.0])
+def test_who_hovers_keeps_the_safe_distance_from_something_large_that_comes(speed_mps, aside_m):
+    airship = mover(
+        (190.0, 100.0 + aside_m, -15.0),
+        (0.0, (-speed_mps, 0.0, 0.0)),
+        radius_m=8.0,
+        height_m=12.0,
+        safe_distance_m=12.0,
+    )
+    world = World(meadow([(80.0, 100.0, -15.0)], moving_obstacles=[airship]), safety_filter=True)
+    outcomes = list(fly(world, Velocity(0.0, 0.0, 15.0), 40))
+    assert sum(int(outcome["breaches"].sum()) for outcome in outcomes) == 0
+
+
+def test_getting_out_of_the_way_is_not_paid_for_with_the_fence_a_wall_or_another_uas():
+    wall = box("wall", (60.0, 1.0, -48.0), (140.0, 4.0, 0.0))
+    starts = [(100.0, 10.0, -10.0), (100.0, 18.0, -10.0), (108.0, 14.0, -10.0)]
+    truck = mover(
+        (100.0, 60.0, -10.0), (0.0, (0.0, -9.0, 0.0)), radius_m=10.0, height_m=30.0,
+        safe_distance_m=8.0,
+    )  # fmt: skip
+    scenario = meadow(starts, obstacles=[wall], moving_obstacles=[truck])
+    world = World(scenario, safety_filter=True)
+    for outcome in fly(world, Velocity(0.0, 0.0, 10.0), 20):
+        assert set(outcome["contact"]) <= {
+            CONTACT_NAMES.index(n) for n in ("none", "moving_obstacle")
+        }
+        assert outcome["separation_m"].min() >= 5.72 - 1e-6
+
+
+def test_things_that_turn_without_warning_drive_nobody_into_what_stands_still():
+    world = World(restless(SCENARIOS["town_5"]()), safety_filter=True)
+    for seed in range(4):
+        assert lost_to(world, seed) <= {CONTACT_NAMES.index("moving_obstacle")}
+
+
+def restless(scenario):
+    """Two fast cylinders that turn every five seconds."""
+    lots = np.random.default_rng(9)
+    corners_m = scenario.fence.vertices_m
+    movers = []
+    for number in (1, 2):
+        place_m = np.append(lots.uniform(0.4, 0.6, 2) * corners_m[:, :2].max(axis=0), -20.0)
+        pieces = [(5.0 * k, (*lots.uniform(-12.0, 12.0, 2), 0.0)) for k in range(30)]
+        movers.append(mover(tuple(place_m), *pieces, safe_distance_m=8.0, name=f"mover_{number}"))
+    data = scenario.model_dump(by_alias=True) | {"moving_obstacles": movers}
+    return Scenario.model_validate(data)
+
+
+def lost_to(world, seed):
+    """Contact codes of a mission of random velocities, without "none"."""
+    rng = np.random.default_rng(seed)
+    world.reset()
+    commands = np.zeros(len(world.names), COMMAND_DTYPE)
+    codes = set()
+    for _ in range(100):
+        if world.done:
+            break
+        draw(rng, world, commands, (VELOCITY,))
+        codes |= set(world.step(commands)["contact"].tolist())
+    return codes - {0}
 
 
 def test_the_ceiling_and_the_ground_hold_back_climbs_and_descents():

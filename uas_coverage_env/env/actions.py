@@ -23,11 +23,11 @@ from typing import Any, Protocol
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.layout import K_WAYPOINTS
 from uas_coverage_env.env.nearest import NO_TARGET
+from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, Z
 from uas_coverage_env.world import HOME
@@ -78,8 +78,8 @@ class Actions(Protocol):
         """A new space of the whole swarm."""
         ...
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
-        """Write an action into row i of `asked` (U, size), not yet known to be finite.
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
+        """Write an action into `asked` (size,), not yet known to be finite.
 
         Raises:
             ValueError: It has a wrong type or shape; names UAS and value.
@@ -111,7 +111,7 @@ class Continuous:
         """The boxes of all UAS, one after the other."""
         return spaces.Box(-1.0, 1.0, (n_uas * self.size,), np.float32)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
         """Write the numbers; any real numbers in the right shape will do."""
         if type(action) is not np.ndarray:
             action = _as_array(name, action)
@@ -119,12 +119,12 @@ class Continuous:
             raise ValueError(
                 f"action of {name} has dtype {action.dtype}: {_shown(action)}; give real numbers"
             )
-        if action.shape != (self.size,):
+        if action.shape != asked.shape:
             raise ValueError(
                 f"action of {name} has shape {action.shape}: {_shown(action)}; "
                 f"give {self.size} numbers, shape ({self.size},)"
             )
-        asked[i] = action
+        asked[:] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One row of numbers for each UAS."""
@@ -153,7 +153,7 @@ class Choice:
         """One choice for each UAS."""
         return spaces.MultiDiscrete([HOME_CHOICE + 1] * n_uas)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
         """Write the choice; any whole number in range will do, also as an array without axes."""
         if isinstance(action, np.ndarray) and action.shape == ():
             action = action[()]
@@ -163,7 +163,7 @@ class Choice:
                 f"action of {name} is {_shown(action)} of type {type(action).__name__}; "
                 f"give a whole number from 0 to {HOME_CHOICE} (home)"
             )
-        asked[i] = action
+        asked[:] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One choice for each UAS."""
@@ -237,7 +237,7 @@ def _wrench_range(vehicle: VehicleParams, _: Range) -> tuple[Range, ...]:
     return lift, *((-torque, 0.0, torque) for torque in torques)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def first_not_finite(asked):
     """Index of the first UAS that was asked for something not finite; -1 if none was."""
     for i in range(asked.shape[0]):
@@ -247,7 +247,7 @@ def first_not_finite(asked):
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def write_commands(state, kind, ranges, asked, candidates, targets, commands):
     """Turn what was asked into commands.
 
@@ -264,15 +264,16 @@ def write_commands(state, kind, ranges, asked, candidates, targets, commands):
         command = commands[i]
         command.kind = kind
         command.returning = False
-        command.values[:] = 0.0
+        for k in range(4):
+            command.values[k] = 0.0
         if kind != GO_TO:
             for k in range(asked.shape[1]):
                 share = min(max(asked[i, k], -1.0), 1.0)
                 middle = ranges[i].middle[k]
+                reach = ranges[i].highest[k] - middle
                 if share < 0.0:
-                    command.values[k] = middle + share * (middle - ranges[i].lowest[k])
-                else:
-                    command.values[k] = middle + share * (ranges[i].highest[k] - middle)
+                    reach = middle - ranges[i].lowest[k]
+                command.values[k] = middle + share * reach
             continue
         choice = int(asked[i, 0])
         if choice == HOME_CHOICE:

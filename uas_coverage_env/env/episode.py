@@ -61,6 +61,7 @@ class Episode:
         chooses: Whether the action is a choice of waypoints.
         steps: Flown since t = 0.
         asked: (U, size) the actions of the coming step, to be written before it.
+        asked_rows: Its rows, one view for each UAS.
         observation: (U, OBSERVATION_SIZE) the latest; a new array in every step.
 
     Raises:
@@ -113,7 +114,8 @@ class Episode:
         self._commands = np.zeros(n_uas, dtype=COMMAND_DTYPE)
         self._outcome = np.zeros(n_uas, dtype=OUTCOME_DTYPE)
         self._report = np.zeros((n_uas, REPORT_SIZE))
-        self.observation = np.zeros((n_uas, OBSERVATION_SIZE), np.float32)
+        self._observation_shape = (n_uas, OBSERVATION_SIZE)
+        self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
         # what the kernel is given in every step: the arrays are written in place
         self._fixed: tuple[Any, ...] = (
@@ -135,15 +137,21 @@ class Episode:
             self._outcome,
             self._report,
         )
-        self._step = compiled_step((*self._fixed, self.max_cycles, self.observation))
+        self._prepare()
+
+    def _prepare(self) -> None:
+        arguments = (*self._fixed, self.max_cycles, self.observation, self.observation)
+        self._step = compiled_step(arguments)
+        self.asked_rows = list(self.asked)
 
     def __getstate__(self) -> dict[str, Any]:
-        # machine code does not travel
-        return {key: value for key, value in self.__dict__.items() if key != "_step"}
+        # machine code does not travel, nor do views as such
+        kept = self.__dict__.items()
+        return {key: value for key, value in kept if key not in ("_step", "asked_rows")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._step = compiled_step((*self._fixed, self.max_cycles, self.observation))
+        self._prepare()
 
     def reset(self) -> None:
         """Begin a new mission."""
@@ -181,8 +189,8 @@ class Episode:
         Raises:
             ValueError: An action is not finite; names UAS and value, and nothing has changed.
         """
-        observation = self.observation.copy()
-        invalid = self._step(*self._fixed, self.max_cycles, observation)
+        observation = np.empty(self._observation_shape, np.float32)
+        invalid = self._step(*self._fixed, self.max_cycles, self.observation, observation)
         if invalid != ACCEPTED:
             numbers_asked = self.asked[invalid].tolist()
             self.asked[invalid] = 0.0
@@ -192,6 +200,37 @@ class Episode:
         self.observation = observation
         self.steps += 1
         return self._report.tolist()
+
+    def arrays(self) -> tuple[tuple[Any, ...], ...]:
+        """What a kernel needs to fly many of these missions, after `reset`.
+
+        Returns:
+            The arena; what else does not change; what is not zero at the start; all that changes,
+            in the order of `WorldState` and `step_learners`.
+        """
+        world = self._world
+        return (
+            world.arena,
+            (self.actions.ranges, self._scales, self._neighbours, self._weights),
+            (
+                world.state.x,
+                world.state.uncovered,
+                self._candidates,
+                self._company,
+                self.observation,
+            ),
+            (
+                *world.state,
+                self.asked,
+                self._targets,
+                self._candidates,
+                self._company,
+                self._commands,
+                self._outcome,
+                self._report,
+                self.observation,
+            ),
+        )
 
     @property
     def report(self) -> list[list[float]]:

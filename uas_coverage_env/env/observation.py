@@ -5,13 +5,13 @@ from column k on and returns the column after its last.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.layout import FAR_M, HEIGHT_M, K_WAYPOINTS, MARGIN, OBSERVATION_LAYOUT
+from uas_coverage_env.env.layout import FAR_M, HEIGHT_M, MARGIN, OBSERVATION_LAYOUT
 from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
 from uas_coverage_env.env.relative import charge_left, close, direction, within
 from uas_coverage_env.env.surroundings import surroundings
+from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import (
     DOD,
@@ -35,6 +35,8 @@ from uas_coverage_env.world.routes import route
 
 _OWN_SIZE = OBSERVATION_LAYOUT[0].size
 _HOME_SIZE = OBSERVATION_LAYOUT[1].size
+_REMAINING_SIZE = OBSERVATION_LAYOUT[2].size
+_N_SECTORS = 8
 
 SCALES_DTYPE = np.dtype(
     (
@@ -89,7 +91,7 @@ def scales_of(scenario: Scenario) -> NDArray[np.void]:
     return scales
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def observe(arena, state, scales, company, sees, targets, max_cycles, candidates, observation):
     """Write the observations of those UAS that are to see.
 
@@ -105,23 +107,31 @@ def observe(arena, state, scales, company, sees, targets, max_cycles, candidates
             there is none; written.
         observation: (U, OBSERVATION_SIZE) float32; written.
     """
-    nearest_m2 = np.empty(K_WAYPOINTS)
     for i in range(state.status.shape[0]):
-        if not sees[i]:
-            continue
-        row = observation[i]
-        nearest_waypoints(arena, state, i, candidates[i], nearest_m2)
-        home_dod = _home(arena, state, i, row, _OWN_SIZE)
-        k = _own(arena, state, scales[i], i, home_dod, max_cycles, row, 0) + _HOME_SIZE
-        k = _remaining(arena, state, i, row, k)
-        k = surroundings(arena, state, i, row, k)
-        k = waypoints(arena, state, scales[i], company, i, targets, candidates[i], row, k)
-        k = others(arena, state, scales[i], i, row, k)
-        moving_obstacles(arena, state, scales[i], i, row, k)
+        if sees[i]:
+            look(
+                arena, state, scales[i], company, i, targets, max_cycles, candidates[i],
+                observation[i],
+            )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
-def _own(arena, state, scale, i, home_dod, max_cycles, row, k):
+@kernel
+def look(arena, state, scale, company, i, targets, max_cycles, candidates, row):
+    """Write the observation of UAS i; scale, candidates and row are its own, see `observe`."""
+    nearest_waypoints(arena, state, i, candidates)
+    home_dod = _home(arena, state, i, row, _OWN_SIZE)
+    k = _OWN_SIZE + _HOME_SIZE
+    left = _remaining(arena, state, i, row, k)
+    k = _own(arena, state, scale, i, home_dod, left, max_cycles, row, 0)
+    k += _HOME_SIZE + _REMAINING_SIZE
+    k = surroundings(arena, state, i, row, k)
+    k = waypoints(arena, state, scale, company, i, targets, candidates, row, k)
+    k = others(arena, state, scale, i, row, k)
+    moving_obstacles(arena, state, scale, i, row, k)
+
+
+@inlined_kernel
+def _own(arena, state, scale, i, home_dod, left, max_cycles, row, k):
     x = state.x[i]
     row[k] = within((x[X] - scale.centre_m[0]) * scale.per_half_side[0], -1.0, 1.0)
     row[k + 1] = within((x[Y] - scale.centre_m[1]) * scale.per_half_side[1], -1.0, 1.0)
@@ -146,15 +156,11 @@ def _own(arena, state, scale, i, home_dod, max_cycles, row, k):
     row[k + 20] = charge_left(arena, state, i)
     row[k + 21] = within((arena.uas[i].dod_max - x[DOD] - home_dod) / MARGIN, -1.0, 1.0)
     row[k + 22] = within((max_cycles - state.step[0]) / max_cycles, 0.0, 1.0)
-    left = 0.0
-    for w in range(state.uncovered.shape[0]):
-        if state.uncovered[w]:
-            left += arena.waypoints[w].weight
     row[k + 23] = within(left * scale.per_weight, 0.0, 1.0)
     return k + 24
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _home(arena, state, i, row, k):
     """Write where home is; returns the depth of discharge that the way there costs."""
     uas = arena.uas[i]
@@ -169,38 +175,44 @@ def _home(arena, state, i, row, k):
     return (way_m / uas.speed_mps + max(0.0, z1 - z) / uas.descent_mps) * uas.dod_per_s
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _sector(dx, dy):
     """Which eighth of the horizon a place lies in: 0 from north to north-east, and on clockwise."""
-    if dy >= 0.0:
-        if dx > 0.0:
-            return 0 if dy < dx else 1
-        return 2 if -dx < dy else 3
-    if dx < 0.0:
-        return 4 if dy > dx else 5
-    return 6 if dx < -dy else 7
+    # selections rather than branches, which waypoints in every direction would mispredict
+    quarter = (0 if dx > 0.0 else 1) if dy >= 0.0 else (2 if dx < 0.0 else 3)
+    along = dx if quarter % 2 == 0 else dy
+    across = dy if quarter % 2 == 0 else dx
+    return 2 * quarter + (0 if abs(across) < abs(along) else 1)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _remaining(arena, state, i, row, k):
-    row[k : k + 10] = 0.0
+    """Write where the open weight lies; returns all of it."""
+    # alternately in two sums each: adding to a number that was just written has to wait for it
+    sectors = room(16)
+    for sector in range(2 * _N_SECTORS):
+        sectors[sector] = 0.0
     x = state.x[i, X]
     y = state.x[i, Y]
     weight = 0.0
     north_m = 0.0
     east_m = 0.0
     for w in range(state.uncovered.shape[0]):
-        if state.uncovered[w]:
-            waypoint = arena.waypoints[w]
-            dx = waypoint.position_m[0] - x
-            dy = waypoint.position_m[1] - y
-            weight += waypoint.weight
-            north_m += waypoint.weight * dx
-            east_m += waypoint.weight * dy
-            row[k + _sector(dx, dy)] += waypoint.weight
+        waypoint = arena.waypoints[w]
+        open_weight = waypoint.weight if state.uncovered[w] else 0.0
+        dx = waypoint.position_m[0] - x
+        dy = waypoint.position_m[1] - y
+        weight += open_weight
+        north_m += open_weight * dx
+        east_m += open_weight * dy
+        sectors[(w % 2) * _N_SECTORS + _sector(dx, dy)] += open_weight
+    for sector in range(_N_SECTORS):
+        row[k + sector] = sectors[sector] + sectors[_N_SECTORS + sector]
+    row[k + 8] = 0.0
+    row[k + 9] = 0.0
     if weight > 0.0:
-        for sector in range(k, k + 8):
+        for sector in range(k, k + _N_SECTORS):
             row[sector] = within(row[sector] / weight, 0.0, 1.0)
         row[k + 8] = within(north_m / weight / FAR_M, -1.0, 1.0)
         row[k + 9] = within(east_m / weight / FAR_M, -1.0, 1.0)
-    return k + 10
+    return weight

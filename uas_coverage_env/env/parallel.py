@@ -14,14 +14,11 @@ from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.kernel import STATUS
+from uas_coverage_env.env.kernel import REWARD, STATUS
 from uas_coverage_env.env.layout import observation_bounds
-from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING
-
-_N_TERMS = len(REWARD_TERMS)
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
@@ -219,11 +216,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             self._refuse(actions)
         if not agents:
             return {}, {}, {}, {}, {}
-        accept, asked = episode.actions.accept, episode.asked
+        accept, asked = episode.actions.accept, episode.asked_rows
         for agent in agents:
             if agent not in actions:
                 self._refuse(actions)
-            accept(agent, actions[agent], asked, index[agent])
+            accept(agent, actions[agent], asked[index[agent]])
         report = episode.step()
 
         observation = episode.observation
@@ -239,7 +236,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             row = report[i]
             flies = row[STATUS] == FLYING
             observations[agent] = observation[i]
-            rewards[agent] = sum(row[:_N_TERMS])
+            rewards[agent] = row[REWARD]
             terminations[agent] = not flies
             truncations[agent] = over and flies
             infos[agent] = episode.info(i, row)
@@ -259,8 +256,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Raises:
             ValueError: It could not; names agent and value.
         """
-        asked = np.zeros((1, self._episode.actions.size))
-        self._episode.actions.accept(agent, action, asked, 0)
+        asked = np.zeros(self._episode.actions.size)
+        self._episode.actions.accept(agent, action, asked)
         if not np.isfinite(asked).all():
             raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
 

@@ -2,13 +2,15 @@
 
 import math
 
-from numba import njit
-
 from uas_coverage_env.env.layout import NEARBY_M
+from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.vehicle import DOD
 
+STRAIGHT_M = 1e-6
+"""What is nearer than this horizontally is straight above or below [m]."""
 
-@njit(cache=True, error_model="numpy")
+
+@inlined_kernel
 def within(value, low, high):
     """The value, kept between two bounds; NaN becomes the lower one and does not travel."""
     if value > low:
@@ -16,17 +18,17 @@ def within(value, low, high):
     return low
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def close(distance_m):
     """1 at the place itself, 1/2 at NEARBY_M, towards 0 far away."""
     return 1.0 / (1.0 + distance_m / NEARBY_M)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def direction(dx, dy, row, k):
     """Write the horizontal unit vector towards a place; returns the next column."""
     distance_m = math.sqrt(dx * dx + dy * dy)
-    if distance_m > 1e-6:
+    if distance_m > STRAIGHT_M:
         row[k] = within(dx / distance_m, -1.0, 1.0)
         row[k + 1] = within(dy / distance_m, -1.0, 1.0)
     else:
@@ -35,13 +37,13 @@ def direction(dx, dy, row, k):
     return k + 2
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def apart_m(dx, dy, dz):
     """Length of a vector [m]."""
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def charge_left(arena, state, i):
     """Share of the usable charge of UAS i that is left; negative once overdrawn."""
     dod_max = arena.uas[i].dod_max

@@ -7,9 +7,9 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.outcome import NONE
@@ -78,14 +78,13 @@ def weights_of(given: Mapping[str, float] | None) -> NDArray[np.float64]:
     return np.array(list(weights.values()), dtype=np.float64)
 
 
-@njit(cache=True, error_model="numpy")
-def pay(arena, state, was_flying, commands, outcome, weights, over, terms):
+@inlined_kernel
+def pay(arena, state, commands, outcome, weights, over, terms):
     """Write the weighted terms of every UAS that flew in this step; those of the others are zero.
 
     Args:
         arena: The arena.
         state: The state of the world after the step.
-        was_flying: (U,) flew before the step.
         commands: (U,) of COMMAND_DTYPE, as they were asked for.
         outcome: (U,) of OUTCOME_DTYPE, what came of them.
         weights: (R,) in the order of REWARD_TERMS.
@@ -97,10 +96,11 @@ def pay(arena, state, was_flying, commands, outcome, weights, over, terms):
         covered_by_all += outcome[i].newly_covered_weight
     for i in range(terms.shape[0]):
         row = terms[i]
-        row[: weights.shape[0]] = 0.0
-        if not was_flying[i]:
-            continue
         event = outcome[i]
+        for term in range(weights.shape[0]):
+            row[term] = 0.0
+        if not event.flew:
+            continue
         row[0] = event.newly_covered_weight
         row[1] = covered_by_all - event.newly_covered_weight
         row[2] = -event.energy_Wh
@@ -118,7 +118,7 @@ def pay(arena, state, was_flying, commands, outcome, weights, over, terms):
             row[term] = row[term] * weights[term] + 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _covered_share(arena, state):
     total = 0.0
     covered = 0.0
@@ -130,7 +130,7 @@ def _covered_share(arena, state):
     return covered / total
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _change(arena, i, asked, applied):
     """How far the velocity flown is from the one asked for, in units of the limit."""
     if asked.kind != VELOCITY:

@@ -1,6 +1,8 @@
 """The single-agent environment: one agent flies the whole swarm (Gymnasium)."""
 
 from collections.abc import Mapping
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,8 +20,6 @@ from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING
-
-_N_TERMS = len(REWARD_TERMS)
 
 
 @with_tables
@@ -139,15 +139,15 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             raise ResetNeeded("step() before reset(): call reset() first")
         episode = self._episode
         rows = episode.actions.joint_rows(action, len(episode.names))
-        for i, (name, row) in enumerate(zip(episode.names, rows, strict=True)):
-            episode.actions.accept(name, row, episode.asked, i)
+        for name, row, asked in zip(episode.names, rows, episode.asked_rows, strict=True):
+            episode.actions.accept(name, row, asked)
         report = episode.step()
         info = self._info(report)
         flies = any(row[STATUS] == FLYING for row in report)
         truncated = flies and episode.steps >= episode.max_cycles
         if self.render_mode is not None:
             self._see()
-        reward = sum(info["reward_terms"].values())
+        reward = reduce(add, info["reward_terms"].values())
         return episode.observation.ravel(), reward, not flies, truncated, info
 
     def action_masks(self) -> NDArray[np.bool_]:
@@ -178,7 +178,8 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     def _info(self, report: list[list[float]]) -> dict[str, Any]:
         episode = self._episode
-        sums = [sum(column) for column in zip(*report, strict=True)]
+        # not Python's `sum`, which rounds in another way than a kernel since 3.12
+        sums = [reduce(add, column) for column in zip(*report, strict=True)]
         info: dict[str, Any] = {
             "reward_terms": dict(zip(REWARD_TERMS, sums, strict=False)),
             "covered": int(report[0][COVERED]),

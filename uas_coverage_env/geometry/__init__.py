@@ -10,6 +10,8 @@ from uas_coverage_env.geometry.round_shapes import (
 )
 from uas_coverage_env.geometry.segments import (
     cylinder_clearance,
+    cylinder_gap,
+    outside_cylinder,
     segment_clearance,
     segment_meets,
     signed_distance,
@@ -20,8 +22,10 @@ __all__ = [
     "closed_cylinder_faces",
     "cylinder_clearance",
     "cylinder_faces",
+    "cylinder_gap",
     "faces_for_slack_variables",
     "inner_factor",
+    "outside_cylinder",
     "segment_clearance",
     "segment_meets",
     "signed_distance",

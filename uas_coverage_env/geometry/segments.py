@@ -6,10 +6,13 @@ hulls of a scenario fit in two arrays. Coordinates are scalars: no array is made
 
 import math
 
-from numba import njit
+from uas_coverage_env.kernels import inlined_kernel, kernel
+
+_SURE_M = 1e-6
+"""More than rounding can change in a distance [m]."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def signed_distance(normals, offsets_m, first, last, x, y, z):
     """D(p): largest face distance of a point (Gasche et al., Sec. III-B.4).
 
@@ -33,7 +36,7 @@ def signed_distance(normals, offsets_m, first, last, x, y, z):
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     """Smallest D(p) on the straight segment from p0 to p1, exact.
 
@@ -85,7 +88,7 @@ def segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     return height + slope * at
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def segment_meets(normals, offsets_m, first, last, inflation_m, x0, y0, z0, x1, y1, z1):
     """Whether the segment enters the inflated hull: segment_clearance < inflation_m.
 
@@ -125,12 +128,19 @@ def segment_meets(normals, offsets_m, first, last, inflation_m, x0, y0, z0, x1, 
     return True
 
 
-@njit(cache=True, error_model="numpy")
-def _outside_cylinder(radius_m, half_height_m, x, y, z):
+@inlined_kernel
+def _gap(a, b):
+    """How far the range between two numbers is from zero."""
+    return max(0.0, min(a, b), -max(a, b))
+
+
+@inlined_kernel
+def outside_cylinder(radius_m, half_height_m, x, y, z):
+    """Distance of a point from a closed upright cylinder about the origin [m]."""
     return max(math.sqrt(x * x + y * y) - radius_m, abs(z) - half_height_m)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def cylinder_clearance(radius_m, half_height_m, x0, y0, z0, x1, y1, z1):
     """Smallest distance from a closed upright cylinder about the origin on a segment, exact.
 
@@ -158,39 +168,52 @@ def cylinder_clearance(radius_m, half_height_m, x0, y0, z0, x1, y1, z1):
     dx = x1 - x0
     dy = y1 - y0
     dz = z1 - z0
+    travelled = dx * dx + dy * dy
+    approach = x0 * dx + y0 * dy
     smallest = min(
-        _outside_cylinder(radius_m, half_height_m, x0, y0, z0),
-        _outside_cylinder(radius_m, half_height_m, x1, y1, z1),
+        outside_cylinder(radius_m, half_height_m, x0, y0, z0),
+        outside_cylinder(radius_m, half_height_m, x1, y1, z1),
     )
-    for candidate in range(6):
+    # closest horizontal approach, and equal height
+    for turn in range(2):
         at = 0.0
-        if candidate == 0:
-            # closest horizontal approach
-            travelled = dx * dx + dy * dy
+        if turn == 0:
             if travelled > 0.0:
-                at = -(x0 * dx + y0 * dy) / travelled
-        elif candidate == 1:
-            # equal height
-            if dz != 0.0:
-                at = -z0 / dz
-        else:
-            # equal terms: x² + y² = (side z + c)² with c = radius - half_height: two roots a side
-            side = 1.0 if candidate < 4 else -1.0
-            level = side * z0 + radius_m - half_height_m
-            rise = side * dz
-            a = dx * dx + dy * dy - rise * rise
-            b = x0 * dx + y0 * dy - level * rise
-            c = x0 * x0 + y0 * y0 - level * level
-            root = math.sqrt(max(b * b - a * c, 0.0))
-            q = -(b + root) if b >= 0.0 else root - b
-            if candidate % 2 == 0:
-                if abs(q) < abs(a):
-                    at = q / a
-            elif abs(c) < abs(q):
-                at = c / q
+                at = -approach / travelled
+        elif dz != 0.0:
+            at = -z0 / dz
         if 0.0 < at < 1.0:
-            distance = _outside_cylinder(
+            distance = outside_cylinder(
+                radius_m, half_height_m, x0 + at * dx, y0 + at * dy, z0 + at * dz
+            )
+            smallest = min(smallest, distance)
+    for turn in range(2):
+        # equal terms: x² + y² = (side z + c)² with c = radius - half_height: two roots a side
+        side = 1.0 if turn == 0 else -1.0
+        level = side * z0 + radius_m - half_height_m
+        rise = side * dz
+        a = travelled - rise * rise
+        b = approach - level * rise
+        c = x0 * x0 + y0 * y0 - level * level
+        root = math.sqrt(max(b * b - a * c, 0.0))
+        q = -(b + root) if b >= 0.0 else root - b
+        at = q / a if abs(q) < abs(a) else 0.0
+        if 0.0 < at < 1.0:
+            distance = outside_cylinder(
+                radius_m, half_height_m, x0 + at * dx, y0 + at * dy, z0 + at * dz
+            )
+            smallest = min(smallest, distance)
+        at = c / q if abs(c) < abs(q) else 0.0
+        if 0.0 < at < 1.0:
+            distance = outside_cylinder(
                 radius_m, half_height_m, x0 + at * dx, y0 + at * dy, z0 + at * dz
             )
             smallest = min(smallest, distance)
     return smallest
+
+
+@inlined_kernel
+def cylinder_gap(radius_m, half_height_m, x0, y0, z0, x1, y1, z1):
+    """A lower bound of `cylinder_clearance`, from the box around the segment."""
+    beside_m = max(_gap(x0, x1), _gap(y0, y1)) - radius_m
+    return max(beside_m, _gap(z0, z1) - half_height_m) - _SURE_M

@@ -13,8 +13,7 @@ led far beyond the bounds, the UAS is levelled out first, with torques within th
 
 import math
 
-from numba import njit
-
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle.layout import (
     LIFT,
     PHI,
@@ -33,11 +32,12 @@ from uas_coverage_env.vehicle.layout import (
 )
 
 _TINY = 1e-12
+_SURELY_LESS = 0.999999
 _FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant, say, goes on
 _HALVES = math.sqrt(0.5)  # of a norm for each of two axes
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reseed_reference(x, reference):
     """Let the loop take over from the velocity reached.
 
@@ -49,19 +49,22 @@ def reseed_reference(x, reference):
     reference[1] = x[VY]
 
 
-@njit(cache=True, error_model="numpy")
-def _within_limit(vehicle, speed_mps):
-    """By what to scale a velocity of a speed so that it is a valid reference."""
-    return min(1.0, vehicle.reference_max_mps / max(speed_mps, _TINY))
+@kernel
+def _within_limit(north, east, limit):
+    """By what to scale a vector so that it is no longer than a limit."""
+    if north * north + east * east < _SURELY_LESS * limit * limit:
+        # spares the exact length, a slow function
+        return 1.0
+    return min(1.0, limit / max(math.hypot(north, east), _TINY))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _govern(vehicle, x, reference, north_mps, east_mps):
     """Move the reference towards a velocity as far as all bounds are predicted to hold."""
-    share = _within_limit(vehicle, math.hypot(reference[0], reference[1]))
+    share = _within_limit(reference[0], reference[1], vehicle.reference_max_mps)
     reference[0] *= share
     reference[1] *= share
-    share = _within_limit(vehicle, math.hypot(north_mps, east_mps))
+    share = _within_limit(north_mps, east_mps, vehicle.reference_max_mps)
     dn = share * north_mps - reference[0]
     de = share * east_mps - reference[1]
     if abs(dn) + abs(de) < _TINY:
@@ -93,7 +96,7 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
     reference[1] += share * de
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _track(vehicle, x, reference, u):
     """Roll and pitch torques that track the reference."""
     k = vehicle.gain
@@ -103,13 +106,12 @@ def _track(vehicle, x, reference, u):
     east = -k[0] * (x[VY] - reference[1]) - k[1] * (x[PHI] - trim * reference[1])
     east -= k[2] * x[WX]
     # never active on a governed flight: it is for states that a player's wrench led to
-    alpha = math.hypot(north, east)
-    share = min(1.0, vehicle.alpha_xy_max_radps2 / max(alpha, _TINY))
+    share = _within_limit(north, east, vehicle.alpha_xy_max_radps2)
     u[TAU_X] = vehicle.inertia_kgm2[0] * share * east
     u[TAU_Y] = -vehicle.inertia_kgm2[1] * share * north
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _speed_towards(distance, speed, per_speed, per_next_speed, brake):
     """Fastest next speed towards a point from which a stop at the point is still possible.
 
@@ -135,7 +137,7 @@ def _speed_towards(distance, speed, per_speed, per_next_speed, brake):
     return left / n + 0.5 * brake * (n - 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _far_outside(vehicle, x, reference):
     """Whether the state breaks a governor row by so much that the feedback would saturate."""
     for q in range(vehicle.n_governor_rows):
@@ -148,7 +150,7 @@ def _far_outside(vehicle, x, reference):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _turn_towards(vehicle, angle, rate, wanted, rate_max, alpha_max):
     """Angular acceleration that brings an angle to a wanted one, within its limits, and stops."""
     dt = vehicle.dt_s
@@ -160,7 +162,7 @@ def _turn_towards(vehicle, angle, rate, wanted, rate_max, alpha_max):
     return min(max((following - rate) / dt, -alpha_max), alpha_max)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _level_out(vehicle, x, u):
     """Torques to a level attitude; leaning against the velocity while that is beyond its limit."""
     speed = math.hypot(x[VX], x[VY])
@@ -175,7 +177,7 @@ def _level_out(vehicle, x, u):
     u[TAU_Y] = vehicle.inertia_kgm2[1] * pitch
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _hold_heading(vehicle, x, u):
     """Yaw torque that brings the heading to 0, at which the model is linearised, and keeps it."""
     u[TAU_Z] = vehicle.inertia_kgm2[2] * _turn_towards(
@@ -183,7 +185,7 @@ def _hold_heading(vehicle, x, u):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _lift_towards(vehicle, x, down_mps, u):
     """Lift that reaches a vertical speed in one step, or as nearly as its limits allow."""
     down = min(max(down_mps, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
@@ -191,7 +193,7 @@ def _lift_towards(vehicle, x, down_mps, u):
     u[LIFT] = min(max(needed, vehicle.lift_min_N), vehicle.lift_max_N)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down_mps, u):
     """Wrench for a horizontal velocity and a vertical speed; the heading is brought to 0.
 
@@ -215,7 +217,7 @@ def velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down_mps, 
     _lift_towards(vehicle, x, down_mps, u)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def velocity_wrench(vehicle, x, reference, north_mps, east_mps, altitude_m, u):
     """Wrench for a horizontal velocity and an altitude to hold, positive up.
 
@@ -234,7 +236,7 @@ def velocity_wrench(vehicle, x, reference, north_mps, east_mps, altitude_m, u):
     velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down, u)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def acceleration_wrench(vehicle, x, reference, north_mps2, east_mps2, down_mps2, u):
     """Wrench for an acceleration held over the step, within the limits of speed.
 

@@ -1,7 +1,6 @@
 """One step of the LPV model, compiled: rigid body, thrust correction, battery."""
 
-from numba import njit
-
+from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
@@ -26,7 +25,7 @@ from uas_coverage_env.vehicle.layout import (
 )
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def delta_thrust(vehicle, x, lift_N):
     """Thrust correction dT = f_T(L, Psi, v) in the piecewise-linear form of the plan [N].
 
@@ -46,7 +45,7 @@ def delta_thrust(vehicle, x, lift_N):
     return max(total, vehicle.delta_thrust_min_N)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _segment(vehicle, dod):
     for j in range(vehicle.n_segments - 1):
         if dod < vehicle.dod_end[j]:
@@ -54,7 +53,7 @@ def _segment(vehicle, dod):
     return vehicle.n_segments - 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def open_circuit_V(vehicle, dod):
     """Open-circuit voltage at a depth of discharge [V]; the curve stays flat beyond its ends."""
     dod = min(max(dod, 0.0), 1.0)
@@ -62,7 +61,7 @@ def open_circuit_V(vehicle, dod):
     return vehicle.ocv_V[j] - vehicle.ocv_slope_V[j] * dod
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def lpv_step(vehicle, x, u, x_next):
     """x_next = A(DoD) x + B(DoD) u + E(DoD); writes u[DELTA_THRUST].
 
@@ -95,7 +94,7 @@ def lpv_step(vehicle, x, u, x_next):
     return voltage, current
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def fly_kinematics(vehicle, x, u):
     """The twelve states of the rigid body one step on, in place; the battery is left alone."""
     inertia = vehicle.inertia_kgm2
@@ -110,7 +109,7 @@ def fly_kinematics(vehicle, x, u):
     x[WZ] += vehicle.yaw_B[1] * alpha
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _axis_step(vehicle, x, position, velocity, angle, rate, sign, angular_acceleration):
     """One horizontal axis; `sign` turns the Euler angle into a tilt forward along the axis."""
     A, B = vehicle.axis_A, vehicle.axis_B
@@ -122,7 +121,7 @@ def _axis_step(vehicle, x, position, velocity, angle, rate, sign, angular_accele
     x[rate] = sign * (w + B[3] * alpha)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def clip_wrench(vehicle, u):
     """Lift and torques within the vehicle's input limits, in place."""
     u[LIFT] = min(max(u[LIFT], vehicle.lift_min_N), vehicle.lift_max_N)

@@ -12,9 +12,8 @@ loss of motor speed with a falling battery voltage.
 
 import math
 
-import numpy as np
-from numba import njit
-
+from uas_coverage_env.kernels import kernel, room
+from uas_coverage_env.vehicle.compiled import MAX_MOTORS
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
@@ -51,7 +50,7 @@ _UPRIGHT_MIN = 0.3
 _RIGID = DOD
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def mix(vehicle, thrust_N, torque, motor_thrust_N):
     """Thrust and torque (3,) as N_M motor thrusts, each within what a motor can give.
 
@@ -84,7 +83,7 @@ def mix(vehicle, thrust_N, torque, motor_thrust_N):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _euler_rates(x, rates):
     """Psi' = W(phi, theta) omega, into rates (3,)."""
     sp = math.sin(x[PHI])
@@ -95,7 +94,7 @@ def _euler_rates(x, rates):
     rates[2] = around
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _rigid_body(vehicle, x, thrust_N, torque, dx):
     """The twelve derivatives of the rigid body with thrust and torque held."""
     sp = math.sin(x[PHI])
@@ -119,7 +118,7 @@ def _rigid_body(vehicle, x, thrust_N, torque, dx):
     dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * x[WX] * x[WY]) / inertia[2]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _asked(tangent, tangent_rate, tangent_acceleration, angle):
     """Angle, rate and acceleration of atan(tangent), within what is asked for; into angle (3,)."""
     largest = math.tan(_TILT_ASKED_RAD)
@@ -134,7 +133,7 @@ def _asked(tangent, tangent_rate, tangent_acceleration, angle):
     angle[2] = slope * tangent_acceleration - 2.0 * tangent * angle[1] * angle[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     """Torque (3,) that tracks the attitude of the LPV model under the step's torques.
 
@@ -183,7 +182,7 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[WZ]))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
     """One Runge-Kutta step of the rigid body in place; k, total, middle (12,) are room."""
     for s in range(_RIGID):
@@ -204,7 +203,7 @@ def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
         x[PHI + axis] = min(max(x[PHI + axis], -_TILT_STOP_RAD), _TILT_STOP_RAD)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def plant_step(vehicle, x, u, x_next):
     """One step of the nonlinear plant under a held wrench.
 
@@ -221,12 +220,14 @@ def plant_step(vehicle, x, u, x_next):
     steps = max(math.ceil(vehicle.dt_s / _SUBSTEP_S - 1e-9), 1)
     h = vehicle.dt_s / steps
     left = math.exp(-h / vehicle.time_constant_th_s)
-    room = np.empty((7, _RIGID))
-    first = room[0, :6]
-    torque = room[1, :3]
-    roll = room[2, :3]
-    pitch = room[3, :3]
-    motors = np.empty(vehicle.n_motors)
+    first = room(6)
+    torque = room(3)
+    roll = room(3)
+    pitch = room(3)
+    slope = room(_RIGID)
+    total = room(_RIGID)
+    middle = room(_RIGID)
+    motors = room(MAX_MOTORS)
     for s in range(x.shape[0]):
         x_next[s] = x[s]
     for s in range(6):
@@ -264,6 +265,6 @@ def plant_step(vehicle, x, u, x_next):
         correction += static - vehicle.weight_N
         charge += current * h
         energy += voltage * current * h
-        _integrate(vehicle, x_next, h, thrust, torque, room[4], room[5], room[6])
+        _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
     u[DELTA_THRUST] = correction / steps
     return energy / charge, charge / vehicle.dt_s

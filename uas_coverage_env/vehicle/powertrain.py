@@ -2,12 +2,11 @@
 
 import math
 
-from numba import njit
-
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle.lpv import open_circuit_V
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def electrical_power_W(vehicle, thrust_N):
     """Battery power of all motors at a total static thrust shared equally, and of the avionics.
 
@@ -23,7 +22,7 @@ def electrical_power_W(vehicle, thrust_N):
     return n * per_motor + vehicle.auxiliary_W
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def battery_operating_point(vehicle, dod, u_th_V, power_W):
     """Voltage and current at which the Thevenin battery delivers a power.
 

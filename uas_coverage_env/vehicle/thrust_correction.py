@@ -7,9 +7,9 @@ by the LPV model and the planner are fitted to it.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle.compiled import compile_vehicle
 from uas_coverage_env.vehicle.params import ThrustCorrection, VehicleParams
 
@@ -18,7 +18,7 @@ _IDLE = 0.05  # of the weight: rotors never stop
 _COSINE_MIN = 0.3  # beyond a tilt of 70 degrees the vertical thrust no longer grows
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _induced_mps(hover_mps, across_mps, climb_mps):
     """Induced velocity v_i of v_i sqrt(v_t² + (v_c + v_i)²) = v_h² (Glauert), climb not negative.
 
@@ -34,7 +34,7 @@ def _induced_mps(hover_mps, across_mps, climb_mps):
     return induced
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def static_thrust(vehicle, thrust_N, phi, theta, psi, vx, vy, vz):
     """Thrust of a hovering rotor set that needs the same power as this thrust in this flight [N].
 
@@ -74,7 +74,7 @@ def static_thrust(vehicle, thrust_N, phi, theta, psi, vx, vy, vz):
     return (max(power, 0.0) / c) ** (2.0 / 3.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def exact_delta_thrust(vehicle, lift_N, phi, theta, psi, vx, vy, vz):
     """Delta T = f_T(L, Psi, v): the static thrust of a flight with lift L, less the weight [N].
 

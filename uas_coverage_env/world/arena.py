@@ -59,6 +59,11 @@ OBSTACLE_DTYPE = _record(
         ("near_m", "f8"),
         ("lower_m", "f8", (3,)),
         ("upper_m", "f8", (3,)),
+        # the same box by its middle and one over half its sides; beyond it, s times as far from
+        # the middle as its walls, every point is at least near_m + rise_m (s - 1) away
+        ("middle_m", "f8", (3,)),
+        ("per_half_m", "f8", (3,)),
+        ("rise_m", "f8"),
         # routes keep wall_m beside it, or pass over it at roof_m, positive up, unless it is tall
         ("wall_m", "f8"),
         ("roof_m", "f8"),
@@ -82,6 +87,8 @@ RULES_DTYPE = _record(
         ("landing_speed_mps", "f8"),
         ("uas_safe_distance_m", "f8"),
         ("fence_margin_m", "f8"),
+        # the largest safe distance of all obstacles
+        ("safe_distance_max_m", "f8"),
         # rows of `normals`
         ("fence_first", "i8"),
         ("fence_last", "i8"),
@@ -229,6 +236,9 @@ def _rules(scenario: Scenario) -> NDArray[np.void]:
     rules["landing_speed_mps"] = scenario.landing_speed_mps
     rules["uas_safe_distance_m"] = scenario.uas_safe_distance_m
     rules["fence_margin_m"] = scenario.geofence.margin_m
+    rules["safe_distance_max_m"] = max(
+        (o.safe_distance_m for o in (*scenario.obstacles, *scenario.moving_obstacles)), default=0.0
+    )
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
     rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - ROUTE_MARGIN_M
@@ -293,6 +303,9 @@ def _obstacles(
         # the corners are rounded in the last digits: widen the box rather than miss a contact
         record["lower_m"] = near.min(axis=0) - 1e-6
         record["upper_m"] = near.max(axis=0) + 1e-6
+        record["middle_m"] = (record["lower_m"] + record["upper_m"]) / 2
+        record["per_half_m"] = 2 / (record["upper_m"] - record["lower_m"])
+        record["rise_m"] = near_m - max(0.0, float(hull.signed_distance(record["middle_m"])))
         record["wall_m"] = wall_m
         record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m

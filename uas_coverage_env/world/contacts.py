@@ -2,16 +2,24 @@
 
 import math
 
-from numba import njit
-
-from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
+from uas_coverage_env.geometry import (
+    cylinder_clearance,
+    cylinder_gap,
+    outside_cylinder,
+    segment_clearance,
+    signed_distance,
+)
+from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import DOD, X, Y, Z
 from uas_coverage_env.world.outcome import BATTERY, FENCE, MOVING_OBSTACLE, NONE, OBSTACLE, UAS
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
 
+_SURE_M = 1e-6
+"""More than rounding can change in a distance [m]."""
 
-@njit(cache=True, error_model="numpy")
+
+@kernel
 def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     """A lower bound of the clearance of a segment: the face that both ends are farthest from."""
     largest = -math.inf
@@ -25,37 +33,67 @@ def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
+def _at_least_m(obstacle, x0, y0, z0, x1, y1, z1):
+    """A lower bound of the clearance of a segment from an obstacle, by the boxes around both.
+
+    The distance D is convex. From the middle of the obstacle's box to its walls, where it is
+    near_m, it has risen by rise_m; farther out it rises at least as fast.
+    """
+    times = 0.0
+    middle = obstacle.middle_m
+    per_half = obstacle.per_half_m
+    times = max(times, max(min(x0, x1) - middle[0], middle[0] - max(x0, x1)) * per_half[0])
+    times = max(times, max(min(y0, y1) - middle[1], middle[1] - max(y0, y1)) * per_half[1])
+    times = max(times, max(min(z0, z1) - middle[2], middle[2] - max(z0, z1)) * per_half[2])
+    if times <= 1.0:
+        return -math.inf
+    return obstacle.near_m + obstacle.rise_m * (times - 1.0) - _SURE_M
+
+
+@inlined_kernel
+def _likely_nearest(obstacles, x0, y0, z0, x1, y1, z1):
+    """The obstacle with the least lower bound."""
+    likely = 0
+    least_m = math.inf
+    for o in range(obstacles.shape[0]):
+        bound = _at_least_m(obstacles[o], x0, y0, z0, x1, y1, z1)
+        if bound < least_m:
+            least_m = bound
+            likely = o
+    return likely
+
+
+@kernel
 def obstacle_clearance(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     """Smallest clearance of a segment from the fixed obstacles, exact.
 
-    Near obstacles come first: what they leave is less than the far ones can be (near_m).
+    The likely nearest comes first: most others cannot be as near as that.
 
     Returns:
         (clearance [m], index of the obstacle); (inf, -1) where there is none.
     """
     smallest = math.inf
     nearest = -1
-    for far in range(2):
-        for o in range(obstacles.shape[0]):
-            obstacle = obstacles[o]
-            if box_apart(obstacle, x0, y0, z0, x1, y1, z1) != (far == 1):
-                continue
-            if far == 1 and obstacle.near_m >= smallest:
-                continue
-            first = obstacle.first_face
-            last = obstacle.last_face
-            bound = face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
-            if bound >= smallest:
-                continue
-            clearance = segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
-            if clearance < smallest:
-                smallest = clearance
-                nearest = o
+    if obstacles.shape[0] == 0:
+        return smallest, nearest
+    likely = _likely_nearest(obstacles, x0, y0, z0, x1, y1, z1)
+    for turn in range(-1, obstacles.shape[0]):
+        o = likely if turn < 0 else turn
+        if turn == likely or _at_least_m(obstacles[o], x0, y0, z0, x1, y1, z1) > smallest:
+            continue
+        first = obstacles[o].first_face
+        last = obstacles[o].last_face
+        if face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1) > smallest:
+            continue
+        clearance = segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
+        if clearance < smallest or (clearance == smallest and o < nearest):
+            smallest = clearance
+            nearest = o
     return smallest, nearest
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def moving_clearance(moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1):
     """Smallest clearance from moving obstacle m, going straight from now_m to next_m (M, 3)."""
     return cylinder_clearance(
@@ -70,22 +108,22 @@ def moving_clearance(moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1):
     )
 
 
-@njit(cache=True, error_model="numpy")
-def separation(before_m, after_m, i, j):
-    """Smallest separation of two UAS, each going straight from before_m to after_m (U, 3)."""
+@inlined_kernel
+def _separation(before_m, other_before_m, after, other_after):
+    """Smallest separation of two UAS, each going straight from before (3,) to after (14,)."""
     return cylinder_clearance(
         0.0,
         0.0,
-        before_m[i, 0] - before_m[j, 0],
-        before_m[i, 1] - before_m[j, 1],
-        before_m[i, 2] - before_m[j, 2],
-        after_m[i, 0] - after_m[j, 0],
-        after_m[i, 1] - after_m[j, 1],
-        after_m[i, 2] - after_m[j, 2],
+        before_m[0] - other_before_m[0],
+        before_m[1] - other_before_m[1],
+        before_m[2] - other_before_m[2],
+        after[X] - other_after[X],
+        after[Y] - other_after[Y],
+        after[Z] - other_after[Z],
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _blame(event, contact, index):
     """Note what a UAS was lost to; of several contacts in a step, the first code counts."""
     if event.contact == NONE:
@@ -93,8 +131,8 @@ def _blame(event, contact, index):
         event.contact_with = index
 
 
-@njit(cache=True, error_model="numpy")
-def judge_obstacles(arena, state, before_m, outcome):
+@inlined_kernel
+def judge_obstacles(arena, state, outcome):
     """Clearances from fixed and moving obstacles over the step, and contacts with them."""
     step = min(state.step[0], arena.moving_path_m.shape[0] - 2)
     now_m = arena.moving_path_m[step]
@@ -103,9 +141,9 @@ def judge_obstacles(arena, state, before_m, outcome):
         event = outcome[i]
         if state.status[i] != FLYING:
             continue
-        x0 = before_m[i, 0]
-        y0 = before_m[i, 1]
-        z0 = before_m[i, 2]
+        x0 = event.before_m[0]
+        y0 = event.before_m[1]
+        z0 = event.before_m[2]
         x1 = state.x[i, X]
         y1 = state.x[i, Y]
         z1 = state.x[i, Z]
@@ -116,6 +154,20 @@ def judge_obstacles(arena, state, before_m, outcome):
         if smallest < radius_m:
             _blame(event, OBSTACLE, nearest)
         for m in range(arena.moving.shape[0]):
+            moving = arena.moving[m]
+            gap_m = cylinder_gap(
+                moving.radius_m,
+                moving.half_height_m,
+                x0 - now_m[m, 0],
+                y0 - now_m[m, 1],
+                z0 - now_m[m, 2],
+                x1 - next_m[m, 0],
+                y1 - next_m[m, 1],
+                z1 - next_m[m, 2],
+            )
+            if gap_m > smallest:
+                # farther than something else; no contact either, or there is one already
+                continue
             clearance = moving_clearance(arena.moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1)
             if clearance < radius_m:
                 _blame(event, MOVING_OBSTACLE, m)
@@ -123,8 +175,8 @@ def judge_obstacles(arena, state, before_m, outcome):
         event.obstacle_clearance_m = smallest
 
 
-@njit(cache=True, error_model="numpy")
-def judge_separation(arena, state, before_m, outcome):
+@inlined_kernel
+def judge_separation(arena, state, outcome):
     """Separations between flying UAS over the step, and contacts: both are lost."""
     n_uas = state.status.shape[0]
     for i in range(n_uas):
@@ -133,7 +185,7 @@ def judge_separation(arena, state, before_m, outcome):
         for j in range(i + 1, n_uas):
             if state.status[j] != FLYING:
                 continue
-            apart_m = separation(before_m, state.x, i, j)
+            apart_m = _separation(outcome[i].before_m, outcome[j].before_m, state.x[i], state.x[j])
             outcome[i].separation_m = min(outcome[i].separation_m, apart_m)
             outcome[j].separation_m = min(outcome[j].separation_m, apart_m)
             if apart_m < arena.uas[i].radius_m + arena.uas[j].radius_m:
@@ -141,7 +193,7 @@ def judge_separation(arena, state, before_m, outcome):
                 _blame(outcome[j], UAS, i)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def judge_limits(arena, state, outcome):
     """Contacts with the geofence and the end of the battery.
 
@@ -166,46 +218,61 @@ def judge_limits(arena, state, outcome):
             _blame(outcome[i], BATTERY, -1)
 
 
-@njit(cache=True, error_model="numpy")
-def _obstacle_breaches(arena, i, x, y, z):
+@kernel
+def _obstacle_breaches(arena, next_m, i, x, y, z):
+    """How many fixed and moving obstacles, at next_m (M, 3), UAS i is too near to."""
     count = 0
+    radius_m = arena.uas[i].radius_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         if not box_apart(obstacle, x, y, z, x, y, z):
             clearance = signed_distance(
                 arena.normals, arena.offsets_m, obstacle.first_face, obstacle.last_face, x, y, z
             )
-            if clearance < arena.uas[i].radius_m + obstacle.safe_distance_m:
+            if clearance < radius_m + obstacle.safe_distance_m:
                 count += 1
+    for m in range(arena.moving.shape[0]):
+        moving = arena.moving[m]
+        clearance = outside_cylinder(
+            moving.radius_m,
+            moving.half_height_m,
+            x - next_m[m, 0],
+            y - next_m[m, 1],
+            z - next_m[m, 2],
+        )
+        if clearance < radius_m + moving.safe_distance_m:
+            count += 1
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def count_breaches(arena, state, outcome):
     """Count, at the new sample, what each UAS that is still whole is too near to."""
     rules = arena.rules[0]
     step = min(state.step[0] + 1, arena.moving_path_m.shape[0] - 1)
     next_m = arena.moving_path_m[step]
     for i in range(state.status.shape[0]):
-        if state.status[i] != FLYING or outcome[i].contact != NONE:
+        event = outcome[i]
+        if state.status[i] != FLYING or event.contact != NONE:
             continue
         x = state.x[i, X]
         y = state.x[i, Y]
         z = state.x[i, Z]
         radius_m = arena.uas[i].radius_m
-        count = _obstacle_breaches(arena, i, x, y, z)
-        for m in range(arena.moving.shape[0]):
-            clearance = moving_clearance(arena.moving, next_m, next_m, m, x, y, z, x, y, z)
-            if clearance < radius_m + arena.moving[m].safe_distance_m:
-                count += 1
+        count = 0
+        # at the end of the segment nothing is nearer than it was somewhere on it
+        if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + _SURE_M:
+            count = _obstacle_breaches(arena, next_m, i, x, y, z)
         for j in range(state.status.shape[0]):
             if j != i and state.status[j] == FLYING and outcome[j].contact == NONE:
                 keep_m = radius_m + arena.uas[j].radius_m + rules.uas_safe_distance_m
-                if separation(state.x, state.x, i, j) < keep_m:
+                other = state.x[j]
+                apart_m = outside_cylinder(0.0, 0.0, x - other[X], y - other[Y], z - other[Z])
+                if apart_m < keep_m:
                     count += 1
         inside_m = -signed_distance(
             arena.normals, arena.offsets_m, rules.fence_first, rules.fence_last, x, y, z
         )
         if inside_m < rules.fence_margin_m:
             count += 1
-        outcome[i].breaches = count
+        event.breaches = count

@@ -1,7 +1,6 @@
 """From a command to the wrench that flies it."""
 
-from numba import njit
-
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle import (
     LIFT,
     TAU_X,
@@ -15,7 +14,7 @@ from uas_coverage_env.vehicle import (
 from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def write_command(command, kind, first, second, third):
     """Write kind and numbers of a record of COMMAND_DTYPE."""
     command.kind = kind
@@ -25,13 +24,13 @@ def write_command(command, kind, first, second, third):
     command.values[3] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def write_brake(command):
     """Write the command to stop and to hold still."""
     write_command(command, CLIMB, 0.0, 0.0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def command_wrench(vehicle, x, reference, command, u):
     """Write into u the wrench for one step of a command, within the vehicle's limits.
 

@@ -2,38 +2,39 @@
 
 import math
 
-from numba import njit
-
+from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.outcome import NONE
 from uas_coverage_env.world.state import FLYING, LANDED
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def cover(arena, state, outcome):
     """Cover the waypoints within reach of a flying UAS at its position now.
 
     A lost UAS covers nothing at the sample of its loss. Where several UAS reach a waypoint at
     the same sample, it counts for the first of them.
     """
-    for w in range(state.uncovered.shape[0]):
-        if not state.uncovered[w]:
+    for i in range(state.status.shape[0]):
+        event = outcome[i]
+        if state.status[i] != FLYING or event.contact != NONE:
             continue
-        waypoint = arena.waypoints[w]
-        for i in range(state.status.shape[0]):
-            if state.status[i] != FLYING or outcome[i].contact != NONE:
-                continue
-            dx = state.x[i, X] - waypoint.position_m[0]
-            dy = state.x[i, Y] - waypoint.position_m[1]
-            dz = state.x[i, Z] - waypoint.position_m[2]
-            if dx * dx + dy * dy + dz * dz <= waypoint.radius_m * waypoint.radius_m:
+        x = state.x[i, X]
+        y = state.x[i, Y]
+        z = state.x[i, Z]
+        for w in range(state.uncovered.shape[0]):
+            waypoint = arena.waypoints[w]
+            dx = x - waypoint.position_m[0]
+            dy = y - waypoint.position_m[1]
+            dz = z - waypoint.position_m[2]
+            within = dx * dx + dy * dy + dz * dz <= waypoint.radius_m * waypoint.radius_m
+            if within and state.uncovered[w]:
                 state.uncovered[w] = False
-                outcome[i].newly_covered += 1
-                outcome[i].newly_covered_weight += waypoint.weight
-                break
+                event.newly_covered += 1
+                event.newly_covered_weight += waypoint.weight
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def land(arena, state, outcome):
     """Land the UAS that are slow and near their starts, and have left before or return.
 

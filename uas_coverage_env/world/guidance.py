@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.control import write_brake, write_command
@@ -24,7 +24,7 @@ _TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
 _SHARE_WHEN_TURNED = 0.4
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def target_position(arena, i, target):
     """Row of node_distance_m and place (north, east, down) [m] of a waypoint; home if negative."""
     if target < 0:
@@ -34,14 +34,14 @@ def target_position(arena, i, target):
     return target, position_m[0], position_m[1], position_m[2]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def path_length_home_m(arena, i, x):
     """Length [m] of the horizontal way home of UAS i past the tall obstacles."""
     row, x1, y1, z1 = target_position(arena, i, -1)
     return route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)[2]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     """Altitude needed over the low obstacles on a leg, and the speed that leaves time to climb.
 
@@ -74,7 +74,7 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     return needed_m, speed_mps
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
     """Speed towards the end of a leg [m/s]: slower for turns, a stop, and a climb or descent."""
     uas = arena.uas[i]
@@ -93,7 +93,7 @@ def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
     return speed_mps
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _altitude(arena, x, altitude1_m, way_m, needed_m):
     """Altitude to hold [m]: descend along a glide slope, but stay over what has to be passed."""
     rules = arena.rules[0]
@@ -103,14 +103,14 @@ def _altitude(arena, x, altitude1_m, way_m, needed_m):
     return min(max(altitude_m, rules.floor_m), max(rules.ceiling_m, altitude1_m))
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
     """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
     n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m)
     return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def guide(arena, i, x, reference, target, stop, nonlinear, command):
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 

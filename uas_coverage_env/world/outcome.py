@@ -15,6 +15,9 @@ OUTCOME_DTYPE = np.dtype(
         np.record,
         np.dtype(
             [
+                # it flew, and from where [m]
+                ("flew", "?"),
+                ("before_m", "f8", (3,)),
                 # (lift, three torques, thrust correction) [N, N m, N] that acted over the step
                 ("u", "f8", (N_INPUTS,)),
                 ("voltage_V", "f8"),

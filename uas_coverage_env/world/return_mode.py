@@ -1,7 +1,6 @@
 """When a UAS has to turn home to arrive in time and with charge left."""
 
-from numba import njit
-
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.world.guidance import path_length_home_m
 
@@ -10,7 +9,7 @@ _LANDING_S = 12.0
 _CLOCK_RESERVE_S = 30.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def seconds_home(arena, i, x):
     """Time [s] that UAS i needs to fly home and land, estimated with reserve.
 
@@ -23,10 +22,13 @@ def seconds_home(arena, i, x):
     return flying_s + altitude_m / uas.descent_mps + _LANDING_S
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def has_to_return(arena, state, i):
     """Whether UAS i has to fly home now: nothing is left to do, or battery or clock demand it."""
-    if not state.uncovered.any():
+    left = 0
+    for w in range(state.uncovered.shape[0]):
+        left += state.uncovered[w]
+    if left == 0:
         return True
     x = state.x[i]
     rules = arena.rules[0]

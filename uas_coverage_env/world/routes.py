@@ -7,12 +7,12 @@ a visibility graph. Distances along the graph to every waypoint and start are co
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from uas_coverage_env.geometry import segment_meets, signed_distance
+from uas_coverage_env.kernels import inlined_kernel, kernel
 
 _CREEP_M = 1e-3
 
@@ -21,7 +21,7 @@ CLEAR, IN_SIGHT, ROUND_CORNER, NO_WAY = range(4)
 over everything, because there is no way round."""
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def box_apart(obstacle, x0, y0, z0, x1, y1, z1):
     """Whether a segment misses the box in which the obstacle's clearance is below near_m."""
     lower = obstacle.lower_m
@@ -36,7 +36,7 @@ def box_apart(obstacle, x0, y0, z0, x1, y1, z1):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1):
     """Fraction of the leg at which it enters an inflated footprint; 2 where it does not."""
     enters = 0.0
@@ -56,7 +56,7 @@ def _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1):
     return enters
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
     """Where a horizontal leg crosses the widened footprint of an obstacle.
 
@@ -91,7 +91,7 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
     return at, over, d1 <= 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
     """Whether no tall obstacle lies between two places.
 
@@ -105,7 +105,7 @@ def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def line_is_clear(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     """Whether the straight line in space keeps the distance of routes from every obstacle."""
     for o in range(obstacles.shape[0]):
@@ -124,7 +124,7 @@ def line_is_clear(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def route(arena, target, x0, y0, z0, x1, y1, z1):
     """The next leg on the shortest way to a target past the fixed obstacles.
 
@@ -166,7 +166,7 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
     return nodes_m[corner, 0], nodes_m[corner, 1], shortest_m, ROUND_CORNER
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _sight_distances(obstacles, normals, offsets_m, from_m, to_m, distance_m):
     for a in range(from_m.shape[0]):
         for b in range(to_m.shape[0]):

@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-from numba import njit, typeof
+from numba import typeof
 
-from uas_coverage_env.vehicle import N_INPUTS, X, Y, Z, lpv_step, plant_step, reseed_reference
+from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
 from uas_coverage_env.world.arena import Arena
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
@@ -27,7 +27,7 @@ from uas_coverage_env.world.state import FLYING, LOST, WorldState
 ACCEPTED = -1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def first_invalid(arena, state, commands):
     """Index of the first flying UAS whose command cannot be flown; ACCEPTED where all can."""
     for i in range(state.status.shape[0]):
@@ -48,11 +48,14 @@ def first_invalid(arena, state, commands):
     return ACCEPTED
 
 
-@njit(cache=True, error_model="numpy")
-def _begin(commands, outcome):
+@inlined_kernel
+def begin_step(state, commands, outcome):
     """An outcome in which nothing has happened yet, with the commands as they were given."""
     for i in range(commands.shape[0]):
         event = outcome[i]
+        event.flew = state.status[i] == FLYING
+        for k in range(3):
+            event.before_m[k] = state.x[i, X + k]
         for k in range(N_INPUTS):
             event.u[k] = 0.0
         event.voltage_V = 0.0
@@ -68,13 +71,15 @@ def _begin(commands, outcome):
         event.separation_m = math.inf
         event.filtered = False
         event.returning = False
-        event.applied_command.kind = commands[i].kind
+        given = commands[i]
+        applied = event.applied_command
+        applied.kind = given.kind
         for k in range(4):
-            event.applied_command.values[k] = commands[i].values[k]
-        event.applied_command.returning = commands[i].returning
+            applied.values[k] = given.values[k]
+        applied.returning = given.returning
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _steer(arena, state, nonlinear, return_mode, outcome):
     """Turn home who has to, and resolve commands that name a place into velocities."""
     for i in range(state.status.shape[0]):
@@ -94,19 +99,21 @@ def _steer(arena, state, nonlinear, return_mode, outcome):
             guide(arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command)
 
 
-@njit(cache=True, error_model="numpy")
-def _fly(arena, state, nonlinear, before_m, outcome):
-    """Fly the commands for one step, and note where each UAS comes from in before_m (U, 3)."""
+@allocating_kernel
+def _filter(arena, state, nonlinear, outcome):
+    filter_commands(arena, state, nonlinear, outcome)
+
+
+@inlined_kernel
+def _fly(arena, state, nonlinear, outcome):
+    """Fly the commands for one step."""
     dt_h = arena.rules[0].dt_s / 3600.0
-    u = np.zeros(N_INPUTS)
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
             continue
         x = state.x[i]
-        before_m[i, 0] = x[X]
-        before_m[i, 1] = x[Y]
-        before_m[i, 2] = x[Z]
         event = outcome[i]
+        u = event.u
         command = event.applied_command
         vehicle = arena.vehicles[i]
         command_wrench(vehicle, x, state.reference[i], command, u)
@@ -114,8 +121,6 @@ def _fly(arena, state, nonlinear, before_m, outcome):
             voltage_V, current_A = plant_step(vehicle, x, u, x)
         else:
             voltage_V, current_A = lpv_step(vehicle, x, u, x)
-        for k in range(N_INPUTS):
-            event.u[k] = u[k]
         event.voltage_V = voltage_V
         event.current_A = current_A
         event.energy_Wh = voltage_V * current_A * dt_h
@@ -123,14 +128,31 @@ def _fly(arena, state, nonlinear, before_m, outcome):
             reseed_reference(x, state.reference[i])
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _lose(state, outcome):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING and outcome[i].contact != NONE:
             state.status[i] = LOST
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
+def carry_out(arena, state, nonlinear, outcome):
+    """Fly the commands in `outcome`, of any kind but GO_TO, and judge what happened.
+
+    The second half of `advance`. It makes no arrays at all, so it runs on a GPU too.
+    """
+    _fly(arena, state, nonlinear, outcome)
+    judge_obstacles(arena, state, outcome)
+    judge_separation(arena, state, outcome)
+    judge_limits(arena, state, outcome)
+    count_breaches(arena, state, outcome)
+    cover(arena, state, outcome)
+    land(arena, state, outcome)
+    _lose(state, outcome)
+    state.step[0] += 1
+
+
+@kernel
 def advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome):
     """Fly all UAS for one step and judge what happened (CONTRACT, "What counts").
 
@@ -146,29 +168,20 @@ def advance(arena, state, commands, nonlinear, return_mode, safety_filter, outco
         safety_filter: Keep commands clear of harm.
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
-    _begin(commands, outcome)
+    begin_step(state, commands, outcome)
     _steer(arena, state, nonlinear, return_mode, outcome)
     if safety_filter:
-        filter_commands(arena, state, nonlinear, outcome)
-    before_m = np.empty((state.status.shape[0], 3))
-    _fly(arena, state, nonlinear, before_m, outcome)
-    judge_obstacles(arena, state, before_m, outcome)
-    judge_separation(arena, state, before_m, outcome)
-    judge_limits(arena, state, outcome)
-    count_breaches(arena, state, outcome)
-    cover(arena, state, outcome)
-    land(arena, state, outcome)
-    _lose(state, outcome)
-    state.step[0] += 1
+        _filter(arena, state, nonlinear, outcome)
+    carry_out(arena, state, nonlinear, outcome)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def begin_mission(arena, state, outcome):
     """Put the world at t = 0: what lies within reach of the starts is covered at once."""
     cover(arena, state, outcome)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def step_world(
     vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
     waypoints, rules, nodes_m, node_distance_m,

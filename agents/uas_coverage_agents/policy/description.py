@@ -55,6 +55,11 @@ class Observation(StrictModel):
         """How many numbers."""
         return sum(group.size for group in self.groups)
 
+    def has_the_numbers_of(self, other: Self) -> bool:
+        """Whether both mean the same numbers, in whatever words."""
+        words = {"groups": {"__all__": {"features": {"__all__": {"meaning"}}}}}
+        return self.model_dump(exclude=words) == other.model_dump(exclude=words)
+
     @classmethod
     def of(cls, layout: str, groups: Iterable[Group], scales: Mapping[str, float]) -> Self:
         """Describe a layout that is given as the environment gives it."""

@@ -30,7 +30,7 @@ class VelocityPilot:
 
     def __init__(self, policy: Policy) -> None:
         description = policy.description
-        if description.observation != observation():
+        if not description.observation.has_the_numbers_of(observation()):
             raise ValueError("its observation is not that of this version; train it anew")
         if description.network.outputs != OUTPUTS:
             raise ValueError(f"network.outputs is {description.network.outputs}, not {OUTPUTS}")

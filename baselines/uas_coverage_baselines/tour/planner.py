@@ -114,7 +114,7 @@ class Tour:
         if self._begun:
             self._schedule.update(view)
         else:
-            self._schedule.begin(view, self._seed)
+            self._find_order(view)
             self._begun = True
         others_m = self._where_others_go(view)
         commands: dict[str, Command] = {}
@@ -125,6 +125,9 @@ class Tour:
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
         return commands
+
+    def _find_order(self, view: View) -> None:
+        self._schedule.begin(view, self._seed)
 
     def _fly(self, i: int, view: View, others_m: FloatArray) -> Command:
         task = self._task(i, view)

@@ -21,7 +21,7 @@ _LATE_S = 6.0  # this far off the schedule, another search is worth its time
 _WAIT_WHEN_LEFT_S = 60.0  # with less than this still to fly, blocked waypoints are waited for
 _WAIT_S = 30.0  # how long is then expected
 _FIRST_SEARCHES = 3
-_MOVES_AGAIN = 200_000  # of a search on an event
+_MOVES_AGAIN = 600_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
 
 
@@ -59,21 +59,20 @@ class Schedule:
         self.acceleration_mps2 = _AGILITY * np.array(
             [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
         )
-        # flown by these plans, a turn costs about what cutting through the sphere gains
-        self._turn_s = np.zeros((len(limits), len(scenario.waypoints)))
+        radius_m = np.array([waypoint.radius_m for waypoint in scenario.waypoints])
+        self._turn_s = radius_m / self.speed_mps[:, None]
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
         self.order = no_order(len(limits))
         self._waits = False  # whether blocked waypoints are waited for: little else is left
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
-        self._seed = seed
         task = self.task(view)
         orders = [
             improved(task, no_order(task.n_uas), Effort(self._moves), seed + attempt)
             for attempt in range(_FIRST_SEARCHES)
         ]
-        self._take(min(orders, key=lambda order: order.cost_s), view)
+        self.take(min(orders, key=lambda order: order.cost_s), view)
 
     def update(self, view: View) -> None:
         """Drop what is covered, and search again where something has happened."""
@@ -87,12 +86,14 @@ class Schedule:
         if self._has_changed(view) or (self._waits and not waits and view.blocked.any()):
             task = self.task(view)
             kept = improved(task, self.order, Effort(0), 0)
-            effort = Effort(_MOVES_AGAIN, hottest_s=1.5)
-            better = improved(task, kept, effort, self._seed + round(view.time_s))
+            efforts = (Effort(_MOVES_AGAIN, hottest_s=1.5), Effort(_MOVES_AGAIN))
+            found = [improved(task, kept, effort, round(view.time_s)) for effort in efforts]
+            better = min(found, key=lambda order: order.cost_s)
             worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
-            self._take(better if worthwhile else kept, view)
+            self.take(better if worthwhile else kept, view)
 
-    def _take(self, order: Order, view: View) -> None:
+    def take(self, order: Order, view: View) -> None:
+        """Fly an order from now on."""
         self.order = order
         self._taken_under = view
         self._expected_s = self._expected_home_s(view)

@@ -1,0 +1,165 @@
+"""The documentation: it builds, its code runs, its commands exist, its names stand where it says."""
+
+import re
+import subprocess
+import sys
+import tomllib
+
+import pytest
+import typer
+from markdown_blocks import PAGES, ROOT, blocks, command_lines
+from typer.core import TyperGroup
+
+from uas_coverage_env.cli.app import app
+from uas_coverage_env.env.layout import OBSERVATION_LAYOUT
+from uas_coverage_env.flight import load_planner, planner_names
+from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
+from uas_coverage_env.scenario import Scenario, scenario_names
+from uas_coverage_env.strict_toml import parse
+
+DOCS = ROOT / "docs"
+PLACEHOLDERS = {"NAME"}
+WITH_CODE = [page for page in PAGES if any(b.language == "python" for b in blocks(page))]
+WITH_COMMANDS = [page for page in PAGES if any(command_lines(page))]
+
+
+def shown(page):
+    return str(page.relative_to(ROOT))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    result = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-W", "-q", "-d", folder / "doctrees"]
+        + ["-b", "html", DOCS, folder / "html"],
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return folder / "html"
+
+
+def test_the_site_builds_without_a_warning_and_holds_every_page(site):
+    built = {path.stem for path in site.glob("*.html")}
+    assert {page.stem for page in DOCS.glob("*.md")} <= built
+
+
+def test_the_site_fetches_nothing(site):
+    fetched = re.compile(r"<(?:script|link|img|iframe)\b[^>]*\b(?:src|href)=\"(?:https?:)?//[^\"]*")
+    found = {path.name: fetched.findall(path.read_text()) for path in site.rglob("*.html")}
+    assert len(found) > 15
+    assert not any(found.values()), found
+    styles = [path for path in site.rglob("*.css") if "url(http" in path.read_text()]
+    assert styles == []
+
+
+def test_the_environment_page_has_every_feature_of_the_observation(site):
+    text = (site / "environment.html").read_text()
+    for group in OBSERVATION_LAYOUT:
+        for feature in group.features:
+            assert f"{group.name}.{feature.name}" in text
+
+
+def test_formulas_are_drawn_by_the_browser(site):
+    text = (site / "formulation.html").read_text()
+    assert "<math" in text
+    assert "$$" not in text
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=shown)
+def test_the_python_blocks_of_a_page_run_one_after_the_other(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "page"}
+    for block in blocks(page):
+        if block.language == "python":
+            code = compile(block.text, f"{shown(page)}, block of line {block.line}", "exec")
+            if not block.long:
+                exec(code, names)
+
+
+@pytest.mark.parametrize("page", WITH_COMMANDS, ids=shown)
+def test_the_command_line_understands_every_command_of_a_page(page):
+    for words in command_lines(page):
+        if words[0] == "uas-coverage":
+            understood(words)
+        elif words[0] == "python" and words[1].endswith(".py"):
+            assert (ROOT / words[1]).is_file(), words
+
+
+def understood(words):
+    """Parse a command as the program does, and ask that players and their options exist."""
+    command, context, rest = typer.main.get_command(app), None, words[1:]
+    while True:
+        context = command.make_context(words[0], list(rest), parent=context)
+        rest = [*context._protected_args, *context.args]
+        if not isinstance(command, TyperGroup) or not rest:
+            break
+        _, command, rest = command.resolve_command(context, rest)
+        assert command is not None, words
+    given = context.params
+    if command.name == "run":
+        options = dict(option.split("=", 1) for option in given["option"] or ())
+        check_player(given["planner"], options)
+        assert given["scenario"] in scenario_names() or given["scenario"].endswith(".toml"), words
+    if command.name == "compare":
+        for player in given["planners"].split(","):
+            check_player(player.rpartition("=")[2], {})
+
+
+def check_player(name, options):
+    if name in PLACEHOLDERS or name.startswith("policy:"):
+        return
+    assert name in planner_names()
+    load_planner(name, options)
+
+
+def test_a_command_that_does_not_exist_would_be_noticed():
+    with pytest.raises(typer.TyperException):
+        understood(["uas-coverage", "run", "village", "--no-such-option"])
+    with pytest.raises(typer.TyperException):
+        understood(["uas-coverage", "fly", "village"])
+    with pytest.raises(ValueError, match="no option"):
+        understood(["uas-coverage", "run", "village", "--planner", "hover", "--option", "wings=2"])
+
+
+def test_toml_blocks_of_scenarios_are_valid_scenarios():
+    found = [
+        (shown(page), block)
+        for page in PAGES
+        for block in blocks(page)
+        if block.language == "toml" and block.text.startswith("schema")
+    ]
+    assert found
+    for page, block in found:
+        parse(tomllib.loads(block.text), Scenario, page)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=shown)
+def test_links_to_files_lead_somewhere(page):
+    prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    for target in re.findall(r"(?<!!)\[[^\]]*\]\(([^)#\s]+)[^)]*\)", prose):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_every_name_of_the_paper_map_stands_where_it_says():
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in (DOCS / "paper_map.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("|") and "`" in line
+    ]
+    assert len(rows) > 30
+    for what, _, names, place in rows:
+        path = place.strip("`").replace("milp_mpc/", "baselines/uas_coverage_baselines/milp_mpc/")
+        file = ROOT / path if path.startswith("baselines") else ROOT / "uas_coverage_env" / path
+        words = set(re.findall(r"\w+", file.read_text(encoding="utf-8")))
+        missing = set(re.findall(r"`(\w+)`", names)) - words
+        assert not missing, f"{what}: {missing} not in {place}"
+
+
+def test_the_columns_of_a_flight_are_described_in_their_order():
+    text = (DOCS / "flight_directory.md").read_text(encoding="utf-8")
+    table = text.partition("## `flight.csv`")[2].partition("## ")[0]
+    cells = re.findall(r"^\|([^|]*)\|", table, re.MULTILINE)
+    assert tuple(re.findall(r"`(\w+)`", " ".join(cells))) == FLIGHT_COLUMNS

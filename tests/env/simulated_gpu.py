@@ -1,0 +1,68 @@
+"""Missions on numba's simulated GPU, and the same as episodes; prints how they compare, as JSON.
+
+Run as a program, with NUMBA_ENABLE_CUDASIM=1.
+"""
+
+import json
+
+import numpy as np
+from practice_grounds import practice_ground
+
+from uas_coverage_env.env.cuda import CudaMissions
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.kernel import REWARD
+
+N_LANES, N_STEPS = 2, 25
+
+
+def compare():
+    """Fly both ways, lanes with different actions, past the end of missions."""
+    ground = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
+    missions = CudaMissions(N_LANES, ground)
+    episodes = [
+        Episode(
+            ground,
+            action="velocity",
+            dynamics="lpv",
+            return_mode=False,
+            safety_filter=False,
+            reward_weights=None,
+            max_cycles=None,
+        )
+        for _ in range(N_LANES)
+    ]
+    for episode in episodes:
+        episode.reset()
+    rng = np.random.default_rng(0)
+    different, restarts = 0, 0
+    ended = [False] * N_LANES
+    for _ in range(N_STEPS):
+        asked = rng.uniform(-1, 1, (N_LANES, 2, 3))
+        missions.step(asked)
+        seen = missions.missions
+        for lane, episode in enumerate(episodes):
+            if ended[lane]:
+                episode.reset()
+                ended[lane] = False
+                restarts += 1
+            else:
+                episode.asked[:] = asked[lane]
+                report = np.array(episode.step())
+                different += int((seen.rewards[lane] != report[:, REWARD]).sum())
+                ended[lane] = bool(seen.ended[lane])
+            different += int((seen.observation[lane] != episode.observation).sum())
+    asked[0, 1, 2] = np.nan
+    before = missions.missions.x.copy()
+    missions.step(asked)
+    changed = (missions.missions.x != before).any(axis=(1, 2)).tolist()
+    return {
+        "different": different,
+        "restarts": restarts,
+        "refused": missions.missions.refused.tolist(),
+        "changed": changed,
+        "acted": int(missions.missions.acted.sum()),
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(compare()))

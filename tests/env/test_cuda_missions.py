@@ -1,0 +1,22 @@
+import json
+import os
+import subprocess
+import sys
+
+import simulated_gpu
+
+
+def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes():
+    done = subprocess.run(
+        [sys.executable, simulated_gpu.__file__],
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["different"] == 0
+    assert result["restarts"] >= 2
+    assert result["refused"] == [True, False]
+    assert result["changed"] == [False, True]
+    assert result["acted"] > 20

@@ -1,0 +1,64 @@
+"""How the kernels of a step are compiled: without counting references, and so without allocating.
+
+Numba counts a reference for every array that a kernel takes out of a named tuple or slices, with
+an atomic instruction; in one step of two UAS that is as much work as the flight. The arrays of a
+step outlive it, so nothing has to be counted. The price is that such a kernel cannot make arrays:
+what it needs for a while lies on the stack (`room`). The same source compiles for a GPU.
+"""
+
+import numpy as np
+from llvmlite import ir
+from numba import config, njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
+from numpy.typing import NDArray
+
+kernel = njit(cache=True, error_model="numpy", _nrt=False)
+"""Compiles a function that makes no arrays and returns none."""
+
+inlined_kernel = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+"""A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
+to hand over their hundred machine words takes longer than most of these parts themselves."""
+
+allocating_kernel = njit(cache=True, error_model="numpy", _nrt=True)
+"""Compiles a function that makes arrays; also what it calls, unless that is a `kernel`."""
+
+
+def room(size: int) -> NDArray[np.float64]:
+    """An array for the time of one call, in a kernel on the stack.
+
+    Args:
+        size: How many numbers; a constant.
+
+    Returns:
+        (size,) not initialised.
+    """
+    return np.empty(size)
+
+
+def _on_the_stack(typing_context, size):
+    if not isinstance(size, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, signature, arguments):
+        double = ir.DoubleType()
+        data = cgutils.alloca_once(builder, ir.ArrayType(double, size.literal_value))
+        array = make_array(signature.return_type)(context, builder)
+        width = context.get_constant(types.intp, 8)
+        populate_array(
+            array,
+            data=builder.bitcast(data, double.as_pointer()),
+            shape=[context.get_constant(types.intp, size.literal_value)],
+            strides=[width],
+            itemsize=width,
+            meminfo=None,
+            parent=None,
+        )
+        return array._getvalue()
+
+    return types.Array(types.float64, 1, "C")(size), generate
+
+
+if not config.DISABLE_JIT:
+    room = intrinsic(prefer_literal=True)(_on_the_stack)

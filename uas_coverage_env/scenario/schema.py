@@ -1,0 +1,47 @@
+"""The JSON Schema of scenario files, with the meaning of every field, for editors and the docs."""
+
+import inspect
+import re
+from typing import Any
+
+from pydantic import BaseModel
+
+from uas_coverage_env.scenario.model import (
+    Decoration,
+    Geofence,
+    MovingObstacle,
+    Obstacle,
+    Scenario,
+    ScheduledVelocity,
+    Uas,
+    Waypoint,
+)
+
+_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration)
+_ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
+
+
+def scenario_schema() -> dict[str, Any]:
+    """The JSON Schema (2020-12) of a scenario file.
+
+    It knows names, types, ranges and what has to be there. What takes geometry to tell (is a start
+    clear of the obstacles?) only `load_scenario` checks.
+    """
+    schema = Scenario.model_json_schema(by_alias=True)
+    _describe(schema, Scenario)
+    for model in _TABLES:
+        _describe(schema["$defs"][model.__name__], model)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _describe(table: dict[str, Any], model: type[BaseModel]) -> None:
+    """Put the docstring's sentences where editors show them."""
+    summary, _, attributes = (inspect.getdoc(model) or "").partition("\nAttributes:")
+    table["description"] = " ".join(summary.split())
+    meanings = {name: " ".join(text.split()) for name, text in _ENTRY.findall(attributes)}
+    for name, field in model.model_fields.items():
+        entry = table["properties"][field.alias or name]
+        entry["description"] = meanings.get(name, "")
+        if entry.get("type") == "array" and "minLength" in entry:
+            # where a validator stands before a tuple pydantic takes it for text
+            entry["minItems"] = entry.pop("minLength")
