@@ -59,7 +59,6 @@ class Study:
 STUDIES = (
     Study("maskable-ppo", "learned-waypoint"),
     Study("ppo", "learned-velocity"),
-    Study("sac", seeds=1),
     Study("ppo-end-to-end", seeds=1, assisted=False),
 )
 
@@ -124,7 +123,8 @@ def report(
     ]
     lines = [
         f"`uas-coverage train {study.config} --seed K`, "
-        f"scored by `python benchmarks/learners.py {study.config}`; {machine()}.",
+        f"scored by `python benchmarks/learners.py {study.config} --missions {len(towns)}` "
+        f"on {len(towns)} unseen towns; {machine()}.",
         "",
         f"![Learning curves](../docs/pictures/learning-{study.config}.png)",
         "",

@@ -216,7 +216,7 @@ def ratios(case: Case, cases: list[Case]) -> dict[str, list[float]]:
 
 def table_of(cases: list[Case]) -> Table:
     """One row for each case."""
-    table = Table("environment", "envs", "threads", "agent-steps/s [k]", "times a peer", "peak MB")
+    table = Table("environment", "envs", "threads", "1000 agent-steps/s", "times a peer", "peak MB")
     for case in cases:
         if not case.rates:
             continue

@@ -22,7 +22,7 @@ from uas_coverage_env.env.pool import tables_of
 from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.env.surroundings import surroundings
 from uas_coverage_env.vehicle import lpv_step
-from uas_coverage_env.world import FLYING, VELOCITY, advance
+from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
 from uas_coverage_env.world.contacts import (
     count_breaches,
     judge_limits,
@@ -41,23 +41,23 @@ compiled = njit(error_model="numpy")
 
 
 @compiled
-def _whole(arena, state, tables, lanes, lane, weights, spare, row):
+def _whole(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     ranges, scales, neighbours = tables
     step_learners(
         arena, state, VELOCITY, ranges, scales, neighbours, weights, False, False, False,
         lanes.asked[lane], lanes.targets[lane], lanes.candidates[lane], lanes.company[lane],
-        lanes.commands[lane], lanes.outcome[lane], lanes.report[lane],
+        commands[lane], outcome[lane], lanes.report[lane],
         arena.rules[0].max_steps, row,
     )  # fmt: skip
 
 
 @compiled
-def _world(arena, state, tables, lanes, lane, weights, spare, row):
-    advance(arena, state, lanes.commands[lane], False, False, False, lanes.outcome[lane])
+def _world(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+    advance(arena, state, commands[lane], False, False, False, outcome[lane])
 
 
 @compiled
-def _observation(arena, state, tables, lanes, lane, weights, spare, row):
+def _observation(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     observe(
         arena, state, tables[1], lanes.company[lane], state.status == FLYING, lanes.targets[lane],
         arena.rules[0].max_steps, lanes.candidates[lane], row,
@@ -65,61 +65,61 @@ def _observation(arena, state, tables, lanes, lane, weights, spare, row):
 
 
 @compiled
-def _actions(arena, state, tables, lanes, lane, weights, spare, row):
+def _actions(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     write_commands(
         state, VELOCITY, tables[0], lanes.asked[lane], lanes.candidates[lane], lanes.targets[lane],
-        lanes.commands[lane],
+        commands[lane],
     )  # fmt: skip
 
 
 @compiled
-def _inner_loop(arena, state, tables, lanes, lane, weights, spare, row):
+def _inner_loop(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            command = lanes.commands[lane, i]
+            command = commands[lane, i]
             reference = state.reference[i]
             command_wrench(arena.vehicles[i], state.x[i], reference, command, spare)
 
 
 @compiled
-def _model(arena, state, tables, lanes, lane, weights, spare, row):
+def _model(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            lpv_step(arena.vehicles[i], state.x[i], lanes.outcome[lane, i].u, spare)
+            lpv_step(arena.vehicles[i], state.x[i], outcome[lane, i].u, spare)
 
 
 @compiled
-def _obstacles(arena, state, tables, lanes, lane, weights, spare, row):
-    judge_obstacles(arena, state, lanes.outcome[lane])
+def _obstacles(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+    judge_obstacles(arena, state, outcome[lane])
 
 
 @compiled
-def _other_contacts(arena, state, tables, lanes, lane, weights, spare, row):
-    judge_separation(arena, state, lanes.outcome[lane])
-    judge_limits(arena, state, lanes.outcome[lane])
-    count_breaches(arena, state, lanes.outcome[lane])
+def _other_contacts(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+    judge_separation(arena, state, outcome[lane])
+    judge_limits(arena, state, outcome[lane])
+    count_breaches(arena, state, outcome[lane])
 
 
 @compiled
-def _coverage(arena, state, tables, lanes, lane, weights, spare, row):
-    cover(arena, state, lanes.outcome[lane])
-    land(arena, state, lanes.outcome[lane])
+def _coverage(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+    cover(arena, state, outcome[lane])
+    land(arena, state, outcome[lane])
 
 
 @compiled
-def _reward(arena, state, tables, lanes, lane, weights, spare, row):
-    pay(arena, state, lanes.commands[lane], lanes.outcome[lane], weights, False, lanes.report[lane])
+def _reward(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+    pay(arena, state, commands[lane], outcome[lane], weights, False, lanes.report[lane])
 
 
 @compiled
-def _nearest(arena, state, tables, lanes, lane, weights, spare, row):
+def _nearest(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             nearest_waypoints(arena, state, i, lanes.candidates[lane, i])
 
 
 @compiled
-def _waypoints(arena, state, tables, lanes, lane, weights, spare, row):
+def _waypoints(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             waypoints(
@@ -129,14 +129,14 @@ def _waypoints(arena, state, tables, lanes, lane, weights, spare, row):
 
 
 @compiled
-def _surroundings(arena, state, tables, lanes, lane, weights, spare, row):
+def _surroundings(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             surroundings(arena, state, i, row[i], 0)
 
 
 @compiled
-def _movers(arena, state, tables, lanes, lane, weights, spare, row):
+def _movers(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             k = others(arena, state, tables[1][i], i, row[i], 0)
@@ -164,13 +164,16 @@ PARTS: dict[str, Callable[..., None]] = {
 
 def _over_lanes(part: Callable[..., None]) -> Callable[..., None]:
     @compiled
-    def run(arenas, tables, worlds, lanes, weights, spare, observation):
+    def run(arenas, tables, worlds, lanes, commands, outcome, weights, spare, observation):
         arena = arena_of(arenas, 0)
         scales = tables_of(tables, 0)
         n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
         for lane in range(observation.shape[0]):
             state = state_of(worlds, lane, n_uas, n_waypoints)
-            part(arena, state, scales, lanes, lane, weights, spare, observation[lane])
+            part(
+                arena, state, scales, lanes, commands, outcome, lane, weights, spare,
+                observation[lane],
+            )  # fmt: skip
 
     return run
 
@@ -183,11 +186,14 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     shape = batch.lanes.asked.shape
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
-    weights = np.ones(len(REWARD_TERMS))
+    fleet = batch.worlds.status.shape
     arguments: tuple[Any, ...] = (
-        batch.pool.arenas, batch.pool.tables, batch.worlds, batch.lanes, weights, np.zeros(14),
-        batch.observation,
+        batch.pool.arenas, batch.pool.tables, batch.worlds, batch.lanes,
+        np.zeros(fleet, COMMAND_DTYPE), np.zeros(fleet, OUTCOME_DTYPE),
+        np.ones(len(REWARD_TERMS)), np.zeros(14), batch.observation,
     )  # fmt: skip
+    # once, so that there are outcomes for the parts to go on from
+    _over_lanes(PARTS[WHOLE])(*arguments)
     result = {}
     for name, part in PARTS.items():
         run = _over_lanes(part)

@@ -28,7 +28,8 @@ from uas_coverage_agents.waypoint.layout import CANDIDATE, HOME_CHOICE, N_TEAM, 
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NOBODY, NOT_HOME, TIME
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
-from uas_coverage_env.flight import coverage, decision_time_s, energy_Wh, home
+from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import decision_time_s
 from uas_coverage_env.world.pool import n_of, pool_arenas
 
 COLUMNS = ("coverage", "all home", "violations", "breaches", "Wh", "steps", "p95 s", "max s")

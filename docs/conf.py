@@ -20,5 +20,6 @@ highlight_language = "text"
 html_theme = "furo"
 html_title = project
 html_copy_source = False
+html_show_copyright = False
 html_extra_path = ["_generated/served"]
 html_math_renderer = "mathml"

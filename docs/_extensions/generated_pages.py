@@ -125,8 +125,12 @@ def scenario_fields() -> str:
     schema = scenario_schema()
     tables = [("The file", schema)]
     for name, entry in schema["properties"].items():
-        tables += [(f"`[[{name}]]`" if "items" in entry else f"`[{name}]`", part)
-                   for part in _tables_in(entry, schema)]  # fmt: skip
+        reference = entry.get("items", entry).get("$ref", "").rpartition("/")[2]
+        if reference:
+            title = f"`[[{name}]]`" if "items" in entry else f"`[{name}]`"
+            tables.append((title, schema["$defs"][reference]))
+    schedule = schema["$defs"]["ScheduledVelocity"]
+    tables.append(("`[[moving_obstacles.schedule]]`", schedule))
     parts = []
     for title, part in tables:
         rows = [
@@ -138,24 +142,12 @@ def scenario_fields() -> str:
             )
             for name, entry in part["properties"].items()
         ]
-        parts += [f"## {title}", part["description"], table(("key", "value", "", "meaning"), rows)]
-    schedule = schema["$defs"]["ScheduledVelocity"]
-    rows = [(f"`{k}`", _type(e), e["description"]) for k, e in schedule["properties"].items()]
-    parts += [
-        "## `[[moving_obstacles.schedule]]`",
-        schedule["description"],
-        table(("key", "value", "meaning"), rows),
-    ]
+        parts += [f"### {title}", part["description"], table(("key", "value", "", "meaning"), rows)]
     return "\n\n".join(parts)
 
 
-def _tables_in(entry: dict[str, Any], schema: dict[str, Any]) -> list[dict[str, Any]]:
-    reference = entry.get("items", entry).get("$ref", "")
-    return [schema["$defs"][reference.rpartition("/")[2]]] if reference else []
-
-
 def _type(entry: dict[str, Any]) -> str:
-    """A value in words: `number, 0 to 1`, `3 numbers`, `list, at least 4`."""
+    """A value in words: `number, > 0, ≤ 1`, `3 numbers`, `tables, at least 1`."""
     if "anyOf" in entry:
         return _type(entry["anyOf"][0])
     if "$ref" in entry:
@@ -167,13 +159,11 @@ def _type(entry: dict[str, Any]) -> str:
         of = "tables" if "$ref" in entry["items"] else f"entries of {_type(entry['items'])}"
         return f"{of}{least}"
     word = {"number": "number", "integer": "whole number", "string": "text"}[entry["type"]]
-    limits = [
-        f"{sign} {entry[key]:g}"
-        for key, sign in (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"),
-                          ("exclusiveMaximum", "<"))
-        if key in entry
-    ]  # fmt: skip
+    limits = [f"{sign} {entry[key]:g}" for key, sign in _LIMITS.items() if key in entry]
     return ", ".join([word, *limits])
+
+
+_LIMITS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 
 
 def planners() -> str:

@@ -1,5 +1,6 @@
 """Formulas as MathML, which browsers draw themselves: nothing has to be fetched to read them."""
 
+import re
 from html import escape
 from typing import Any
 
@@ -17,10 +18,12 @@ def _mathml(node: nodes.math | nodes.math_block) -> str:
     # docutils knows \textstyle at the head of a group alone; a code host knows it everywhere
     tex = node.astext().replace(r"\textstyle", "")
     try:
-        return tex2mathml(tex, as_block=isinstance(node, nodes.math_block))
+        formula = tex2mathml(tex, as_block=isinstance(node, nodes.math_block))
     except MathError as error:
         _LOG.warning("formula %r: %s", tex, error, location=node, type="mathml")
         return f"<code>{escape(tex)}</code>"
+    # plain braces are as high as what they hold, like plain brackets
+    return re.sub(r"<mo>([{}])</mo>", r'<mo stretchy="false">\1</mo>', formula)
 
 
 def _inline(translator: HTML5Translator, node: nodes.math) -> None:

@@ -30,8 +30,8 @@ def test_a_report_takes_the_place_of_the_former_one(readme):
     learners.put("ppo", "newer")
     text = readme.read_text()
     assert text == "before\n<!-- ppo -->\n\nnewer\n\n<!-- end of ppo -->\nafter\n"
-    with pytest.raises(ValueError, match="has no <!-- sac -->"):
-        learners.put("sac", "new")
+    with pytest.raises(ValueError, match="has no <!-- dqn -->"):
+        learners.put("dqn", "new")
     assert readme.read_text() == text
 
 

@@ -265,6 +265,17 @@ def test_searching_the_beginnings_is_searching_the_whole_with_the_rests_as_they_
             assert new[len(new) - len(old) + most :].tolist() == old[most:].tolist()
 
 
+def test_what_no_battery_reaches_stays_left_out_when_beginnings_are_searched():
+    neighbours = np.array([[(w + 1) % 14, (w + 2) % 14] for w in range(14)])
+    whole = task(5, waypoints=14, budget_s=np.full(2, 60.0), neighbours=neighbours)
+    order = improved(whole, no_order(2), SOME, 0)
+    part = Beginning.of(whole, order, 2)
+    assert len(order.left_out)
+    assert any(map(len, part.rests))
+    joined = part.joined(improved(part.task, part.order, SOME, 1))
+    assert sorted(np.concatenate([*joined.routes, joined.left_out])) == list(range(14))
+
+
 def test_short_routes_are_searched_as_a_whole():
     whole = task(3)
     order = improved(whole, no_order(2), SOME, 0)

@@ -69,6 +69,7 @@ _WORTH_POLISHING = 0.05
 _WORTH_STARTING_S = 0.05  # less time than this gives no first plan
 _WORTHWHILE_S = 0.12  # nor this a better one
 _TURN_S = 0.15  # of one thread: with less for each, some wait for the next decision
+_TURN_PER_WRITING = 6.0  # a busy machine takes longer: what writing a program took says so
 _TEAMS_VERIFIED = 6
 _RESTRICTED_NODES = 60
 _ALONE_NODES = 30
@@ -100,10 +101,11 @@ def decide(
     left = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
     standby = [search.safe(uas, plans) for uas, plans in enumerate(left)]
     goes_on = [len(left[u]) > 1 and any(p is left[u][0] for p in standby[u]) for u in everyone]
-    turn = search.turn(turns or Turns(), [uas for uas in everyone if not goes_on[uas]])
+    turns = Turns() if turns is None else turns
+    turn = search.turn(turns, [uas for uas in everyone if not goes_on[uas]])
     with ThreadPoolExecutor(effort.threads) as side_by_side:  # kernels and solver free the GIL
         constructing = {uas: side_by_side.submit(flights, problem, uas, dt_s) for uas in turn}
-        search.formulate(turn)
+        turns.writing_s = search.formulate(turn) / len(turn)
         pools = [
             constructing[uas].result() if uas in turn else [as_flight(problem, uas, left[uas][0])]
             for uas in everyone
@@ -179,11 +181,12 @@ class _Search:
         self._best: Plan | None = None
         self._bound = -np.inf
 
-    def formulate(self, turn: Sequence[int]) -> None:
-        """Write the own programs of those whose turn it is."""
+    def formulate(self, turn: Sequence[int]) -> float:
+        """Write the own programs of those whose turn it is; how long it took [s]."""
         before = time.perf_counter()
         self._own = {uas: Program(self._alone[uas]) for uas in turn}
         self._formulating_s = time.perf_counter() - before
+        return self._formulating_s
 
     def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
         """Those of a UAS's plans that are clear of everything but the other UAS."""
@@ -193,7 +196,8 @@ class _Search:
         """Who is planned for: everybody where the time suffices."""
         most = min(self.problem.n_uas, self.effort.at_once)
         if not self.effort.deterministic:
-            most = min(most, int(self.effort.threads * self.time_left_s() / _TURN_S))
+            each_s = max(_TURN_S, _TURN_PER_WRITING * turns.writing_s)
+            most = min(most, int(self.effort.threads * self.time_left_s() / each_s))
         return turns.take(self.problem.names, urgent, max(most, 1))
 
     def has_plan(self, uas: int) -> bool:

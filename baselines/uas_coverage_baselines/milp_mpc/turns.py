@@ -14,6 +14,7 @@ class Turns:
     """Whose turn it is to be planned for, where the time does not suffice for everybody."""
 
     def __init__(self) -> None:
+        self.writing_s = 0.0  # what writing one program took in the last decision
         self._last: dict[str, int] = {}
         self._decision = 0
 

@@ -24,18 +24,20 @@ class Beginning:
         task: the routing problem of these waypoints alone.
         order: their order.
         rests: (U) what follows in each route.
+        aside: left out of the whole order, and far from these waypoints.
     """
 
     task: Task
     order: Order
     rests: tuple[NDArray[np.int64], ...]
+    aside: NDArray[np.int64]
 
     @classmethod
     def of(cls, task: Task, order: Order, most: int) -> Beginning:
         """The first `most` waypoints of each route of an order."""
         rests = tuple(route[most:] for route in order.routes)
         if not any(map(len, rests)):
-            return cls(task, order, rests)
+            return cls(task, order, rests, order.left_out[:0])
         first = tuple(route[:most] for route in order.routes)
         home_s, idle_s, start_m = task.home_s.copy(), task.idle_s.copy(), task.start_m.copy()
         for uas, rest in enumerate(rests):
@@ -45,16 +47,24 @@ class Beginning:
                 home_s[uas] = between[:, rest[0]] + rest_s
                 idle_s[uas] = task.first_s[uas, rest[0]] + rest_s
                 start_m[uas] = task.waypoints_m[rest[0], :2]
+        near = np.isin(order.left_out, task.neighbours[np.concatenate(first)])
+        left_out = order.left_out[near]
         part = replace(
             task,
-            open_waypoints=np.concatenate([*first, order.left_out]),
+            open_waypoints=np.concatenate([*first, left_out]),
             home_s=home_s,
             idle_s=idle_s,
             start_m=start_m,
         )
-        return cls(part, replace(order, routes=first), rests)
+        return cls(
+            part, replace(order, routes=first, left_out=left_out), rests, order.left_out[~near]
+        )
 
     def joined(self, order: Order) -> Order:
         """The whole order again, with the beginnings as `order` has them."""
         routes = zip(order.routes, self.rests, strict=True)
-        return replace(order, routes=tuple(np.concatenate(parts) for parts in routes))
+        return replace(
+            order,
+            routes=tuple(np.concatenate(parts) for parts in routes),
+            left_out=np.concatenate([order.left_out, self.aside]),
+        )
