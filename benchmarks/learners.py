@@ -123,8 +123,8 @@ def report(
     ]
     lines = [
         f"`uas-coverage train {study.config} --seed K`, "
-        f"scored by `python benchmarks/learners.py {study.config} --missions {len(towns)}` "
-        f"on {len(towns)} unseen towns; {machine()}.",
+        f"scored by `python benchmarks/learners.py {study.config} "
+        f"--seeds {len(directories)} --missions {len(towns)}`; {machine()}.",
         "",
         f"![Learning curves](../docs/pictures/learning-{study.config}.png)",
         "",

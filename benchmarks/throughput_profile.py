@@ -7,15 +7,17 @@ and in registers, and every loop costs a little: their sum is not exactly the wh
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from rich.table import Table
 
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions import write_commands
-from uas_coverage_env.env.kernel import step_learners
+from uas_coverage_env.env.kernel import REPORT_SIZE, step_learners
+from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
 from uas_coverage_env.env.observation import observe
 from uas_coverage_env.env.pool import tables_of
@@ -23,6 +25,7 @@ from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.env.surroundings import surroundings
 from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
+from uas_coverage_env.world.borrow import borrow
 from uas_coverage_env.world.contacts import (
     count_breaches,
     judge_limits,
@@ -40,103 +43,115 @@ WHOLE = "the whole step"
 compiled = njit(error_model="numpy")
 
 
+class View(NamedTuple):
+    """What `step_learners` needs of one lane."""
+
+    asked: NDArray[np.float64]
+    targets: NDArray[np.int64]
+    candidates: NDArray[np.int64]
+    company: NDArray[np.float64]
+    commands: NDArray[np.void]
+    outcome: NDArray[np.void]
+    report: NDArray[np.float64]
+
+
 @compiled
-def _whole(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _whole(arena, state, tables, view, weights, spare, row):
     ranges, scales, neighbours = tables
     step_learners(
         arena, state, VELOCITY, ranges, scales, neighbours, weights, False, False, False,
-        lanes.asked[lane], lanes.targets[lane], lanes.candidates[lane], lanes.company[lane],
-        commands[lane], outcome[lane], lanes.report[lane],
+        view.asked, view.targets, view.candidates, view.company,
+        view.commands, view.outcome, view.report,
         arena.rules[0].max_steps, row,
     )  # fmt: skip
 
 
 @compiled
-def _world(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
-    advance(arena, state, commands[lane], False, False, False, outcome[lane])
+def _world(arena, state, tables, view, weights, spare, row):
+    advance(arena, state, view.commands, False, False, False, view.outcome)
 
 
 @compiled
-def _observation(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _observation(arena, state, tables, view, weights, spare, row):
     observe(
-        arena, state, tables[1], lanes.company[lane], state.status == FLYING, lanes.targets[lane],
-        arena.rules[0].max_steps, lanes.candidates[lane], row,
+        arena, state, tables[1], view.company, state.status == FLYING, view.targets,
+        arena.rules[0].max_steps, view.candidates, row,
     )  # fmt: skip
 
 
 @compiled
-def _actions(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _actions(arena, state, tables, view, weights, spare, row):
     write_commands(
-        state, VELOCITY, tables[0], lanes.asked[lane], lanes.candidates[lane], lanes.targets[lane],
-        commands[lane],
+        state, VELOCITY, tables[0], view.asked, view.candidates, view.targets,
+        view.commands,
     )  # fmt: skip
 
 
 @compiled
-def _inner_loop(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _inner_loop(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            command = commands[lane, i]
+            command = view.commands[i]
             reference = state.reference[i]
             command_wrench(arena.vehicles[i], state.x[i], reference, command, spare)
 
 
 @compiled
-def _model(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _model(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            lpv_step(arena.vehicles[i], state.x[i], outcome[lane, i].u, spare)
+            lpv_step(arena.vehicles[i], state.x[i], view.outcome[i].u, spare)
 
 
 @compiled
-def _obstacles(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
-    judge_obstacles(arena, state, outcome[lane])
+def _obstacles(arena, state, tables, view, weights, spare, row):
+    judge_obstacles(arena, state, view.outcome)
 
 
 @compiled
-def _other_contacts(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
-    judge_separation(arena, state, outcome[lane])
-    judge_limits(arena, state, outcome[lane])
-    count_breaches(arena, state, outcome[lane])
+def _other_contacts(arena, state, tables, view, weights, spare, row):
+    judge_separation(arena, state, view.outcome)
+    judge_limits(arena, state, view.outcome)
+    count_breaches(arena, state, view.outcome)
 
 
 @compiled
-def _coverage(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
-    cover(arena, state, outcome[lane])
-    land(arena, state, outcome[lane])
+def _coverage(arena, state, tables, view, weights, spare, row):
+    cover(arena, state, view.outcome)
+    land(arena, state, view.outcome)
 
 
 @compiled
-def _reward(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
-    pay(arena, state, commands[lane], outcome[lane], weights, False, lanes.report[lane])
+def _reward(arena, state, tables, view, weights, spare, row):
+    pay(arena, state, view.commands, view.outcome, weights, False, view.report)
 
 
 @compiled
-def _nearest(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _nearest(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            nearest_waypoints(arena, state, i, lanes.candidates[lane, i])
+            nearest_waypoints(arena, state, i, view.candidates[i])
 
 
 @compiled
-def _waypoints(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _waypoints(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             waypoints(
-                arena, state, tables[1][i], lanes.company[lane], i, lanes.targets[lane],
-                lanes.candidates[lane, i], row[i], 0,
+                arena, state, tables[1][i], view.company, i, view.targets,
+                view.candidates[i], row[i], 0,
             )  # fmt: skip
 
 
 @compiled
-def _surroundings(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _surroundings(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             surroundings(arena, state, i, row[i], 0)
 
 
 @compiled
-def _movers(arena, state, tables, lanes, commands, outcome, lane, weights, spare, row):
+def _movers(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             k = others(arena, state, tables[1][i], i, row[i], 0)
@@ -159,7 +174,7 @@ PARTS: dict[str, Callable[..., None]] = {
     "the whole world": _world,
     WHOLE: _whole,
 }
-"""In the order in which they are timed; from the whole world on, the states change."""
+"""In the order in which they are timed, each from the same states."""
 
 
 def _over_lanes(part: Callable[..., None]) -> Callable[..., None]:
@@ -170,10 +185,18 @@ def _over_lanes(part: Callable[..., None]) -> Callable[..., None]:
         n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
         for lane in range(observation.shape[0]):
             state = state_of(worlds, lane, n_uas, n_waypoints)
-            part(
-                arena, state, scales, lanes, commands, outcome, lane, weights, spare,
-                observation[lane],
-            )  # fmt: skip
+            # views that count no references, as in the batch
+            view = View(
+                borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
+                borrow(lanes.targets, lane, (n_uas,)),
+                borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
+                borrow(lanes.company, lane, (n_waypoints, 2)),
+                borrow(commands, lane, (n_uas,)),
+                borrow(outcome, lane, (n_uas,)),
+                borrow(lanes.report, lane, (n_uas, REPORT_SIZE)),
+            )
+            row = borrow(observation, lane, (n_uas, OBSERVATION_SIZE))
+            part(arena, state, scales, view, weights, spare, row)
 
     return run
 
@@ -195,23 +218,25 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     # once, so that there are outcomes for the parts to go on from
     _over_lanes(PARTS[WHOLE])(*arguments)
     result = {}
+    flying = int(batch.flying.sum())
+    kept = batch.worlds.copy()
     for name, part in PARTS.items():
         run = _over_lanes(part)
         run(*arguments)
         best_s = np.inf
         for _ in range(repeats):
-            flying = int(batch.flying.sum())
+            for array, before in zip(batch.worlds, kept, strict=True):
+                array[:] = before
             start_s = time.process_time()
-            for _ in range(4):
-                run(*arguments)
-            best_s = min(best_s, (time.process_time() - start_s) / 4 / flying)
+            run(*arguments)
+            best_s = min(best_s, (time.process_time() - start_s) / flying)
         result[name] = best_s * 1e9
     return result
 
 
 def profile_table(repeats: int) -> Table:
     """The times as a table, with shares of the whole step."""
-    times_ns = nanoseconds(max(repeats, 20))
+    times_ns = nanoseconds(max(repeats, 60))
     table = Table("part", "ns per agent-step", "share")
     for name, time_ns in times_ns.items():
         table.add_row(name, f"{time_ns:.0f}", f"{time_ns / times_ns[WHOLE]:.0%}")

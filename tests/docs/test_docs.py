@@ -130,7 +130,7 @@ def test_toml_blocks_of_scenarios_are_valid_scenarios():
 def test_links_to_files_lead_somewhere(page):
     prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
     for target in re.findall(r"(?<!!)\[[^\]]*\]\(([^)#\s]+)[^)]*\)", prose):
-        if "://" not in target:
+        if ":" not in target:  # else on the web, or made by the build, which checks it
             assert (page.parent / target).exists(), target
 
 

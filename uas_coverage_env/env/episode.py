@@ -99,6 +99,7 @@ class Episode:
         self.max_cycles = scenario.max_steps
         self._filters = bool(safety_filter)
         self.chooses = action == "waypoint"
+        self._tells_more = self.chooses or self._filters
         self._partners = {
             "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
             "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
@@ -275,12 +276,14 @@ class Episode:
             "returning": row[RETURNING] > 0.0,
             "covered": int(row[COVERED]),
             "energy_Wh": row[ENERGY],
-            "reward_terms": dict(zip(REWARD_TERMS, row, strict=False)),
+            "reward_terms": dict(zip(REWARD_TERMS, row)),  # noqa: B905  # called most often
         }
         if row[CONTACT]:
             info["contact"] = kind = CONTACT_NAMES[int(row[CONTACT])]
             if kind in self._partners:
                 info["contact_with"] = self._partners[kind][int(row[CONTACT_WITH])]
+        if not self._tells_more:
+            return info
         if self.chooses:
             info["action_mask"] = self.action_mask(i)
         if self._filters:

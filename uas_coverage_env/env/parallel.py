@@ -231,6 +231,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         truncations: dict[str, bool] = {}
         infos: Infos = {}
         alive: list[str] = []
+        # by index: to iterate over the array, or to zip, takes twice as long
         for agent in agents:
             i = index[agent]
             row = report[i]
