@@ -122,7 +122,7 @@ def report(
         for policy in policies
     ]
     lines = [
-        f"`uas-coverage train {study.config} --seed K`, "
+        f"`uas-coverage train {study.config} --seed 0` and the other seeds, "
         f"scored by `python benchmarks/learners.py {study.config} "
         f"--seeds {len(directories)} --missions {len(towns)}`; {machine()}.",
         "",

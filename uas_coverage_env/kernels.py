@@ -6,6 +6,8 @@ step outlive it, so nothing has to be counted. The price is that such a kernel c
 what it needs for a while lies on the stack (`room`). The same source compiles for a GPU.
 """
 
+from typing import Any
+
 import numpy as np
 from llvmlite import ir
 from numba import config, njit, types
@@ -14,14 +16,16 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-kernel = njit(cache=True, error_model="numpy", _nrt=False)
+_compiler: Any = njit  # the types that numba ships leave out the option _nrt
+
+kernel = _compiler(cache=True, error_model="numpy", _nrt=False)
 """Compiles a function that makes no arrays and returns none."""
 
-inlined_kernel = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+inlined_kernel = _compiler(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 """A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
 to hand over their hundred machine words takes longer than most of these parts themselves."""
 
-allocating_kernel = njit(cache=True, error_model="numpy", _nrt=True)
+allocating_kernel = _compiler(cache=True, error_model="numpy", _nrt=True)
 """Compiles a function that makes arrays; also what it calls, unless that is a `kernel`."""
 
 
@@ -60,5 +64,5 @@ def _on_the_stack(typing_context, size):
     return types.Array(types.float64, 1, "C")(size), generate
 
 
-if not config.DISABLE_JIT:
-    room = intrinsic(prefer_literal=True)(_on_the_stack)
+if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    room = intrinsic(prefer_literal=True)(_on_the_stack)  # pyright: ignore[reportAssignmentType]

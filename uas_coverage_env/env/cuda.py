@@ -158,12 +158,13 @@ def step_mission(arena, tables, start, missions, kind, nonlinear, lane):
 
 def _on_device(array: NDArray) -> Any:
     # the simulator's own arrays are strange to what is called by its kernels; it takes plain ones
-    return array.copy() if config.ENABLE_CUDASIM else cuda.to_device(array)
+    simulated = config.ENABLE_CUDASIM  # pyright: ignore[reportAttributeAccessIssue]
+    return array.copy() if simulated else cuda.to_device(array)
 
 
 @cuda.jit
 def _step_missions(arena, tables, start, missions, kind, nonlinear):
-    lane = cuda.grid(1)
+    lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
     if lane < missions.ended.shape[0]:
         step_mission(arena, tables, start, missions, kind, nonlinear, lane)
 
@@ -239,4 +240,5 @@ class CudaMissions:
         """
         if asked is not None:
             self.missions.asked[:] = asked
-        _step_missions[self._blocks, THREADS_PER_BLOCK](*self._arguments)
+        launched: Any = _step_missions
+        launched[self._blocks, THREADS_PER_BLOCK](*self._arguments)

@@ -118,6 +118,7 @@ class Episode:
         self._observation_shape = (n_uas, OBSERVATION_SIZE)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
+        self._first_look: tuple[NDArray[Any], ...] | None = None
         # what the kernel is given in every step: the arrays are written in place
         self._fixed: tuple[Any, ...] = (
             *self._world.arena,
@@ -167,19 +168,32 @@ class Episode:
         self._report[:, CONTACT_WITH] = -1
         self._report[:, STATUS] = world.state.status
         self._report[:, COVERED] = (~world.state.uncovered).sum()
-        self.observation = np.empty_like(self.observation)
-        count_company(world.state.uncovered, self._neighbours, self._company)
+        if self._first_look is None:
+            self._first_look = self._look()
+        candidates, company, observation = self._first_look
+        self._candidates[:] = candidates
+        self._company[:] = company
+        self.observation = observation.copy()
+
+    def _look(self) -> tuple[NDArray[Any], ...]:
+        """What is seen at the start, always the same: candidates, company, observation."""
+        world = self._world
+        candidates = np.full_like(self._candidates, -1)
+        company = np.zeros_like(self._company)
+        observation = np.zeros_like(self.observation)
+        count_company(world.state.uncovered, self._neighbours, company)
         observe(
             world.arena,
             world.state,
             self._scales,
-            self._company,
+            company,
             world.state.status == FLYING,
             self._targets,
             self.max_cycles,
-            self._candidates,
-            self.observation,
+            candidates,
+            observation,
         )
+        return candidates, company, observation
 
     def step(self) -> list[list[float]]:
         """Fly what was asked for one step.

@@ -119,7 +119,7 @@ class Tour:
         others_m = self._where_others_go(view)
         commands: dict[str, Command] = {}
         predicted_m: dict[str, FloatArray] = {}
-        for i in np.flatnonzero(view.flies):
+        for i in np.flatnonzero(view.flies).tolist():
             name = self._scenario.uas[i].name
             commands[name] = self._fly(i, view, others_m)
             predicted_m[name] = others_m[i].copy()
@@ -192,7 +192,7 @@ class Tour:
     def _where_others_go(self, view: View) -> FloatArray:
         """(U, N+1, 3) [m] as planned before, one step on; NaN where nobody flies."""
         paths_m = np.full((len(view.x), self._n_steps + 1, 3), np.nan)
-        for i in np.flatnonzero(view.flies):
+        for i in np.flatnonzero(view.flies).tolist():
             path_m = self._plans[i].path_m
             paths_m[i, :-1] = path_m[1:]
             paths_m[i, -1] = path_m[-1]

@@ -18,8 +18,9 @@ LANDING_S = 3.0  # from full speed over the start to rest on it
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 _RESERVE_S = 30.0  # what return mode asks for beyond the way home at full speed
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
-_WAIT_WHEN_LEFT_S = 60.0  # with less than this still to fly, blocked waypoints are waited for
-_WAIT_S = 30.0  # how long is then expected
+_SLOWER = 1.15  # flights take so much longer than their legs, when batteries are counted on
+_OPENS_AFTER = 0.75  # share of the mean flight left after which what is blocked may be open
+_OPENS_AFTER_S = 10.0  # and at least so long
 _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 600_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
@@ -63,10 +64,11 @@ class Schedule:
         self._turn_s = radius_m / self.speed_mps[:, None]
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
         self.order = no_order(len(limits))
-        self._waits = False  # whether blocked waypoints are waited for: little else is left
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
+        if (view.blocked & view.uncovered).any():  # how late is late, is known with an order
+            self.take(improved(self.task(view), self.order, Effort(self._moves), seed), view)
         task = self.task(view)
         orders = [
             improved(task, no_order(task.n_uas), Effort(self._moves), seed + attempt)
@@ -80,10 +82,7 @@ class Schedule:
         routes = tuple(route[open_[route]] for route in self.order.routes)
         left_out = self.order.left_out[open_[self.order.left_out]]
         self.order = Order(routes, left_out, self.order.seconds, self.order.cost_s)
-        waits = self._waits
-        left_s = (self._expected_home_s(view) - view.time_s)[view.may_work]
-        self._waits |= bool((left_s < _WAIT_WHEN_LEFT_S).all())
-        if self._has_changed(view) or (self._waits and not waits and view.blocked.any()):
+        if self._has_changed(view):
             task = self.task(view)
             kept = improved(task, self.order, Effort(0), 0)
             efforts = (Effort(_MOVES_AGAIN, hottest_s=1.5), Effort(_MOVES_AGAIN))
@@ -148,14 +147,13 @@ class Schedule:
         first_s = np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)])
         idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
         uas = self._arena.uas
-        budget_s = (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"] - _RESERVE_S
-        # nobody knows when a blocked waypoint opens: it is left aside as long as there is other
-        # work, since an order that waits has no reason to be quick with the rest
-        wanted = view.uncovered
-        if not self._waits and (wanted & ~view.blocked).any():
-            wanted = wanted & ~view.blocked
+        budget_s = (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"] / _SLOWER - _RESERVE_S
+        # nobody knows when a blocked waypoint opens: late enough to do other work before, and soon
+        # enough to be thought of while there is other work near it
+        work_s = (self._expected_home_s(view) - view.time_s)[view.may_work]
+        opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0
         return Task(
-            open_waypoints=np.flatnonzero(wanted),
+            open_waypoints=np.flatnonzero(view.uncovered),
             first_s=first_s,
             between_s=legs.between_s,
             kind=legs.kind,
@@ -170,6 +168,6 @@ class Schedule:
             turn_s=self._turn_s,
             neighbours=legs.neighbours,
             weight=self._weight,
-            not_before_s=np.where(view.blocked, _WAIT_S, 0.0),
+            not_before_s=np.where(view.blocked, opens_s, 0.0),
             budget_s=np.where(view.may_work, budget_s, -np.inf),
         )
