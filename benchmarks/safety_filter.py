@@ -227,7 +227,7 @@ def _fly_many(case: Case, seeds: Sequence[int], steps: int) -> Tally:
 
 
 def main(
-    missions: Annotated[int, typer.Option(min=1, help="Generated missions of each case.")] = 200,
+    missions: Annotated[int, typer.Option(min=1, help="Generated missions of each case.")] = 60,
     players: Annotated[str, typer.Option(help="Which players.")] = ",".join(PLAYERS),
     steps: Annotated[int, typer.Option(min=1, help="Steps of a flight at most.")] = 200,
     jobs: Annotated[int, typer.Option(min=1, help="Processes side by side.")] = 2,
