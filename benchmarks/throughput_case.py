@@ -117,6 +117,7 @@ def _village_sync(num_envs: int, threads: int) -> Steps:
 def _village_cuda(num_envs: int, threads: int) -> Steps:
     import numpy as np
     from numba import cuda
+
     from uas_coverage_env.env.cuda import CudaMissions
 
     flown = CudaMissions(num_envs)
