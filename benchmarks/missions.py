@@ -28,17 +28,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 from independent_check import BadFlightError, check
 from mission_statistics import COLUMNS, Row, flights_table, planners_table
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from uas_coverage_env import Scenario, generate_scenario, load_planner, load_scenario, rollout
+from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.flight import Progress as FlightProgress
 from uas_coverage_env.flight import describe_planners
 from uas_coverage_env.flight.registry import options_of
+from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.strict_toml import InputError
 
 PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"
@@ -67,17 +68,6 @@ class Mission:
     def name(self) -> str:
         """For people."""
         return f"{self.scenario.name} {self.planner}"
-
-
-def mission_scenario(seed: int) -> Scenario:
-    """The generated scenario of a seed: 1 to 4 UAS, 20 to 60 waypoints, 5 to 20 blocks."""
-    lots = np.random.default_rng([seed, 20, 60, 5, 20])
-    return generate_scenario(
-        seed,
-        n_uas=int(lots.integers(1, 5)),
-        n_waypoints=int(lots.integers(20, 61)),
-        n_obstacles=int(lots.integers(5, 21)),
-    )
 
 
 def fly(mission: Mission, told: MutableMapping[str, str] | None = None) -> Row:
@@ -182,24 +172,12 @@ def planner_options(planners: Sequence[str], pairs: Sequence[str]) -> dict[str, 
     return shares
 
 
-def seed_range(text: str) -> range:
-    """FIRST:END as a range; END is not part of it.
-
-    Raises:
-        InputError: It is not that.
-    """
-    first, separator, end = text.partition(":")
-    if not separator or not first.isdigit() or not end.isdigit():
-        raise InputError(f"--seeds {text!r}: should be FIRST:END, as in {SEEDS}")
-    return range(int(first), int(end))
-
-
 def _missions(
     planners: Sequence[str], options: Mapping[str, dict[str, str]], seeds: range,
     village: bool, folder: Path,
 ) -> list[Mission]:  # fmt: skip
     scenarios = [(0, load_scenario("village"))] if village else []
-    scenarios += [(seed, mission_scenario(seed)) for seed in seeds]
+    scenarios += [(seed, draw_scenario(seed)) for seed in seeds]
     if not scenarios or not planners:
         raise InputError("nothing to fly: give --planners, and --village or some --seeds")
     return [
@@ -286,7 +264,7 @@ def main(
     console = Console()
     with _folder(out) as folder:
         shares = planner_options(names, option or ())
-        missions = _missions(names, shares, seed_range(seeds), village, folder)
+        missions = _missions(names, shares, seed_range("--seeds", seeds), village, folder)
         rows = fly_all(missions, jobs, console)
         if out is not None:
             _write_rows(out / "missions.csv", rows)

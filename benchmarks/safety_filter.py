@@ -29,7 +29,6 @@ from typing import Annotated, Protocol
 
 import numpy as np
 import typer
-from missions import mission_scenario
 from rich.console import Console
 from rich.table import Table
 from scipy.stats import beta
@@ -37,6 +36,7 @@ from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 
 from uas_coverage_env import Scenario
+from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import CONTACT_NAMES, Command, SwarmState, World
 
@@ -149,7 +149,7 @@ class Tally:
 
 def fly(case: Case, seed: int, steps: int) -> Tally:
     """One mission of a case."""
-    scenario = mission_scenario(seed)
+    scenario = draw_scenario(seed)
     if case.moving:
         scenario = with_movers(scenario, seed)
     world = World(scenario, safety_filter=case.safety_filter)

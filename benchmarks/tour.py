@@ -24,7 +24,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from missions import mission_scenario, seed_range
 from rich.console import Console
 from rich.table import Table
 from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
@@ -33,6 +32,8 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import Scenario, load_scenario
 from uas_coverage_env.flight import rollout
+from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import World, build_arena
 
@@ -142,7 +143,7 @@ def main(
     except ImportError:
         solvers = {"annealing": annealed}
     scenarios = [load_scenario("village")] if village else []
-    scenarios += [mission_scenario(seed) for seed in seed_range(seeds)]
+    scenarios += [draw_scenario(seed) for seed in seed_range("--seeds", seeds)]
     table = Table(title=f"Orders found in {seconds:g} s each")
     for column in ("scenario", "search", "cost [s]", "longest [s]", "sum [s]", "steps", "Wh"):
         table.add_column(column)

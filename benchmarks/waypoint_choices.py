@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from missions import mission_scenario, seed_range
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
@@ -30,6 +29,8 @@ from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NOBODY, NO
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.flight.metrics import decision_time_s
+from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.world.pool import n_of, pool_arenas
 
 COLUMNS = ("coverage", "all home", "violations", "breaches", "Wh", "steps", "p95 s", "max s")
@@ -105,11 +106,11 @@ def table(title: str, players: dict[str, NDArray]) -> Table:
 def main(argv: Sequence[str] | None = None) -> int:
     """Fly and print; the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--seeds", type=seed_range, default="2000:2020", help="FIRST:END")
+    parser.add_argument("--seeds", default="2000:2020", help="FIRST:END")
     parser.add_argument("--simulations", default="0,32", help="how many; default 0,32")
     parser.add_argument("--filter", default="true", help="false: fly without the safety filter")
     arguments = parser.parse_args(argv)
-    towns = [mission_scenario(seed) for seed in arguments.seeds]
+    towns = [draw_scenario(seed) for seed in seed_range("--seeds", arguments.seeds)]
     console = Console(width=170)
     for title, scenarios in (("village", [load_scenario("village")]), ("generated", towns)):
         options = {"filter": arguments.filter}

@@ -9,6 +9,8 @@ import missions
 import numpy as np
 import pytest
 
+from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.strict_toml import InputError
 
 
@@ -19,13 +21,13 @@ def mission(lively_town, tmp_path):
 
 
 def test_the_default_scenarios_are_as_large_as_they_should_be():
-    seeds = missions.seed_range(missions.SEEDS)
-    drawn = [missions.mission_scenario(seed) for seed in seeds]
+    seeds = seed_range("--seeds", missions.SEEDS)
+    drawn = [draw_scenario(seed) for seed in seeds]
     assert len(drawn) == 20
     assert {len(scenario.uas) for scenario in drawn} == {1, 2, 3, 4}
     assert all(20 <= len(scenario.waypoints) <= 60 for scenario in drawn)
     assert all(5 <= len(scenario.obstacles) <= 20 for scenario in drawn)
-    assert drawn[3] == missions.mission_scenario(seeds[3])
+    assert drawn[3] == draw_scenario(seeds[3])
 
 
 def test_a_finished_flight_is_kept_and_not_flown_again(mission, monkeypatch):
@@ -86,7 +88,7 @@ def test_what_no_planner_can_take_is_refused(planners, pairs, reason):
 @pytest.mark.parametrize("text", ["10", "a:b", "-1:3", "3:"])
 def test_seeds_that_are_no_range_are_refused(text):
     with pytest.raises(InputError, match="FIRST:END"):
-        missions.seed_range(text)
+        seed_range("--seeds", text)
 
 
 def test_the_interval_of_paired_differences_holds_their_mean():

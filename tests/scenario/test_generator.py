@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.scenario import generate_scenario, warnings
+from uas_coverage_env.scenario import draw_scenario, generate_scenario, warnings
+
+PUBLISHED = [
+    "town-s1000-u4-w55-o8",
+    "town-s2000-u3-w33-o7",
+    "town-s2019-u2-w54-o10",
+    "town-s3000-u1-w45-o13",
+]
 
 KEPT_M = 0.36 + 3.0
 CEILING_M = 50.0
@@ -171,3 +178,8 @@ def test_the_smallest_size_that_is_named_works():
     least_m = float(str(caught.value).split()[-1])
     town = generate_scenario(0, n_uas=9, n_waypoints=1, n_obstacles=0, size_m=least_m)
     assert len(town.uas) == 9
+
+
+def test_seeds_of_published_tables_go_on_to_name_the_same_towns():
+    drawn = [draw_scenario(seed).name for seed in (1000, 2000, 2019, 3000)]
+    assert drawn == PUBLISHED

@@ -6,7 +6,6 @@ from uas_coverage_env.leaderboard.publish import Comparison, failures, write
 from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES, Row
 from uas_coverage_env.leaderboard.scenario_sets import (
     SETS,
-    benchmark_scenario,
     scenarios_of,
     seed_range,
 )
@@ -38,7 +37,6 @@ __all__ = [
     "Store",
     "Sweep",
     "WorkerLostError",
-    "benchmark_scenario",
     "failures",
     "flights_in",
     "fly",

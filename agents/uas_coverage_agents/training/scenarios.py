@@ -1,10 +1,8 @@
 """Which scenarios a learner flies: towns drawn from seeds, or one scenario."""
 
-import numpy as np
-
 from uas_coverage_agents.policy import ScenarioFamily, Towns
 from uas_coverage_agents.training.config import TrainingScenarios
-from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
+from uas_coverage_env.scenario import Scenario, draw_scenario, load_scenario
 
 VALIDATION = Towns(first_seed=900_000, n_uas=(1, 4), n_waypoints=(20, 60), n_obstacles=(5, 20))
 """What learners are validated on; nothing is trained on these seeds."""
@@ -12,13 +10,9 @@ VALIDATION = Towns(first_seed=900_000, n_uas=(1, 4), n_waypoints=(20, 60), n_obs
 
 def town(towns: Towns, number: int) -> Scenario:
     """One of the towns: seed `first_seed + number` draws the counts, then the town itself."""
-    seed = towns.first_seed + number
-    lots = np.random.default_rng([seed, *towns.n_waypoints, *towns.n_obstacles])
-    n_uas, n_waypoints, n_obstacles = (
-        int(lots.integers(least, most + 1))
-        for least, most in (towns.n_uas, towns.n_waypoints, towns.n_obstacles)
+    return draw_scenario(
+        towns.first_seed + number, towns.n_uas, towns.n_waypoints, towns.n_obstacles
     )
-    return generate_scenario(seed, n_uas=n_uas, n_waypoints=n_waypoints, n_obstacles=n_obstacles)
 
 
 def training_scenarios(scenarios: TrainingScenarios, seed: int) -> list[Scenario]:
