@@ -36,7 +36,6 @@ _RESERVE_S = 25.0  # flight time to come home with, as the OCP's reserve asks fo
 _WAIT_WHEN_LEFT_S = 60.0  # with less than this still to go, blocked waypoints are waited for
 _WAIT_S = 30.0  # how long is then expected
 _WAITING_M = 100.0  # how far from a blocked waypoint is near enough: what blocks it may set off
-_AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 
 
 @dataclass(frozen=True)
@@ -72,15 +71,7 @@ class OrderGuide:
         self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(scenario)
         self._names = tuple(uas.name for uas in scenario.uas)
-        limits = [vehicle.limits for vehicle in scenario.vehicles]
-        gravity = [vehicle.airframe.gravity_mps2 for vehicle in scenario.vehicles]
-        self._speed = np.array([limit.v_xy_max_mps for limit in limits])
-        self._acceleration = _AGILITY * np.array(
-            [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
-        )
-        radius = np.array([w.radius_m for w in scenario.waypoints])
-        self._turn_s = radius / self._speed[:, None]
-        self._radius_m = radius
+        self._radius_m = np.array([w.radius_m for w in scenario.waypoints])
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
         self._order: Order | None = None
         self._waits = False  # whether blocked waypoints are waited for, once little else is left
@@ -179,11 +170,11 @@ class OrderGuide:
             idle_s=np.where(active, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
             velocity_mps=np.ascontiguousarray(x[:, 3:5]),
-            speed_mps=self._speed,
-            acceleration_mps2=self._acceleration,
+            speed_mps=self._legs.speed_mps,
+            acceleration_mps2=self._legs.acceleration_mps2,
             start_m=np.ascontiguousarray(self._legs.starts_m[:, :2]),
             waypoints_m=self._legs.waypoints_m,
-            turn_s=self._turn_s,
+            turn_s=self._legs.turn_s,
             neighbours=self._legs.neighbours,
             weight=self._weight,
             not_before_s=opens,

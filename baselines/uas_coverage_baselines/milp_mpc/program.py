@@ -98,7 +98,7 @@ class Program:
             if not separation.undecided.any():
                 continue
             crossed = self.milp.columns(f"{separation.name}.crossed")
-            spare = _spare_over_intervals(separation, positions_m)
+            spare = _open_spare_m(separation, positions_m)
             best = spare.max(axis=2, keepdims=True)
             faces = spare >= best - nearness.face_slack_m
             if not nearness.other_faces:
@@ -124,7 +124,7 @@ class Program:
             if not separation.undecided.any():
                 continue
             crossed = self.milp.columns(f"{separation.name}.crossed")
-            spare = _spare_over_intervals(separation, positions_m)
+            spare = _open_spare_m(separation, positions_m)
             best = spare.argmax(axis=2)[..., None]
             chosen = np.arange(spare.shape[2]) != best
             columns.append(crossed.ravel())
@@ -154,14 +154,8 @@ def _made(columns: Columns) -> Columns:
     return columns[columns != ABSENT]
 
 
-def _spare_over_intervals(separation: Separation, positions_m: FloatArray) -> FloatArray:
-    """(G, N, F) distance to spare beyond each face at both ends of each interval."""
-    position = positions_m[separation.mover]
-    if separation.partner is not None:
-        position = position - positions_m[separation.partner]
-    spare = position @ separation.normals.T + separation.offset_m
-    spare = spare - separation.clearance_m[:, None, :]
-    spare[:, 0] = np.where(separation.always[:, 0], np.inf, -np.inf)
-    over_interval = np.minimum(spare[:, :-1], spare[:, 1:])
-    over_interval[separation.never[:, :-1] | separation.never[:, 1:]] = -np.inf
-    return over_interval
+def _open_spare_m(separation: Separation, positions_m: FloatArray) -> FloatArray:
+    """`Separation.spare_m`, -inf where the program has no such face to choose."""
+    spare = separation.spare_m(positions_m)
+    spare[separation.never[:, :-1] | separation.never[:, 1:]] = -np.inf
+    return spare

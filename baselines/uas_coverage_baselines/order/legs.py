@@ -19,6 +19,7 @@ from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
 
 FloatArray = NDArray[np.float64]
+_AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 _NEIGHBOURS = 24
 """Legs to so many nearest waypoints are routed past obstacles; longer ones are taken straight."""
 _FROM_HERE = 64
@@ -36,6 +37,9 @@ class Legs:
         home_s: (U, W) from a waypoint to each UAS's start.
         kind: (U,) row of each UAS in `between_s`.
         neighbours: (W, K) the nearest other waypoints of each, nearest first.
+        speed_mps: (U,) of each UAS.
+        acceleration_mps2: (U,) horizontal, what a turn uses of it on average.
+        turn_s: (U, W) time that the radius of a waypoint is worth.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -46,6 +50,14 @@ class Legs:
         kinds = list(dict.fromkeys(scenario.vehicles))
         self.kind = np.array([kinds.index(vehicle) for vehicle in scenario.vehicles])
         self._speeds = np.array([_speeds(vehicle) for vehicle in kinds])
+        limits = [vehicle.limits for vehicle in scenario.vehicles]
+        gravity = [vehicle.airframe.gravity_mps2 for vehicle in scenario.vehicles]
+        self.speed_mps = np.array([limit.v_xy_max_mps for limit in limits])
+        self.acceleration_mps2 = _AGILITY * np.array(
+            [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
+        )
+        radius_m = np.array([w.radius_m for w in scenario.waypoints])
+        self.turn_s = radius_m / self.speed_mps[:, None]
         n = len(self.waypoints_m)
         nearest = min(_NEIGHBOURS, n - 1)
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]

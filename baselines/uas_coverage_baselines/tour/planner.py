@@ -158,7 +158,7 @@ class Tour:
             np.where(blocked, -1.0, within_m),
             np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),
             schedule.rest_s(i, SLOWER, _PER_WAYPOINT_S) if len(route) else np.zeros(1),
-            schedule.acceleration_mps2[i],
+            schedule.legs.acceleration_mps2[i],
             self._brake_s[i],
             _MOVING_MARGIN_M,
         )

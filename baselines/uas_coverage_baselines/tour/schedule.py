@@ -15,7 +15,6 @@ from uas_coverage_env.world import Arena
 FloatArray = NDArray[np.float64]
 
 LANDING_S = 3.0  # from full speed over the start to rest on it
-_AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average
 _RESERVE_S = 30.0  # what return mode asks for beyond the way home at full speed
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
 _SLOWER = 1.15  # flights take so much longer than their legs, when batteries are counted on
@@ -51,19 +50,11 @@ class Schedule:
     """The order of the swarm, kept up to date."""
 
     def __init__(self, scenario: Scenario, arena: Arena, moves: int) -> None:
-        self._legs = Legs(scenario)
+        self.legs = Legs(scenario)
         self._arena = arena
         self._moves = moves
-        limits = [vehicle.limits for vehicle in scenario.vehicles]
-        gravity = [vehicle.airframe.gravity_mps2 for vehicle in scenario.vehicles]
-        self.speed_mps = np.array([limit.v_xy_max_mps for limit in limits])
-        self.acceleration_mps2 = _AGILITY * np.array(
-            [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
-        )
-        radius_m = np.array([waypoint.radius_m for waypoint in scenario.waypoints])
-        self._turn_s = radius_m / self.speed_mps[:, None]
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
-        self.order = no_order(len(limits))
+        self.order = no_order(len(scenario.uas))
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
@@ -126,23 +117,23 @@ class Schedule:
         route = self.order.routes[uas]
         if not len(route):
             return np.zeros(1)
-        between = self._legs.between_s[self._legs.kind[uas]]
-        legs = np.append(between[route[:-1], route[1:]], self._legs.home_s[uas, route[-1]])
+        between = self.legs.between_s[self.legs.kind[uas]]
+        legs = np.append(between[route[:-1], route[1:]], self.legs.home_s[uas, route[-1]])
         return np.append(np.cumsum((slower * legs + per_waypoint_s)[::-1])[::-1], 0.0)
 
     def _seconds_left(self, uas: int, position_m: FloatArray) -> float:
         """Flight time along the route of a UAS and home, turns not counted."""
         route = self.order.routes[uas]
         if not len(route):
-            return self._legs.way_home_s(uas, position_m)
-        first_m = self._legs.waypoints_m[route[0]] - position_m
+            return self.legs.way_home_s(uas, position_m)
+        first_m = self.legs.waypoints_m[route[0]] - position_m
         return float(
-            np.linalg.norm(first_m[:2]) / self.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
+            np.linalg.norm(first_m[:2]) / self.legs.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
         )
 
     def task(self, view: View) -> Task:
         """The routing problem of a moment."""
-        legs, x = self._legs, view.x
+        legs, x = self.legs, view.x
         n_uas = len(x)
         first_s = np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)])
         idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
@@ -161,11 +152,11 @@ class Schedule:
             idle_s=np.where(view.may_work, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
             velocity_mps=np.ascontiguousarray(x[:, 3:5]),
-            speed_mps=self.speed_mps,
-            acceleration_mps2=self.acceleration_mps2,
+            speed_mps=self.legs.speed_mps,
+            acceleration_mps2=self.legs.acceleration_mps2,
             start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
             waypoints_m=legs.waypoints_m,
-            turn_s=self._turn_s,
+            turn_s=self.legs.turn_s,
             neighbours=legs.neighbours,
             weight=self._weight,
             not_before_s=np.where(view.blocked, opens_s, 0.0),
