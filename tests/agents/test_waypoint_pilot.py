@@ -124,11 +124,11 @@ def test_a_policy_of_another_layout_is_refused():
     policy = policy_of(tensors())
     policy.description.observation = observation().model_copy(update={"layout": "waypoint_v0"})
     with pytest.raises(ValueError, match="train it anew"):
-        WaypointPilot(policy)
+        WaypointPilot(policy, BOTH)
     policy = policy_of(tensors())
     policy.description.network = network(16, PRIOR).model_copy(update={"way": 2})
     with pytest.raises(ValueError, match="train it anew"):
-        WaypointPilot(policy)
+        WaypointPilot(policy, BOTH)
 
 
 def test_a_pointer_whose_sizes_contradict_each_other_is_refused():

@@ -7,7 +7,7 @@ from typing import Protocol
 from uas_coverage_agents.policy.directory import Policy, load_policy
 from uas_coverage_agents.velocity.pilot import VelocityPilot
 from uas_coverage_agents.waypoint.pilot import WaypointPilot
-from uas_coverage_env.flight import AssistedOptions
+from uas_coverage_env.flight import Assistants, AssistedOptions
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Command, SwarmState
@@ -29,8 +29,8 @@ class Pilot(Protocol):
         ...
 
 
-PILOTS: dict[str, Callable[[Policy], Pilot]] = {
-    "velocity": VelocityPilot,
+PILOTS: dict[str, Callable[[Policy, Assistants], Pilot]] = {
+    "velocity": lambda policy, _: VelocityPilot(policy),
     "waypoint": WaypointPilot,
 }
 """Interface of a policy -> who flies it; raises a ValueError that says why it cannot."""
@@ -56,9 +56,12 @@ class PolicyPlanner:
         self.argument = str(argument)
         self.policy = load_policy(argument)
         try:
-            self._pilot = PILOTS[self.policy.description.interface](self.policy)
+            self._pilot = self._piloted()
         except ValueError as error:
             raise InputError(f"{self.argument}: cannot be flown: {error}") from error
+
+    def _piloted(self) -> Pilot:
+        return PILOTS[self.policy.description.interface](self.policy, self.assistants)
 
     @property
     def fingerprint(self) -> str:

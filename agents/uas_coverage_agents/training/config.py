@@ -47,6 +47,20 @@ class PpoSettings(StrictModel):
     clip: Positive = 0.2
     entropy: Annotated[float, Field(ge=0.0)] = 0.0
 
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """The same by the names of Stable-Baselines3; the learning rate at the start."""
+        return {
+            "learning_rate": self.learning_rate,
+            "n_steps": self.rollout_steps,
+            "batch_size": self.batch_size,
+            "n_epochs": self.epochs,
+            "gamma": self.gamma,
+            "gae_lambda": self.gae_lambda,
+            "clip_range": self.clip,
+            "ent_coef": self.entropy,
+        }
+
 
 class SacSettings(StrictModel):
     """Soft actor-critic, as Stable-Baselines3 has it.

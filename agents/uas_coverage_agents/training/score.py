@@ -8,7 +8,7 @@ from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Interval, Policy, Score
 from uas_coverage_agents.policy.planner import PILOTS
-from uas_coverage_env.flight import Flight, coverage, energy_Wh, home, rollout
+from uas_coverage_env.flight import Assistants, Flight, coverage, energy_Wh, home, rollout
 from uas_coverage_env.scenario import Scenario
 
 MEASURES = ("coverage", "all_home", "violations", "energy_Wh", "flight_steps")
@@ -30,7 +30,8 @@ def fly(
     Returns:
         (missions, measures) in the order of MEASURES.
     """
-    pilot = PILOTS[policy.description.interface](policy)
+    assistants = Assistants(return_mode=return_mode, safety_filter=safety_filter)
+    pilot = PILOTS[policy.description.interface](policy, assistants)
     return np.array(
         [
             measured(rollout(scenario, pilot, safety_filter=safety_filter, return_mode=return_mode))

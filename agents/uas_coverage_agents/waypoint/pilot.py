@@ -73,9 +73,7 @@ class WaypointPilot:
         ValueError: The policy was trained on another observation, or has another network.
     """
 
-    def __init__(
-        self, policy: Policy, assistants: Assistants | None = None, simulations: int = 0
-    ) -> None:
+    def __init__(self, policy: Policy, assistants: Assistants, simulations: int = 0) -> None:
         described = policy.description
         if described.observation != observation():
             raise ValueError("its observation is not that of this version; train it anew")
@@ -84,7 +82,7 @@ class WaypointPilot:
         if described.network != network(described.network.hidden, described.network.prior):
             raise ValueError("its network does not fit to its observation; train it anew")
         self._weights = weights_of(described.network, policy.tensors)
-        self._assistants = assistants or Assistants(return_mode=True, safety_filter=True)
+        self._assistants = assistants
         self._simulations = simulations
 
     def warm_up(self, scenario: Scenario) -> None:
