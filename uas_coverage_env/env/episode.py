@@ -85,7 +85,7 @@ class Episode:
         if not isinstance(scenario, Scenario):
             scenario = load_scenario(scenario)
         if max_cycles is not None:
-            scenario = _cut(scenario, max_cycles)
+            scenario = with_max_steps(scenario, max_cycles)
         self._weights = weights_of(reward_weights)
         self.actions = actions_of(action, scenario)
         self._world = World(
@@ -315,7 +315,7 @@ class Episode:
         return mask
 
 
-def _cut(scenario: Scenario, max_cycles: int) -> Scenario:
+def with_max_steps(scenario: Scenario, max_cycles: int) -> Scenario:
     """The scenario with another limit of steps; return mode and the observed time know it."""
     whole = isinstance(max_cycles, int | np.integer) and not isinstance(max_cycles, bool)
     if not whole or not 1 <= max_cycles <= _LONGEST:

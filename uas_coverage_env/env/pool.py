@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.episode import _cut
+from uas_coverage_env.env.episode import with_max_steps
 from uas_coverage_env.env.nearest import neighbours_of
 from uas_coverage_env.env.observation import scales_of
 from uas_coverage_env.scenario import Scenario, load_scenario
@@ -99,4 +99,4 @@ class ScenarioPool:
 def _loaded(scenario: str | Path | Scenario, max_cycles: int | None) -> Scenario:
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    return scenario if max_cycles is None else _cut(scenario, max_cycles)
+    return scenario if max_cycles is None else with_max_steps(scenario, max_cycles)
