@@ -4,11 +4,8 @@ import subprocess
 import sys
 
 import polars
-import pytest
 
 from uas_coverage_env.leaderboard import TIMES
-
-pytest.importorskip("ray", reason="extra `cluster`")
 
 RUN = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
 
