@@ -80,7 +80,7 @@ def test_an_out_that_holds_something_is_refused_unless_overwritten(elsewhere, ca
     assert (elsewhere / "mine" / "notes.txt").read_text() == "keep"
 
 
-def test_options_seed_dynamics_and_filter_reach_the_flight():
+def test_options_seed_dynamics_and_filter_reach_the_flight(capsys):
     code = main(
         [
             *("run", "village", "--planner", "random-walk", "--seed", "5", "--steps", "2"),
@@ -93,8 +93,10 @@ def test_options_seed_dynamics_and_filter_reach_the_flight():
     assert (flight.seed, flight.dynamics) == (5, "nonlinear")
     assert flight.planner_options["hold_s"] == 3.0
     assert (flight.return_mode, flight.safety_filter) == (False, False)
+    assert "safety filter" not in capsys.readouterr().out
     main(["run", "village", "--planner", "hover", "--steps", "1", "--filter", "--out", "safe"])
     assert Flight.load("safe").safety_filter
+    assert "the safety filter replaced 0.0% of the commands" in capsys.readouterr().out
 
 
 def test_ctrl_c_keeps_the_flight_and_fails_the_mission(elsewhere, monkeypatch, capsys):

@@ -12,6 +12,7 @@ from uas_coverage_env.flight import (
     PlannerOptions,
     accomplished,
     energy_Wh,
+    filtered_share,
     rollout,
 )
 from uas_coverage_env.scenario import Scenario
@@ -118,6 +119,19 @@ def test_a_contact_is_a_violation_with_time_kind_and_partner(yard):
     assert MODES[flight.mode[k, i]] == "lost"
     assert flight.ended == "complete"
     assert not accomplished(flight)
+
+
+def test_what_the_safety_filter_replaced_is_kept_step_by_step(yard):
+    toward_the_fence = commanding(Velocity(12.0, 0.0, 3.0))
+    bare = rollout(yard, toward_the_fence)
+    assert {decision.filtered for decision in bare.decisions} == {0}
+    assert filtered_share(bare) == 0.0
+    kept = rollout(yard, toward_the_fence, safety_filter=True, max_steps=40)
+    assert not kept.violations
+    replaced = [decision.filtered for decision in kept.decisions]
+    assert replaced[0] == 0, "far from the fence there is nothing to replace"
+    assert replaced[-1] == 2, "both are held back at the fence"
+    assert filtered_share(kept) == pytest.approx(sum(replaced) / (2 * 40))
 
 
 def test_a_collision_with_an_obstacle_names_the_obstacle(yard):

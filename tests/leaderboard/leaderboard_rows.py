@@ -29,6 +29,7 @@ def row(scenario="a", player="p", seed=0, **changes) -> Row:
         "decision_p50_s": 0.001,
         "decision_p95_s": 0.002,
         "fallbacks": 0,
+        "filtered_share": 0.0,
         "trajectory_sha256": "11",
         "wall_time_s": 0.1,
         "versions": "{}",

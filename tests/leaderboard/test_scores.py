@@ -40,6 +40,16 @@ def test_a_failed_flight_covers_nothing_and_the_rest_is_still_counted():
     assert one.steps.n == 1
 
 
+def test_what_the_filter_replaced_is_averaged_over_the_flights_there_are():
+    rows = [
+        *(row("a", "base"), row("a", "p", filtered_share=0.1), row("b", "p", filtered_share=0.2)),
+        failed_row("c", "p"),
+    ]
+    assert by_player(rows)["p"].filtered_percent == pytest.approx(15.0)
+    nothing = by_player([row("a", "base"), failed_row("a", "p")])["p"]
+    assert nothing.filtered_percent == 0.0
+
+
 def test_energy_per_percent_leaves_out_who_covered_nothing():
     rows = [
         row("a", "p", coverage=0.5, accomplished=False),

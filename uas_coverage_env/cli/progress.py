@@ -9,7 +9,9 @@ from rich.live import Live
 from rich.spinner import Spinner
 
 from uas_coverage_env.cli.text_map import TextMap
-from uas_coverage_env.flight import Progress
+from uas_coverage_env.cli.watch import FlightWindow
+from uas_coverage_env.draw import NoDisplayError
+from uas_coverage_env.flight import Planner, Progress
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import LANDED, LOST
@@ -21,14 +23,47 @@ _NO_CHARGE = {LANDED: "landed", LOST: "lost"}
 
 @contextmanager
 def shown(
-    out: Console, scenario: Scenario, *, watch: bool
+    out: Console, scenario: Scenario, *, watch: Planner | None = None
 ) -> Iterator[Callable[[Progress], object]]:
-    """Show how a flight goes: gives the function that `rollout` calls in every step."""
+    """Show how a flight goes: gives the function that `rollout` calls in every step.
+
+    Args:
+        out: Where to write.
+        scenario: The scenario flown.
+        watch: Who flies, where a person wants to watch: in a window, or on a map of letters where
+            there is no display.
+    """
+    window = None if watch is None else _window(out, scenario, watch)
+    text_map = TextMap(scenario) if watch is not None and window is None else None
+    try:
+        with _lines(out, text_map) as write:
+
+            def update(progress: Progress) -> None:
+                write(progress)
+                if window is not None:
+                    window(progress)
+
+            yield update
+    finally:
+        if window is not None:
+            window.close()
+
+
+def _window(out: Console, scenario: Scenario, planner: Planner) -> FlightWindow | None:
+    try:
+        return FlightWindow(scenario, planner)
+    except (ImportError, NoDisplayError) as error:
+        instead = "a map of letters" if out.is_terminal else "lines"
+        out.print(f"{error}; {instead} instead", markup=False)
+        return None
+
+
+@contextmanager
+def _lines(out: Console, text_map: TextMap | None) -> Iterator[Callable[[Progress], object]]:
     if not out.is_terminal:
         out.print(_COMPILING)
         yield _PlainLines(out)
         return
-    text_map = TextMap(scenario) if watch else None
     with Live(Spinner("dots", _COMPILING), console=out, refresh_per_second=8) as live:
 
         def update(progress: Progress) -> None:

@@ -19,6 +19,7 @@ from uas_coverage_env.flight import (
     check_directory,
     draw_flight,
     energy_Wh,
+    filtered_share,
     load_planner,
     rollout,
     summary,
@@ -50,7 +51,12 @@ def run(
         bool, typer.Option("--filter", help="Keep the planner's commands clear of harm.")
     ] = False,
     watch: Annotated[
-        bool, typer.Option("--watch", help="Show a map of letters while it flies (terminal).")
+        bool,
+        typer.Option(
+            "--watch",
+            help="Show it in a window as it is planned (extra `human`); without a display, as a "
+            "map of letters.",
+        ),
     ] = False,
     out: Annotated[
         Path | None,
@@ -74,7 +80,7 @@ def run(
 
     screen = console()
     try:
-        with shown(screen, mission, watch=watch) as on_step:
+        with shown(screen, mission, watch=player if watch else None) as on_step:
             flight = rollout(
                 mission,
                 player,
@@ -150,5 +156,8 @@ def _report(screen: Console, flight: Flight, directory: Path) -> None:
             f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
         )
         screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks", markup=False)
+    if flight.safety_filter:
+        share = filtered_share(flight)
+        screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)
     screen.print(f"flight in {directory}", markup=False)
     screen.print(f"to watch it: uas-coverage replay {directory}", markup=False)

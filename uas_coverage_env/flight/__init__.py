@@ -6,6 +6,7 @@ from uas_coverage_env.flight.metrics import (
     coverage,
     covered_at,
     energy_Wh,
+    filtered_share,
     home,
     summary,
 )
@@ -49,6 +50,7 @@ __all__ = [
     "describe_planners",
     "draw_flight",
     "energy_Wh",
+    "filtered_share",
     "flight_picture",
     "flight_pictures",
     "home",

@@ -74,7 +74,8 @@ class FlightLog:
             _mode(commands.get(name), returning)
             for name, returning in zip(names, outcome["returning"], strict=True)
         ]
-        record = _decision_record(duration_s, decision)
+        filtered = int(outcome["filtered"].sum())
+        record = _decision_record(duration_s, decision, filtered)
         plan = _plan_rows(decision, self.steps, names)
         # one append, so that there is no half a step
         self._steps.append(_Step(outcome, modes, record, plan, self._sample()))
@@ -160,11 +161,11 @@ def _plan_rows(decision: Decision | None, step: int, names: tuple[str, ...]) -> 
     return np.concatenate(parts)
 
 
-def _decision_record(duration_s: float, decision: Decision | None) -> DecisionRecord:
+def _decision_record(duration_s: float, decision: Decision | None, filtered: int) -> DecisionRecord:
     if decision is None:
-        return DecisionRecord(duration_s)
+        return DecisionRecord(duration_s, filtered=filtered)
     gap = decision.mip_gap
     if gap is not None:
         # an infinite gap says that there is no bound
         gap = float(gap) if math.isfinite(gap) else None
-    return DecisionRecord(duration_s, decision.fallback, gap)
+    return DecisionRecord(duration_s, decision.fallback, gap, filtered)

@@ -60,6 +60,12 @@ def mip_gap_p50(flight: Flight) -> float | None:
     return float(np.median(gaps)) if gaps else None
 
 
+def filtered_share(flight: Flight) -> float:
+    """Share of the commands that the safety filter replaced, 0..1; 0 where there was none."""
+    commands = int(flight.last_sample.sum())
+    return sum(decision.filtered for decision in flight.decisions) / max(commands, 1)
+
+
 def summary(flight: Flight) -> dict[str, Any]:
     """The fields of `summary.json`, in their order."""
     return {

@@ -32,11 +32,15 @@ class Violation:
 
 @dataclass(frozen=True)
 class DecisionRecord:
-    """One decision of the planner: how long it took and how it came about."""
+    """One decision of the planner: how long it took, how it came about, what was left of it.
+
+    `filtered` counts the UAS whose command the safety filter replaced.
+    """
 
     duration_s: float
     fallback: bool = False
     mip_gap: float | None = None
+    filtered: int = 0
 
 
 @dataclass(frozen=True, eq=False)

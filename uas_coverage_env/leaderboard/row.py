@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from typing import Any, Self
 
-from uas_coverage_env.flight import Flight, accomplished, summary
+from uas_coverage_env.flight import Flight, accomplished, filtered_share, summary
 from uas_coverage_env.leaderboard.sweep import Entry
 
 FLOWN, FAILED = "flown", "failed"
@@ -43,6 +43,7 @@ class Row:
         decision_p50_s: Median time of a decision.
         decision_p95_s: 95th percentile.
         fallbacks: Decisions flown on a fallback.
+        filtered_share: Share of the commands that the safety filter replaced, 0..1.
         trajectory_sha256: Hash of every state of every UAS.
         wall_time_s: Time that the flight took to compute.
         versions: Package -> version, as JSON.
@@ -73,6 +74,7 @@ class Row:
     decision_p50_s: float | None
     decision_p95_s: float | None
     fallbacks: int
+    filtered_share: float
     trajectory_sha256: str | None
     wall_time_s: float | None
     versions: str
@@ -99,6 +101,7 @@ class Row:
             decision_p50_s=result["decision_time_s"]["p50"],
             decision_p95_s=result["decision_time_s"]["p95"],
             fallbacks=result["fallbacks"],
+            filtered_share=filtered_share(flight),
             trajectory_sha256=hashlib.sha256(flight.x.tobytes()).hexdigest(),
             wall_time_s=result["wall_time_s"],
             versions=json.dumps(result["versions"], sort_keys=True),
@@ -125,6 +128,7 @@ class Row:
             decision_p50_s=None,
             decision_p95_s=None,
             fallbacks=0,
+            filtered_share=0.0,
             trajectory_sha256=None,
             wall_time_s=None,
             versions="{}",

@@ -36,6 +36,7 @@ class Scores:
         violations: Contacts in all flights.
         breaches: Samples closer than the safe distances, in all flights.
         fallbacks: Decisions flown on a fallback, in all flights.
+        filtered_percent: Mean over flights of the share of commands that the filter replaced.
         coverage_percent: Interquartile mean; a failed flight covers nothing.
         mean_coverage_percent: The mean, which one bad flight changes.
         worst_coverage_percent: The least of all flights.
@@ -63,6 +64,7 @@ class Scores:
     violations: int
     breaches: int
     fallbacks: int
+    filtered_percent: float
     coverage_percent: Estimate
     mean_coverage_percent: Estimate
     worst_coverage_percent: float
@@ -142,6 +144,7 @@ def _scores(
         violations=sum(row.violations for row in rows),
         breaches=sum(row.breaches for row in rows),
         fallbacks=sum(row.fallbacks for row in rows),
+        filtered_percent=_PERCENT * _filtered_share(rows),
         coverage_percent=estimate(coverage, over),
         mean_coverage_percent=estimate(coverage, over, mean),
         worst_coverage_percent=_PERCENT * min(row.coverage for row in rows),
@@ -156,6 +159,11 @@ def _scores(
         improves_energy=_improves(mine, theirs, lambda row: row.energy_Wh, compared),
         improves_steps=_improves(mine, theirs, lambda row: row.steps, compared),
     )
+
+
+def _filtered_share(rows: Sequence[Row]) -> float:
+    shares = [row.filtered_share for row in rows if row.status == FLOWN]
+    return float(np.mean(shares)) if shares else 0.0
 
 
 Measure = Callable[[Row], float | None]

@@ -19,7 +19,7 @@ from uas_coverage_env.strict_toml import InputError
 
 STORE = "flights.sqlite"
 _LOCK = ".lock"
-_SCHEMA_VERSION = 1
+_SCHEMA_VERSION = 2
 _SQL_TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
 _BOOLEANS = tuple(field.name for field in dataclasses.fields(Row) if field.type is bool)
 

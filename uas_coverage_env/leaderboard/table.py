@@ -17,7 +17,7 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
     """Headings and rows: what was achieved, and what went wrong."""
     headings = [
         *("player", "flights", "accomplished", "covered, %", "worst", "all home"),
-        *("violations", "breaches", "fallbacks"),
+        *("violations", "breaches", "fallbacks", "filtered, %"),
     ]
     return headings, [
         [
@@ -30,6 +30,7 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
             f"{one.violations} in {one.violating}" if one.violations else "0",
             str(one.breaches),
             str(one.fallbacks),
+            f"{one.filtered_percent:.1f}",
         ]
         for one in scores
     ]

@@ -1,5 +1,6 @@
 """Flying a list of flights, side by side: joblib's processes, or the machines of a Ray cluster."""
 
+import logging
 import os
 import threading
 import time
@@ -126,7 +127,7 @@ def _join_ray(jobs: int) -> None:
     if not ray.is_initialized():
         here = "RAY_ADDRESS" not in os.environ
         local = {"num_cpus": None if jobs < 0 else jobs, "include_dashboard": False} if here else {}
-        ray.init(**local, log_to_driver=False, logging_level="ERROR")
+        ray.init(**local, log_to_driver=False, logging_level=logging.ERROR)
     from joblib import register_parallel_backend
 
     register_parallel_backend("uas-ray", Returning)
