@@ -12,7 +12,7 @@ from rich.console import Console
 from uas_coverage_env.cli import main
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.text_map import TextMap
-from uas_coverage_env.flight import Flight, rollout
+from uas_coverage_env.flight import Decision, Flight, load_planner, rollout
 from uas_coverage_env.scenario import load_scenario, scenario_names
 from uas_coverage_env.world import World
 
@@ -190,18 +190,73 @@ def test_the_planner_of_the_paper_flies_by_default_and_leaves_its_predictions(el
     np.testing.assert_allclose(now["position_m"], flight.x[now["step"], now["uas"], :3])
 
 
+@pytest.fixture
+def no_display(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+
+
+def terminal(rows=60):
+    return Console(file=io.StringIO(), force_terminal=True, width=120, height=rows)
+
+
 @pytest.mark.parametrize("watch", [True, False])
-def test_a_terminal_shows_a_line_that_changes_and_a_map_where_it_is_watched(watch):
+def test_a_terminal_shows_a_line_that_changes_and_a_map_where_it_is_watched(watch, no_display):
     scenario = load_scenario("open_field")
-    screen = Console(file=io.StringIO(), force_terminal=True, width=120, height=60)
-    with shown(screen, scenario, watch=watch) as on_step:
-        rollout(scenario, "hover", max_steps=3, on_step=on_step)
+    screen = terminal()
+    planner = load_planner("hover")
+    with shown(screen, scenario, watch=planner if watch else None) as on_step:
+        rollout(scenario, planner, max_steps=3, on_step=on_step)
     assert isinstance(screen.file, io.StringIO)
     text = screen.file.getvalue()
     assert "compiling" in text
     assert "step 3/3" in text
     assert "100%" in text
     assert ("moving obstacle" in text) is watch
+    assert ("a map of letters instead" in text) is watch
+
+
+def test_a_watched_flight_is_shown_in_a_window_with_what_is_planned(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    scenario = load_scenario("open_field")
+    planner = load_planner("hover")
+    screen = terminal()
+    pictures = []
+
+    def look(progress):
+        if progress.swarm.step == 2:
+            ahead_m = progress.swarm.x[:1, :3] + np.linspace([0, 20, 0], [0, 90, 0], 12)
+            planner.last_decision = Decision({progress.swarm.names[0]: ahead_m})
+        on_step(progress)
+        pictures.append(pygame.surfarray.array3d(pygame.display.get_surface()))
+
+    with shown(screen, scenario, watch=planner) as on_step:
+        flight = rollout(scenario, planner, max_steps=2, on_step=look)
+    assert flight.steps == 2
+    assert [picture.shape for picture in pictures] == [(720, 720, 3)] * 3
+    blue = (pictures[2] == [0, 114, 178]).all(axis=2).sum()
+    assert blue > (pictures[1] == [0, 114, 178]).all(axis=2).sum() + 60, "the plan is drawn"
+    assert pygame.display.get_surface() is None
+    assert isinstance(screen.file, io.StringIO)
+    assert "map of letters" not in screen.file.getvalue()
+
+
+def test_a_flight_goes_on_where_a_person_closes_the_window(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    scenario = load_scenario("open_field")
+    planner = load_planner("hover")
+
+    def close(progress):
+        if progress.swarm.step == 1:
+            pygame.event.post(pygame.event.Event(pygame.QUIT))
+        on_step(progress)
+
+    with shown(terminal(), scenario, watch=planner) as on_step:
+        flight = rollout(scenario, planner, max_steps=4, on_step=close)
+    assert flight.steps == 4
 
 
 def test_a_log_gets_few_lines(elsewhere, capsys):
@@ -214,7 +269,7 @@ def test_a_log_gets_few_lines(elsewhere, capsys):
 def test_a_map_of_letters_shows_what_is_where():
     scenario = load_scenario("village")
     world = World(scenario)
-    lines = TextMap(scenario).drawn(world.swarm_state()).plain.splitlines()
+    lines = TextMap(scenario, 120, 60).drawn(world.swarm_state()).plain.splitlines()
     cells = np.array([list(line) for line in lines[1:-2]])
     assert {"1", "2", "o", "#", "@"} <= set(cells.ravel())
     row, column = np.argwhere(cells == "1")[0]
@@ -223,3 +278,16 @@ def test_a_map_of_letters_shows_what_is_where():
     assert abs(row - len(cells) / 2) <= 2
     # the helicopter is in the east
     assert np.argwhere(cells == "@")[0][1] > 0.8 * cells.shape[1]
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (200, 50), (40, 60), (20, 10)])
+@pytest.mark.parametrize("name", ["village", "open_field"])
+def test_the_map_and_the_line_below_it_fit_into_the_terminal(name, columns, rows):
+    scenario = load_scenario(name)
+    *drawn, legend = (
+        TextMap(scenario, columns, rows).drawn(World(scenario).swarm_state()).plain.splitlines()
+    )
+    assert legend.startswith("1.. UAS")
+    assert len(drawn) + 2 <= rows
+    assert len({len(line) for line in drawn}) == 1
+    assert len(drawn[0]) <= columns

@@ -224,10 +224,27 @@ def test_a_window_shows_the_mission(monkeypatch):
     env.reset()
     env.step(still(env))
     assert env.render() is None
-    assert pygame.display.get_surface().get_size() == (512, 512)
+    assert pygame.display.get_surface().get_size() == (720, 720)
     env.close()
     env.close()
     assert pygame.display.get_surface() is None
+
+
+def test_a_window_that_a_person_closes_does_not_end_the_mission(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = uas_coverage_v0.parallel_env(practice_ground(max_steps=5), render_mode="human")
+    env.reset()
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_ESCAPE))
+    steps = 0
+    while env.agents:
+        env.step(still(env))
+        steps += 1
+    assert steps == 5
+    env.reset()
+    assert env.render() is None
+    assert pygame.display.get_surface() is None
+    env.close()
 
 
 def test_a_window_without_pygame_says_what_to_install(monkeypatch):

@@ -13,6 +13,7 @@ import uas_coverage_env  # noqa: F401  it registers the ids
 from uas_coverage_env.env import CoverageSwarmEnv, CoverageVectorEnv
 from uas_coverage_env.env.batch_kernel import ABSENT
 from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.screen import Screen
 from uas_coverage_env.world import STATUS_NAMES
 
 ID = "UASCoverage-v0"
@@ -152,16 +153,96 @@ def test_observations_stay_as_they_were_unless_copies_are_spared():
         assert np.array_equal(kept, as_it_was) == copy
 
 
-def test_pictures_show_every_mission():
+def flown(env, singles, steps=6):
+    """Fly both with the same actions; waypoints are covered and paths drawn on the way."""
+    env.reset(seed=0)
+    for single in singles:
+        single.reset()
+    rng = np.random.default_rng(1)
+    for _ in range(steps):
+        actions = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+        env.step(actions)
+        for single, action in zip(singles, actions, strict=True):
+            single.step(action[: single.action_space.shape[0]])
+
+
+def test_pictures_show_every_mission_as_it_is_shown_alone():
     env = make(2, scenario=MIXED, render_mode="rgb_array")
     env.reset(seed=0)
-    for _ in range(4):
-        env.step(env.action_space.sample())
+    singles = [
+        CoverageSwarmEnv(scenario, render_mode="rgb_array") for scenario in env.get_attr("scenario")
+    ]
+    flown(env, singles)
     pictures = env.render()
-    assert isinstance(pictures, tuple)
-    assert [picture.shape for picture in pictures] == [(512, 512, 3)] * 2
-    with pytest.raises(ValueError, match="render_mode"):
-        make(render_mode="human")
+    assert isinstance(pictures, tuple), "as Gymnasium's wrappers expect"
+    for picture, single in zip(pictures, singles, strict=True):
+        np.testing.assert_array_equal(picture, single.render())
+
+
+@pytest.mark.parametrize(
+    ("num_envs", "rows", "columns", "size_px"),
+    [(1, 1, 1, 512), (2, 1, 2, 512), (3, 2, 2, 512), (5, 2, 3, 341), (16, 4, 4, 256)],
+)
+def test_a_tile_is_the_picture_of_its_mission(num_envs, rows, columns, size_px):
+    env = make(num_envs, render_mode="rgb_array_tiled")
+    singles = [CoverageSwarmEnv(GROUND, render_mode="rgb_array") for _ in range(num_envs)]
+    flown(env, singles, steps=3)
+    picture = env.render()
+    assert picture.shape == (rows * size_px, columns * size_px, 3)
+    tiles = picture.reshape(rows, size_px, columns, size_px, 3).swapaxes(1, 2)
+    tiles = tiles.reshape(rows * columns, size_px, size_px, 3)
+    for tile, single in zip(tiles, singles, strict=False):
+        screen = Screen(GROUND, "rgb_array", size_px=size_px)
+        for positions_m in single._screen._path_m:
+            screen.see(positions_m)
+        np.testing.assert_array_equal(tile, screen.render(single._episode.swarm_state()))
+    assert all((tile == tile[0, 0]).all() for tile in tiles[num_envs:]), "the rest is paper"
+
+
+def test_tiles_show_the_first_sixteen_missions_through_new_starts():
+    env = make(20, scenario=MIXED, max_cycles=3, render_mode="rgb_array_tiled")
+    alone = make(16, scenario=MIXED, max_cycles=3, render_mode="rgb_array_tiled")
+    for some in (env, alone):
+        some.reset(seed=4)
+    rng = np.random.default_rng(0)
+    for _ in range(8):
+        actions = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+        env.step(actions)
+        alone.step(actions[:16])
+        np.testing.assert_array_equal(env.render(), alone.render())
+    assert env.render().shape == (1024, 1024, 3)
+    twin = pickle.loads(pickle.dumps(env))
+    np.testing.assert_array_equal(twin.render(), env.render())
+
+
+def test_a_window_shows_the_tiles(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gymnasium.make_vec(
+        "UASCoverage-v0",
+        num_envs=4,
+        vectorization_mode="vector_entry_point",
+        scenario=GROUND,
+        render_mode="human",
+    )
+    env.reset()
+    env.step(env.action_space.sample())
+    assert env.render() is None
+    assert pygame.display.get_surface().get_size() == (1024, 1024)
+    env.close()
+    env.close()
+    assert pygame.display.get_surface() is None
+
+
+def test_a_render_mode_that_there_is_not_is_refused():
+    with pytest.raises(ValueError, match="human, rgb_array, rgb_array_tiled"):
+        make(render_mode="ansi")
+
+
+def test_nothing_can_be_rendered_before_the_first_reset():
+    with pytest.raises(ResetNeeded):
+        make(render_mode="rgb_array").render()
+    assert make().render() is None
 
 
 def test_attributes_are_asked_of_every_mission():

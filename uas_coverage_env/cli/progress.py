@@ -34,7 +34,9 @@ def shown(
             there is no display.
     """
     window = None if watch is None else _window(out, scenario, watch)
-    text_map = TextMap(scenario) if watch is not None and window is None else None
+    text_map = None
+    if watch is not None and window is None:
+        text_map = TextMap(scenario, *out.size)
     try:
         with _lines(out, text_map) as write:
 

@@ -7,21 +7,28 @@ from rich.text import Text
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import LOST, SwarmState
 
-_COLUMNS = 72
+_MOST_COLUMNS = 72
+_LEAST_ROWS, _LEAST_COLUMNS = 4, 16
+# The frame and the legend, and below the map the line with the progress, which may be broken once.
+_OTHER_ROWS, _OTHER_COLUMNS = 5, 2
 _UAS_SIGNS = "123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _LEGEND = "1.. UAS   x lost   o open   . covered   # obstacle   @ moving obstacle   ^ north"
 
 
 class TextMap:
-    """The scenario from above, north up; the fixed part is drawn once."""
+    """The scenario from above, north up; the fixed part is drawn once.
 
-    def __init__(self, scenario: Scenario) -> None:
+    Args:
+        scenario: What is drawn.
+        columns: Of the terminal.
+        rows: Of the terminal.
+    """
+
+    def __init__(self, scenario: Scenario, columns: int, rows: int) -> None:
         corners_m = scenario.fence.vertices_m[:, :2]
         self._low_m = corners_m.min(axis=0)
         self._span_m = np.ptp(corners_m, axis=0)
-        # a character is about twice as high as it is wide
-        rows = max(4, round(_COLUMNS * self._span_m[0] / self._span_m[1] / 2))
-        self._shape = (rows, _COLUMNS)
+        self._shape = _shape(self._span_m[0] / self._span_m[1], columns, rows)
         self._waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
         self._ground = np.full(self._shape, " ")
         centres_m = self._centres_m()
@@ -42,7 +49,7 @@ class TextMap:
             sign = _UAS_SIGNS[i % len(_UAS_SIGNS)]
             self._put(cells, x, "x" if status == LOST else sign)
         lines = ["".join(row) for row in cells]
-        edge = "+" + "-" * _COLUMNS + "+"
+        edge = "+" + "-" * self._shape[1] + "+"
         return Text("\n".join([edge, *(f"|{line}|" for line in lines), edge, _LEGEND]))
 
     def _put(self, cells: NDArray[np.str_], position_m: NDArray[np.float64], sign: str) -> None:
@@ -57,3 +64,14 @@ class TextMap:
         north_m = self._low_m[0] + self._span_m[0] * (1.0 - (np.arange(rows) + 0.5) / rows)
         east_m = self._low_m[1] + self._span_m[1] * (np.arange(columns) + 0.5) / columns
         return np.stack(np.meshgrid(north_m, east_m, indexing="ij"), axis=2)
+
+
+def _shape(north_by_east: float, columns: int, rows: int) -> tuple[int, int]:
+    """Rows and columns of the map that fit into a terminal, in the proportions of the area."""
+    most_columns = max(_LEAST_COLUMNS, min(_MOST_COLUMNS, columns - _OTHER_COLUMNS))
+    most_rows = max(_LEAST_ROWS, rows - _OTHER_ROWS)
+    # a character is about twice as high as it is wide
+    wanted = round(most_columns * north_by_east / 2)
+    if wanted <= most_rows:
+        return max(_LEAST_ROWS, wanted), most_columns
+    return most_rows, max(_LEAST_COLUMNS, min(most_columns, round(2 * most_rows / north_by_east)))

@@ -1,9 +1,9 @@
-"""One picture of one state, seen from above: what `render_mode="rgb_array"` returns.
+"""One picture of one state, seen from above: what `render` returns, or shows in a window.
 
-Pillow is imported when the first picture is drawn, pygame when the first window opens.
+Pillow is imported when the first `Picture` is made, pygame when the first window opens.
 """
 
 from uas_coverage_env.draw.picture import Picture, picture
-from uas_coverage_env.draw.window import Window
+from uas_coverage_env.draw.window import NoDisplayError, Window
 
-__all__ = ["Picture", "Window", "picture"]
+__all__ = ["NoDisplayError", "Picture", "Window", "picture"]

@@ -9,6 +9,8 @@ SMOOTHING = 2
 """Everything is drawn at this multiple of the size and averaged down, which smooths all edges."""
 
 _DESIGN_PX = 512
+# In smaller pictures the writing shrinks less than the rest.
+_SMALL_PX, _LARGER = 384, 1.25
 
 
 @dataclass(frozen=True)
@@ -18,6 +20,8 @@ class Frame:
     Attributes:
         side: Side of the square canvas.
         unit: Canvas pixels per pixel of the 512-pixel design.
+        letter: Canvas pixels per pixel of its writing.
+        detailed: Whether there is room for all that could be written.
         header: Height of the strip above the map.
         footer: Top edge of the strip below the map.
         gauge: Left edge of the altitude scale.
@@ -32,6 +36,8 @@ class Frame:
 
     side: int
     unit: float
+    letter: float
+    detailed: bool
     header: float
     footer: float
     gauge: float
@@ -62,6 +68,8 @@ class Frame:
         return cls(
             side=side,
             unit=unit,
+            letter=unit * (_LARGER if size_px < _SMALL_PX else 1.0),
+            detailed=size_px >= _SMALL_PX,
             header=header,
             footer=footer,
             gauge=gauge,

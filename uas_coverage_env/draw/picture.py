@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours, marks
-from uas_coverage_env.draw.frame import SMOOTHING, Frame
+from uas_coverage_env.draw.canvas import Canvas
+from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.terrain import terrain
-from uas_coverage_env.draw.text import write
+from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, PSI, Z
 from uas_coverage_env.world import FLYING, LANDED, STATUS_NAMES, SwarmState
@@ -52,6 +53,9 @@ def picture(
 class Picture:
     """Draws the states of one scenario; keeps the background between them.
 
+    A copy (`copy.copy`) shares the background, and is for states that take turns with those of the
+    original, such as another mission in the same scenario.
+
     Args:
         scenario: The scenario flown.
         size_px: Side of the square pictures.
@@ -74,7 +78,18 @@ class Picture:
         self._heavy = [weight > min(weights) for weight in weights]
         self._radii = [point.radius_m * frame.scale for point in scenario.waypoints]
         self._labels = [uas.name.rpartition("_")[2][:3] for uas in scenario.uas]
-        self._terrain: Image | None = None
+        self._canvas = Canvas(frame.side)
+        self._terrain = terrain(scenario, frame).convert("RGBX")
+        unit = frame.unit
+        # the strips around the map
+        self._margins = [
+            (self._terrain.crop(box), box[:2])
+            for box in (
+                (0, 0, frame.side, round(frame.header - unit)),
+                (0, round(frame.footer), frame.side, frame.side),
+                (round(frame.gauge - 4 * unit), 0, frame.side, frame.side),
+            )
+        ]
         # the map changes only when a waypoint is covered
         self._map: tuple[bytes, Image] | None = None
 
@@ -97,7 +112,8 @@ class Picture:
         """
         from PIL import ImageDraw
 
-        image = self._map_with_waypoints(swarm.uncovered).copy()
+        image = self._canvas.image
+        image.paste(self._map_with_waypoints(swarm.uncovered))
         draw = ImageDraw.Draw(image)
         if paths_m is not None and len(paths_m) > 1:
             self._paths(draw, paths_m)
@@ -105,22 +121,19 @@ class Picture:
             self._plans(draw, swarm.names, planned_m)
         self._moving_obstacles(draw, swarm)
         self._swarm(image, draw, swarm)
-        self._margins(image)
+        # a helicopter that has left the map, and its dotted circle, are covered again
+        for strip, corner in self._margins:
+            image.paste(strip, corner)
         self._altitudes(draw, swarm)
         self._captions(image, draw, swarm)
-        return np.array(image.reduce(SMOOTHING))
-
-    def _background(self) -> "Image":
-        if self._terrain is None:
-            self._terrain = terrain(self._scenario, self._frame)
-        return self._terrain
+        return self._canvas.smoothed()
 
     def _map_with_waypoints(self, uncovered: NDArray[np.bool_]) -> "Image":
         from PIL import ImageDraw
 
         key = uncovered.tobytes()
         if self._map is None or self._map[0] != key:
-            image = self._background().copy()
+            image = self._terrain.copy()
             draw = ImageDraw.Draw(image)
             for (x, y), radius, heavy, open_ in zip(
                 self._waypoints, self._radii, self._heavy, uncovered.tolist(), strict=True
@@ -180,18 +193,8 @@ class Picture:
 
     def _label(self, image: "Image", place: tuple[float, float], i: int, align: float) -> None:
         unit = self._frame.unit
-        write(image, place, self._labels[i], 11 * unit, _colour(i), align=align, halo=1.5 * unit)
-
-    def _margins(self, image: "Image") -> None:
-        """Cover what has left the map: a helicopter that is gone, and its dotted circle."""
-        frame, unit = self._frame, self._frame.unit
-        background = self._background()
-        for box in (
-            (0, 0, frame.side, round(frame.header - unit)),
-            (0, round(frame.footer), frame.side, frame.side),
-            (round(frame.gauge - 4 * unit), 0, frame.side, frame.side),
-        ):
-            image.paste(background.crop(box), box[:2])
+        size = 11 * self._frame.letter
+        write(image, place, self._labels[i], size, _colour(i), align=align, halo=1.5 * unit)
 
     def _altitudes(self, draw: "ImageDraw", swarm: SwarmState) -> None:
         """Where the flying UAS are on the altitude scale."""
@@ -208,21 +211,26 @@ class Picture:
         y = frame.header / 2
         covered, waypoints = int((~swarm.uncovered).sum()), len(swarm.uncovered)
         middle = f"covered {covered} / {waypoints}"
-        write(image, (frame.side / 2, y), middle, 14 * unit, colours.INK, align=0.5)
+        write(image, (frame.side / 2, y), middle, 14 * frame.letter, colours.INK, align=0.5)
         end = f"step {swarm.step} / {self._scenario.max_steps}"
-        write(image, (frame.side - 8 * unit, y), end, 14 * unit, colours.INK, align=1.0)
+        write(image, (frame.side - 8 * unit, y), end, 14 * frame.letter, colours.INK, align=1.0)
         y = (frame.footer + frame.side) / 2
         if len(swarm.names) > _NAMED_UAS:
-            write(image, (8 * unit, y), _summed_up(swarm), 12 * unit, colours.INK)
+            write(image, (8 * unit, y), _summed_up(swarm), 12 * frame.letter, colours.INK)
             return
+        size, room = 10.5 * frame.letter, 496 / _NAMED_UAS * unit
+        # as for the longest words, so that a name does not change while it flies
+        longest = " 100 %, landed" if frame.detailed else " 100 %"
+        room_for_name = room - 20 * unit - width_of(longest, size)
         for i, name in enumerate(swarm.names):
-            x = (8 + i * 496 / _NAMED_UAS) * unit
+            x = 8 * unit + i * room
             draw.ellipse((x, y - 4 * unit, x + 8 * unit, y + 4 * unit), fill=_colour(i))
-            doing = f"{-swarm.x[i, Z]:.0f} m"
-            if swarm.status[i] != FLYING:
-                doing = STATUS_NAMES[swarm.status[i]]
-            words = f"{name[:10]} {100 * (1 - swarm.x[i, DOD]):.0f} %, {doing}"
-            write(image, (x + 11 * unit, y), words, 10.5 * unit, colours.INK)
+            words = f"{fitted(name, size, room_for_name)} {100 * (1 - swarm.x[i, DOD]):.0f} %"
+            if frame.detailed:
+                status = swarm.status[i]
+                doing = f"{-swarm.x[i, Z]:.0f} m" if status == FLYING else STATUS_NAMES[status]
+                words += f", {doing}"
+            write(image, (x + 11 * unit, y), words, size, colours.INK)
 
 
 def _colour(i: int) -> colours.Colour:

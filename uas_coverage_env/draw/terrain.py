@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.frame import Frame
-from uas_coverage_env.draw.text import write
+from uas_coverage_env.draw.labels import free_place
+from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import Scenario
 
@@ -45,8 +46,11 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
         if decoration.kind == "pad":
             draw.line([*corners, *corners[:2]], fill=colours.FAINT, width=round(frame.unit))
     _shadows(image, frame, scenario.hulls)
+    points = scenario.waypoints
+    places = frame.pixels(np.array([point.position_m for point in points]))
+    marks = np.column_stack([places, [point.radius_m * frame.scale for point in points]])
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        _obstacle(image, draw, frame, obstacle.kind or "", hull)
+        _obstacle(image, draw, frame, obstacle.kind or "", hull, marks)
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
     _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
@@ -69,7 +73,7 @@ def _grid(image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.flo
     end = start + np.array([step_m * frame.scale, 0])
     draw.line(_flat(np.array([start, end])), fill=colours.INK, width=round(2 * frame.unit))
     place = (float(start[0]), float(start[1]) - 7 * frame.unit)
-    write(image, place, f"{step_m:g} m", 9 * frame.unit, colours.INK)
+    write(image, place, f"{step_m:g} m", 9 * frame.letter, colours.INK)
 
 
 def _shadows(image: "Image", frame: Frame, hulls: tuple[ConvexPolytope, ...]) -> None:
@@ -88,9 +92,17 @@ def _shadows(image: "Image", frame: Frame, hulls: tuple[ConvexPolytope, ...]) ->
 
 
 def _obstacle(
-    image: "Image", draw: "ImageDraw", frame: Frame, kind: str, hull: ConvexPolytope
+    image: "Image",
+    draw: "ImageDraw",
+    frame: Frame,
+    kind: str,
+    hull: ConvexPolytope,
+    marks: NDArray[np.float64],
 ) -> None:
-    """The faces that can be seen from above, lit, in the tint of the kind; darker where taller."""
+    """The faces that can be seen from above, lit, in the tint of the kind; darker where taller.
+
+    Its height stands where no waypoint (`marks`, (W, 3) x, y, radius on the canvas) hides it.
+    """
     height_m = float(np.ptp(hull.vertices_m[:, 2]))
     tint = colours.OBSTACLES.get(kind, colours.OTHER_OBSTACLE)
     tint = colours.shaded(tint, 1.08 - 0.3 * min(1.0, height_m / _TALL_M))
@@ -103,10 +115,12 @@ def _obstacle(
     edge = _flat(frame.pixels(np.vstack([outline, outline[:1]])))
     width = round((1 + min(1.0, height_m / _TALL_M)) * frame.unit)
     draw.line(edge, fill=colours.shaded(tint, 0.55), width=width, joint="curve")
-    if np.ptp(frame.pixels(outline), axis=0).min() > 14 * frame.unit:
-        x, y = frame.pixels(outline.mean(axis=0)).tolist()
-        ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.5)
-        write(image, (x, y), f"{height_m:.0f} m", 8.5 * frame.unit, ink, align=0.5)
+    ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.35)
+    words, size = f"{height_m:.0f} m", 8.5 * frame.letter
+    box = np.array([width_of(words, size), size]) + frame.unit
+    place = free_place(frame.pixels(outline), box, marks)
+    if place is not None:
+        write(image, place, words, size, ink, align=0.5)
 
 
 def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> None:
@@ -119,15 +133,17 @@ def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> Non
 def _margins(image: "Image", draw: "ImageDraw", frame: Frame, name: str) -> None:
     """The name above the map and the altitude scale beside it."""
     unit = frame.unit
-    write(image, (8 * unit, frame.header / 2), name, 14 * unit, colours.INK)
+    size = 14 * frame.letter
+    name = fitted(name, size, frame.side / 2 - 20 * unit - width_of("covered 100 / 100", size) / 2)
+    write(image, (8 * unit, frame.header / 2), name, size, colours.INK)
     x = frame.gauge + 8 * unit
     top, bottom = frame.gauge_height(frame.ceiling_m), frame.gauge_height(frame.floor_m)
     draw.line((x, top, x, bottom), fill=colours.FAINT, width=round(1.5 * unit))
     for altitude_m in np.linspace(frame.floor_m, frame.ceiling_m, 6).tolist():
         y = frame.gauge_height(altitude_m)
         draw.line((x, y, x + 4 * unit, y), fill=colours.FAINT, width=round(unit))
-        write(image, (x + 7 * unit, y), f"{altitude_m:.0f}", 9 * unit, colours.FAINT)
-    write(image, (x - 4 * unit, top - 12 * unit), "alt [m]", 9 * unit, colours.FAINT)
+        write(image, (x + 7 * unit, y), f"{altitude_m:.0f}", 9 * frame.letter, colours.FAINT)
+    write(image, (x - 4 * unit, top - 12 * unit), "alt [m]", 9 * frame.letter, colours.FAINT)
 
 
 def _outline(points_m: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -15,7 +16,8 @@ from uas_coverage_env.env.batch_kernel import SWARM_COVERED, SWARM_REWARD
 from uas_coverage_env.env.kernel import CONTACT, ENERGY, FILTERED, RETURNING, STATUS
 from uas_coverage_env.env.layout import observation_bounds
 from uas_coverage_env.env.rewards import REWARD_TERMS
-from uas_coverage_env.env.screen import RENDER_FPS, Screen
+from uas_coverage_env.env.screen import RENDER_FPS
+from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
 from uas_coverage_env.scenario import Scenario
 
 _MODES = {
@@ -73,14 +75,16 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         threads: How many of numba's threads share the missions, see `CoverageBatch`.
         copy: Whether observations are arrays of their own. False: they are overwritten by the step
             after the next, which spares a copy.
-        render_mode: None or "rgb_array".
+        render_mode: None; "rgb_array": `render` returns a tuple of pictures, 512 x 512 pixels each,
+            as Gymnasium's wrappers ask for; "rgb_array_tiled": one array (H, W, 3) that shows the
+            first 16 missions side by side; "human": a window with these (extra `human`).
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  # as Gymnasium declares it
-        "render_modes": ["rgb_array"],
+        "render_modes": list(BATCH_RENDER_MODES),
         "render_fps": RENDER_FPS,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -102,8 +106,6 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         render_mode: str | None = None,
     ) -> None:
         mode = AutoresetMode(autoreset_mode)
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode is {render_mode!r}; it is None or 'rgb_array'")
         self._batch = CoverageBatch(
             num_envs,
             scenario,
@@ -119,12 +121,12 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         self.metadata = {**self.metadata, "autoreset_mode": mode}
         self.num_envs = self._batch.num_lanes
         self.render_mode = render_mode
+        self._tiles = Tiles(self.num_envs, render_mode)
         self.copy = copy
+        self._begun = False
         self._same_step = mode == AutoresetMode.SAME_STEP
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
-        self._screens: list[Screen] = []
-        self._drawn_mission = np.full(self.num_envs, -1)
         self._attributes: dict[str, tuple[Any, ...]] = {}
         n_uas = self._batch.n_uas
         low, high = (np.tile(bounds, n_uas) for bounds in observation_bounds())
@@ -164,7 +166,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         elif not isinstance(mask, np.ndarray) or not mask.any():
             raise ValueError(f"reset_mask is {mask!r}; give an array with one true value at least")
         observation = self._batch.reset(seed, mask=mask, scenarios=options.get("scenario"))
-        self._drawn_mission[mask] = -1
+        self._tiles.forget(np.flatnonzero(mask).tolist())
         self._watch()
         lanes = self._batch.lanes
         return self._shown(observation), self._infos(
@@ -209,14 +211,15 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
             raise ValueError('only action="waypoint" has masks; the others are continuous')
         return self._batch.action_masks().reshape(self.num_envs, -1)
 
-    def render(self) -> tuple[Any, ...] | None:
-        """One picture of each mission with "rgb_array"."""
-        if self.render_mode is None:
-            return None
-        return tuple(
-            screen.render(self._batch.swarm_state(lane))
-            for lane, screen in enumerate(self._screens)
-        )
+    def render(self) -> Any:
+        """A tuple of pictures, one of each mission, or one picture of many, see `render_mode`.
+
+        Raises:
+            ResetNeeded: `reset` was not called before.
+        """
+        if self.render_mode is not None and not self._begun:
+            raise ResetNeeded("render() before reset(): call reset() first")
+        return self._tiles.render(self._batch.swarm_state)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What every sub-environment answers, a tuple.
@@ -259,7 +262,8 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         self._attributes[name] = tuple(values)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Nothing is held that would have to be given back."""
+        """Close the window, if there is one."""
+        self._tiles.close()
 
     def _shown(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         flat = observation.reshape(self.num_envs, -1)
@@ -310,15 +314,11 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         infos["_final_info"] = ended
 
     def _watch(self) -> None:
-        """Remember where the UAS are, for pictures with their paths."""
+        """Remember where the UAS are, for pictures with their paths; show them in the window."""
         if self.render_mode is None:
             return
         batch = self._batch
-        if not self._screens:
-            self._screens = [Screen(batch.scenario_of(0), self.render_mode)] * self.num_envs
-        for lane in range(self.num_envs):
-            if self._drawn_mission[lane] != batch.lanes.mission[lane]:
-                self._drawn_mission[lane] = batch.lanes.mission[lane]
-                self._screens[lane] = Screen(batch.scenario_of(lane), self.render_mode)
-            n_uas = len(batch.scenario_of(lane).uas)
-            self._screens[lane].see(batch.worlds.x[lane, :n_uas, :3])
+        self._begun = True
+        self._tiles.see(batch.lanes.mission.tolist(), batch.scenario_of, batch.worlds.x[:, :, :3])
+        if self.render_mode == "human":
+            self.render()
