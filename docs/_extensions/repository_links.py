@@ -1,8 +1,8 @@
 """Pages that read well on a code host as well as on the site: links out of docs/ are bent.
 
 READMEs of other folders become pages of the site. A link to one of them leads to that page; a link
-to any other file of the repository becomes plain text. `index.md` gets the pages that none of its
-tables of contents names, so that a new page needs no other edit.
+to a notebook downloads it, one to any other file of the repository becomes plain text. `index.md`
+gets the pages that none of its tables of contents names, so that a new page needs no other edit.
 """
 
 import os
@@ -49,7 +49,7 @@ def site_text(text: str, source: Path, page: Path) -> str:
         if picture and source.parent != DOCS and not file.exists():
             return label  # READMEs show pictures that a benchmark has yet to make
         file = PAGES.get(file, file)
-        if file.exists() and not file.is_relative_to(DOCS):
+        if file.exists() and not file.is_relative_to(DOCS) and file.suffix != ".ipynb":
             return label
         return f"{picture}[{label}]({os.path.relpath(file, page.parent)}{anchor})"
 

@@ -56,12 +56,13 @@ def blocks(page: Path) -> Iterator[Block]:
     assert start is None, f"{page.name}: the block of line {start} has no end"
 
 
-def command_lines(page: Path) -> Iterator[list[str]]:
-    """Every command of ours in the blocks and the inline code of a page, as its words."""
+def command_lines(page: Path, *, inline: bool = True) -> Iterator[list[str]]:
+    """Every command of ours in the blocks, and the inline code, of a page, as its words."""
     shells = [b.text for b in blocks(page) if b.language in ("bash", "console", "", "sh")]
     prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
-    inline = re.findall(r"`((?:uas-coverage|python) [^`\[\]|…]*)`", prose)
-    for text in [*shells, *inline]:
+    prose = prose if inline else ""
+    commands = re.findall(r"`((?:uas-coverage|python) [^`\[\]|…]*)`", prose)
+    for text in [*shells, *commands]:
         for line in text.replace("\\\n", " ").splitlines():
             words = shlex.split(line.removeprefix("$ "), comments=True)
             while words:

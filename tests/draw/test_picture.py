@@ -3,6 +3,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from uas_coverage_env.draw import Picture, picture
 from uas_coverage_env.draw.colours import of_charge
@@ -62,6 +64,34 @@ def test_the_same_state_makes_the_same_picture_and_an_array_of_its_own(village, 
     other[:] = 0
     np.testing.assert_array_equal(one, one_copy)
     np.testing.assert_array_equal(one, picture(village, swarm))
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), size_px=st.sampled_from([200, 333, 512]))
+def test_a_kept_picture_shows_what_a_new_one_shows(village, seed, size_px):
+    rng = np.random.default_rng(seed)
+    # crowded: marks overlap each other, and the edge of the map
+    places_m = rng.uniform([2, 2, -48], [90, 90, -47], (49, 3)).tolist()
+    crowded = village.model_copy(
+        update={
+            "waypoints": tuple(
+                waypoint.model_copy(update={"position_m": tuple(place_m)})
+                for waypoint, place_m in zip(village.waypoints, places_m, strict=True)
+            )
+        }
+    )
+    swarm, other = World(village).swarm_state(), World(village).swarm_state()
+    kept = Picture(crowded, size_px=size_px)
+    kept.draw(swarm)
+    twin = kept.twin()
+    for _ in range(3):
+        swarm.uncovered[:] = rng.random(49) < rng.random()
+        swarm.x[:, :3] += rng.normal(0, 30, (2, 3))
+        expected = picture(crowded, swarm, size_px=size_px)
+        np.testing.assert_array_equal(kept.draw(swarm), expected)
+        np.testing.assert_array_equal(
+            twin.draw(other), picture(crowded, other, size_px=size_px), "another mission's"
+        )
 
 
 def test_north_is_up_and_east_to_the_right(village, swarm):

@@ -7,8 +7,15 @@ import polars
 import pytest
 from leaderboard_rows import failed_row, row
 
-from uas_coverage_env.leaderboard import Comparison, scores_of, write
+from uas_coverage_env.leaderboard import (
+    Comparison,
+    leaderboard_figure,
+    published,
+    scores_of,
+    write,
+)
 from uas_coverage_env.leaderboard.table import NOTHING, markdown, outcome_cells, scenarios_cells
+from uas_coverage_env.strict_toml import InputError
 
 
 def by_player(rows, reference="base"):
@@ -125,3 +132,63 @@ def test_the_picture_is_drawn_for_any_flights(tmp_path):
     rows = [row("a", "base"), failed_row("a", "p"), row("b", "q", violations=1)]
     assert "coverage-energy.png" in write(Comparison.of(rows, 3, "base", "c", "j"), tmp_path)
     assert (tmp_path / "coverage-energy.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_picture_holds_every_flight_and_every_mean():
+    rows = [
+        *(row(s, "base", energy_Wh=20.0) for s in "ab"),
+        *(row(s, "p", energy_Wh=e, coverage=c) for s, e, c in (("a", 10.0, 1.0), ("b", 15.0, 0.5))),
+        row("c", "p", violations=1),
+    ]
+    scores = scores_of(rows, "base")
+    figure = leaderboard_figure(scores, rows, "base")
+    coverage, energy = figure.axes
+    assert [label.get_text() for label in coverage.get_yticklabels()] == ["base", "p"]
+    assert coverage.get_ylim() == (1.5, -0.5), "the best on top"
+
+    def dots(axes):
+        return [
+            sorted(line.get_xdata().tolist())
+            for line in axes.get_lines()
+            if line.get_marker() == "."
+        ]
+
+    def means(axes):
+        return [line.get_xdata()[0] for line in axes.get_lines() if line.get_marker() == "D"]
+
+    assert dots(coverage) == [[100.0, 100.0], [50.0, 100.0, 100.0]]
+    assert dots(energy) == [[100.0, 100.0], [50.0, 75.0]], "without the flight with a violation"
+    assert means(energy) == [one.relative_energy_percent.value for one in scores]
+    assert means(coverage) == [one.mean_coverage_percent.value for one in scores]
+
+
+def test_what_is_published_is_read_again(tmp_path):
+    rows = [row("a", "base"), row("b", "base", energy_Wh=None), failed_row("a", "p")]
+    write(Comparison.of(rows, 3, "base", "c", "j"), tmp_path)
+    assert published(tmp_path) == (rows, "base")
+
+
+def test_what_is_no_comparison_of_this_version_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"flights\.parquet: cannot be read"):
+        published(tmp_path)
+    rows = [row("a", "base")]
+    write(Comparison.of(rows, 1, "base", "c", "j"), tmp_path)
+    flights, table = tmp_path / "flights.parquet", tmp_path / "table.json"
+    good = flights.read_bytes()
+    flights.write_bytes(b"no parquet")
+    with pytest.raises(InputError, match=r"flights\.parquet: cannot be read"):
+        published(tmp_path)
+    polars.read_parquet(good).drop("fallbacks").write_parquet(flights)
+    with pytest.raises(InputError, match="other columns than this version writes"):
+        published(tmp_path)
+    polars.read_parquet(good).clear().write_parquet(flights)
+    with pytest.raises(InputError, match="no flight"):
+        published(tmp_path)
+    flights.write_bytes(good)
+    table.write_text('{"reference": "nobody"}')
+    with pytest.raises(InputError, match="'nobody' has no flight"):
+        published(tmp_path)
+    for text in ("{", "[]", "{}"):
+        table.write_text(text)
+        with pytest.raises(InputError, match=r"table\.json: cannot be read"):
+            published(tmp_path)

@@ -12,9 +12,11 @@ from uas_coverage_env.replay.figures import (
     KINDS,
     battery_figure,
     decision_time_figure,
+    learning_curve,
     map_figure,
     modes_figure,
     save_figure,
+    training_figure,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
 from uas_coverage_env.strict_toml import InputError
@@ -140,3 +142,57 @@ def test_fast_decisions_are_counted_in_milliseconds(plain):
 def test_a_flight_without_decisions_has_no_decision_times(plain):
     with pytest.raises(InputError, match="no decision"):
         decision_time_figure(dataclasses.replace(plain, decisions=()))
+
+
+CURVE = """steps,process_s,wall_s,coverage,all_home,violations,energy_Wh,flight_steps
+0,0.1,0.2,0.25,0.5,1.5,60.0,400.0
+1000000,9.0,9.0,1.0,1.0,0.0,30.0,200.0
+"""
+
+
+def curve_in(directory, text=CURVE):
+    directory.mkdir(exist_ok=True)
+    (directory / "learning_curve.csv").write_text(text)
+    return directory
+
+
+def test_trainings_are_drawn_side_by_side_in_panels_of_their_own(tmp_path):
+    later = CURVE.replace("30.0", "25.0")
+    runs = {
+        "seed 0": learning_curve(curve_in(tmp_path / "a")),
+        "seed 1": learning_curve(curve_in(tmp_path / "b", later)),
+    }
+    figure = training_figure(runs)
+    coverage, violations, energy, duration = figure.axes
+    for axes, first, second in (
+        (coverage, [25.0, 100.0], [25.0, 100.0]),
+        (violations, [1.5, 0.0], [1.5, 0.0]),
+        (energy, [60.0, 30.0], [60.0, 25.0]),
+        (duration, [400.0, 200.0], [400.0, 200.0]),
+    ):
+        assert [line[:, 0].tolist() for line in lines(axes)] == [[0.0, 1.0]] * 2
+        assert [line[:, 1].tolist() for line in lines(axes)] == [first, second]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["seed 0", "seed 1"]
+    styles = {line.get_linestyle() for line in coverage.get_lines()}
+    assert len(styles) == 2, "told apart without colour"
+
+
+def test_a_training_alone_needs_no_legend(tmp_path):
+    assert not training_figure({"": learning_curve(curve_in(tmp_path))}).legends
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (CURVE.replace("60.0", "nan"), "line 2, energy_Wh: 'nan' should be a finite number"),
+        (CURVE.replace("60.0", "much"), "line 2, energy_Wh: 'much'"),
+        ("\n".join([*CURVE.splitlines()[:2], "5"]), "line 3, coverage: None"),
+        (CURVE.replace("coverage", "cover"), "no column coverage"),
+        (CURVE.splitlines()[0], "no row"),
+        ("", "no row"),
+    ],
+)
+def test_a_curve_that_is_none_is_refused(text, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        learning_curve(curve_in(tmp_path, text))

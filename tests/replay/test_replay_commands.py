@@ -1,7 +1,9 @@
 """`uas-coverage replay` and `figure`, in this process: what they write, and what they refuse."""
 
 import re
+import shutil
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -54,6 +56,43 @@ def test_figure_writes_a_pdf_into_the_flight(kind, directory, capsys):
     assert main(["figure", "flown", "--kind", kind]) == 0
     assert capsys.readouterr().out == f"figure in flown/{kind}.pdf\n"
     assert (directory / f"{kind}.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.fixture
+def trained(directory):
+    folder = directory.parent / "trained"
+    folder.mkdir()
+    head = "steps,process_s,wall_s,coverage,all_home,violations,energy_Wh,flight_steps"
+    (folder / "learning_curve.csv").write_text(f"{head}\n0,1,1,0.5,1,0,30,200\n")
+    return folder
+
+
+def test_figure_draws_trainings_and_comparisons_too(trained, capsys):
+    shutil.copytree(trained, "again")
+    assert main(["figure", "trained", "again", "--kind", "training"]) == 0
+    assert capsys.readouterr().out == "figure in trained/training.pdf\n"
+    players = ["--scenarios", "open_field", "--planners", "hover", "--seeds", "0:1"]
+    assert main(["compare", *players, "--jobs", "1", "--out", "compared"]) in (0, 1)
+    capsys.readouterr()
+    assert main(["figure", "compared", "--kind", "leaderboard", "--out", "board.svg"]) == 0
+    assert capsys.readouterr().out == "figure in board.svg\n"
+    assert Path("board.svg").read_bytes().startswith(b"<?xml")
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (["flown", "--kind", "training"], "flown: is the directory of a flight"),
+        (["flown", "--kind", "leaderboard"], "draw map, battery, modes, decision-time"),
+        (["trained", "--kind", "battery"], "trained: is the directory of a training"),
+        ([".", "--kind", "leaderboard"], "no directory of a comparison: it has no flights.parquet"),
+        (["flown", "trained", "--kind", "map"], "--kind map shows one directory; 2 were given"),
+        (["trained", "trained", "--kind", "training"], "a directory is given twice"),
+        (["trained", "gone", "--kind", "training"], "gone: there is no such directory"),
+    ],
+)
+def test_figure_says_what_a_directory_is(command, message, trained, capsys):
+    assert message in refused(capsys, "figure", *command)
 
 
 def test_figure_writes_where_it_is_told_but_not_over_another(directory, capsys):

@@ -1,22 +1,35 @@
-"""`uas-coverage figure`: a figure of a flight for print."""
+"""`uas-coverage figure`: a figure of a flight, of a comparison or of trainings, for print."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.flight import Flight
+from uas_coverage_env.leaderboard import FLIGHTS, leaderboard_figure, published, scores_of
 from uas_coverage_env.strict_toml import InputError
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _SUFFIXES = (".pdf", ".svg", ".png")
+_LEADERBOARD, _TRAINING = "leaderboard", "training"
+_FLIGHT_KINDS = "map, battery, modes, decision-time"
 
 
 def figure(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+    directories: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DIR...",
+            help="A flight directory; for `leaderboard` the --out of `compare`; for `training` "
+            "that of `train`, or several of them.",
+        ),
+    ],
     kind: Annotated[
-        Literal["map", "battery", "modes", "decision-time"],
+        Literal["map", "battery", "modes", "decision-time", "leaderboard", "training"],
         typer.Option(help="What is drawn; map and battery are the paper's Fig. 1 to 3."),
     ],
     step: Annotated[
@@ -33,19 +46,71 @@ def figure(
 
     DIR/KIND.pdf is drawn anew each time; a file that --out names is replaced only on request.
     """
-    path = out or directory / f"{kind}.pdf"
+    for directory in directories:
+        if not directory.is_dir():
+            raise InputError(f"{directory}: there is no such directory")
+    path = out or directories[0] / f"{kind}.pdf"
     check_file(path, _SUFFIXES, overwrite=overwrite or out is None)
     if step is not None and kind != "map":
         raise InputError(f"--step is for --kind map; a figure of kind {kind} shows all steps")
+    if len(directories) > 1 and kind != _TRAINING:
+        raise InputError(f"--kind {kind} shows one directory; {len(directories)} were given")
     try:
-        from uas_coverage_env.replay.figures import KINDS, map_figure, save_figure
+        from uas_coverage_env.replay.figures import (
+            CURVE,
+            KINDS,
+            learning_curve,
+            map_figure,
+            save_figure,
+            training_figure,
+        )
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
         raise InputError(
             'a figure needs matplotlib: pip install "uas-coverage-env[view]"'
         ) from error
-    flight = Flight.load(directory)
-    drawn = KINDS[kind](flight) if step is None else map_figure(flight, step=step)
+    for directory in directories:
+        _check_sort(directory, kind, CURVE)
+    drawn: Figure
+    if kind == _LEADERBOARD:
+        rows, reference = published(directories[0])
+        drawn = leaderboard_figure(scores_of(rows, reference), rows, reference)
+    elif kind == _TRAINING:
+        drawn = training_figure(
+            {name: learning_curve(path) for name, path in _named(directories).items()}
+        )
+    elif step is not None:
+        drawn = map_figure(Flight.load(directories[0]), step=step)
+    else:
+        drawn = KINDS[kind](Flight.load(directories[0]))
     save_figure(drawn, path)
     console().print(f"figure in {path}", markup=False)
+
+
+def _check_sort(directory: Path, kind: str, curve: str) -> None:
+    """Whether a directory is of the sort that the kind draws, as far as its files tell."""
+    sorts = {FLIGHTS: "a comparison", curve: "a training", "flight.csv": "a flight"}
+    kinds = {FLIGHTS: _LEADERBOARD, curve: _TRAINING, "flight.csv": _FLIGHT_KINDS}
+    wanted = {_LEADERBOARD: FLIGHTS, _TRAINING: curve}.get(kind, "flight.csv")
+    if (directory / wanted).is_file():
+        return
+    for file, sort in sorts.items():
+        if (directory / file).is_file():
+            raise InputError(
+                f"{directory}: is the directory of {sort}, of which there is no figure {kind}; "
+                f"draw {kinds[file]}"
+            )
+    raise InputError(f"{directory}: is no directory of {sorts[wanted]}: it has no {wanted}")
+
+
+def _named(directories: list[Path]) -> dict[str, Path]:
+    """What a training is called in the legend: its directory; nothing where it is alone."""
+    if len(directories) == 1:
+        return {"": directories[0]}
+    names = [directory.resolve().name for directory in directories]
+    if len(set(names)) < len(names):
+        names = [str(directory) for directory in directories]
+    if len(set(names)) < len(names):
+        raise InputError("a directory is given twice; give each once")
+    return dict(zip(names, directories, strict=True))

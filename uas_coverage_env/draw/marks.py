@@ -48,7 +48,7 @@ def moving_obstacle(
     box = (x - radius, y - radius, x + radius, y + radius)
     draw.ellipse(box, fill=colours.RED, outline=colours.INK, width=round(frame.unit))
     # chords: an arc takes Pillow three times as long
-    dashes = min(240, max(12, 4 * round(safe_radius / (4 * frame.unit))))
+    dashes = min(240, max(12, 3 * round(safe_radius / (4 * frame.unit))))
     for dash in range(dashes):
         ends = []
         for angle in (2 * math.pi * dash / dashes, 2 * math.pi * (dash + 0.5) / dashes):

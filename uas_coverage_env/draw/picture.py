@@ -1,6 +1,7 @@
 """The picture of a state, seen from above: north up, east to the right."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,9 +54,6 @@ def picture(
 class Picture:
     """Draws the states of one scenario; keeps the background between them.
 
-    A copy (`copy.copy`) shares the background, and is for states that take turns with those of the
-    original, such as another mission in the same scenario.
-
     Args:
         scenario: The scenario flown.
         size_px: Side of the square pictures.
@@ -90,8 +88,13 @@ class Picture:
                 (round(frame.gauge - 4 * unit), 0, frame.side, frame.side),
             )
         ]
-        # the map changes only when a waypoint is covered
-        self._map: tuple[bytes, Image] | None = None
+        # the waypoints whose marks may share pixels with that of each one
+        reach = np.array(self._radii) + 4 * frame.unit
+        places = np.array(self._waypoints)
+        apart = np.abs(places[:, None] - places).max(axis=2)
+        self._touching = [np.flatnonzero(row).tolist() for row in apart < reach[:, None] + reach]
+        # which were open when the map was drawn, and the map
+        self._map: tuple[NDArray[np.bool_], Image] | None = None
 
     def draw(
         self,
@@ -128,19 +131,39 @@ class Picture:
         self._captions(image, draw, swarm)
         return self._canvas.smoothed()
 
+    def twin(self) -> "Picture":
+        """Another one for the same scenario that shares background and canvas.
+
+        It is for states that take turns with those of this one, such as another mission's.
+        """
+        twin = copy(self)
+        twin._map = None
+        return twin
+
     def _map_with_waypoints(self, uncovered: NDArray[np.bool_]) -> "Image":
+        if self._map is None:
+            self._map = (uncovered.copy(), self._terrain.copy())
+            self._mark(self._map[1], range(len(uncovered)), uncovered)
+        before, image = self._map
+        # mostly none, seldom one: not worth drawing the other waypoints again
+        for j in np.flatnonzero(before != uncovered).tolist():
+            (x, y), reach = self._waypoints[j], self._radii[j] + 2 * self._frame.unit
+            box = (int(x - reach), int(y - reach), int(x + reach) + 1, int(y + reach) + 1)
+            patch = self._canvas.image
+            patch.paste(self._terrain.crop(box), box[:2])
+            self._mark(patch, self._touching[j], uncovered)
+            image.paste(patch.crop(box), box[:2])
+        before[:] = uncovered
+        return image
+
+    def _mark(self, image: "Image", waypoints: Iterable[int], uncovered: NDArray[np.bool_]) -> None:
         from PIL import ImageDraw
 
-        key = uncovered.tobytes()
-        if self._map is None or self._map[0] != key:
-            image = self._terrain.copy()
-            draw = ImageDraw.Draw(image)
-            for (x, y), radius, heavy, open_ in zip(
-                self._waypoints, self._radii, self._heavy, uncovered.tolist(), strict=True
-            ):
-                marks.waypoint(draw, self._frame, x, y, radius, heavy=heavy, open_=open_)
-            self._map = (key, image)
-        return self._map[1]
+        draw = ImageDraw.Draw(image)
+        for j in waypoints:
+            (x, y), radius, heavy = self._waypoints[j], self._radii[j], self._heavy[j]
+            open_ = bool(uncovered[j])
+            marks.waypoint(draw, self._frame, x, y, radius, heavy=heavy, open_=open_)
 
     def _paths(self, draw: "ImageDraw", paths_m: NDArray[np.float64]) -> None:
         pixels = self._frame.pixels(paths_m)
@@ -220,12 +243,12 @@ class Picture:
             return
         size, room = 10.5 * frame.letter, 496 / _NAMED_UAS * unit
         # as for the longest words, so that a name does not change while it flies
-        longest = " 100 %, landed" if frame.detailed else " 100 %"
+        longest = "  100 %, landed" if frame.detailed else "  100 %"
         room_for_name = room - 20 * unit - width_of(longest, size)
         for i, name in enumerate(swarm.names):
             x = 8 * unit + i * room
             draw.ellipse((x, y - 4 * unit, x + 8 * unit, y + 4 * unit), fill=_colour(i))
-            words = f"{fitted(name, size, room_for_name)} {100 * (1 - swarm.x[i, DOD]):.0f} %"
+            words = f"{fitted(name, size, room_for_name)}  {100 * (1 - swarm.x[i, DOD]):.0f} %"
             if frame.detailed:
                 status = swarm.status[i]
                 doing = f"{-swarm.x[i, Z]:.0f} m" if status == FLYING else STATUS_NAMES[status]

@@ -43,6 +43,7 @@ def write(
     _paste(image, place, words, size, colour, align, 0)
 
 
+@lru_cache(maxsize=1024)
 def width_of(words: str, size: float) -> float:
     """How wide a line is, in canvas pixels."""
     return _font(round(size)).getlength(words)
@@ -68,7 +69,7 @@ def _paste(
     edge: int,
 ) -> None:
     shapes = [_shape(word, round(size), edge) for word in words.split(" ")]
-    space = _font(round(size)).getlength(" ")
+    space = width_of(" ", size)
     x = place[0] - align * (sum(shape.advance for shape in shapes) + space * (len(shapes) - 1))
     for shape in shapes:
         corner = (round(x) + shape.left, round(place[1] + _MIDDLE * size) + shape.top)

@@ -90,7 +90,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
-        render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window; extra `human`).
+        render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra `human`:
+            space pauses, right steps, escape closes it and the missions go on unseen).
 
     Version History:
         v0: First version.

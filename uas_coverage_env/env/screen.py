@@ -56,7 +56,7 @@ class Screen:
     def twin(self) -> "Screen":
         """A screen for another mission in the same scenario; both share what they draw on."""
         twin = copy(self)
-        twin._picture = copy(self._painter())
+        twin._picture = self._painter().twin()
         twin._path_m = []
         return twin
 

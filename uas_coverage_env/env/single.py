@@ -63,7 +63,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
-        render_mode: None, "rgb_array" or "human".
+        render_mode: None, "rgb_array" or "human", see `CoverageParallelEnv`.
 
     Version History:
         v0: First version.

@@ -1,8 +1,9 @@
 """Who is better: planners and policies on the same scenarios, flown, kept, counted, published."""
 
 from uas_coverage_env.leaderboard.machine import machine
+from uas_coverage_env.leaderboard.picture import leaderboard_figure
 from uas_coverage_env.leaderboard.players import Player, players_of
-from uas_coverage_env.leaderboard.publish import Comparison, failures, write
+from uas_coverage_env.leaderboard.publish import FLIGHTS, Comparison, failures, published, write
 from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES, Row
 from uas_coverage_env.leaderboard.scenario_sets import (
     SETS,
@@ -23,6 +24,7 @@ from uas_coverage_env.leaderboard.workers import (
 
 __all__ = [
     "FAILED",
+    "FLIGHTS",
     "FLOWN",
     "SETS",
     "STORE",
@@ -42,9 +44,11 @@ __all__ = [
     "fly",
     "fly_all",
     "jobs_of",
+    "leaderboard_figure",
     "machine",
     "opened",
     "players_of",
+    "published",
     "scenarios_of",
     "scores_of",
     "seed_range",

@@ -1,72 +1,96 @@
-"""The picture of a comparison: coverage against energy, a mark per player, a dot per flight."""
+"""The picture of a comparison: coverage and energy, a row per player, a dot per flight."""
 
 from collections.abc import Sequence
-from io import BytesIO
+from typing import TYPE_CHECKING
 
+from uas_coverage_env.draw import colours
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.leaderboard.scores import Scores
 from uas_coverage_env.leaderboard.statistics import Estimate
 
-_SIZE_IN = (8.0, 5.0)
-_DPI = 150
-_MARKS = "osD^vP*X<>"
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# The mean stands above its flights; these in some lines, so that equal ones are seen to be many.
+_MEAN, _FIRST_LINE, _LINES, _SPREAD = -0.16, 0.08, 5, 0.28
+_LONGEST_NAME = 26
+
+
+def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference: str) -> "Figure":
+    """Coverage on the left, energy on the right, players in the order of their scores.
+
+    Energy is in percent of the reference's mean on the same scenario, so that small and large
+    scenarios can stand in one picture; flights with a violation have none.
+
+    Args:
+        scores: Of each player, best first.
+        rows: The flights.
+        reference: Label of the player with whom the others are compared.
+
+    Raises:
+        ImportError: matplotlib (extra `view`) is not installed.
+    """
+    from matplotlib.figure import Figure
+
+    from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade
+
+    with printed():
+        size = (WIDTH_IN, 1.1 + 0.32 * len(scores))
+        figure = Figure(figsize=size, layout="constrained")
+        coverage, energy = figure.subplots(1, 2, sharey=True)
+        for place, one in enumerate(scores):
+            covered = [100.0 * row.coverage for row in rows if row.player == one.player]
+            _draw(coverage, place, covered, one.mean_coverage_percent)
+            relative = _relative_energies(rows, one.player, reference)
+            _draw(energy, place, relative, one.relative_energy_percent)
+        energy.axvline(100.0, color=shade(colours.FAINT), linewidth=0.8, linestyle=":", zorder=1)
+        coverage.set_yticks(range(len(scores)), [_short(one.player) for one in scores])
+        coverage.set_ylim(len(scores) - 0.5, -0.5)
+        coverage.set_xlabel("Waypoints covered, %")
+        energy.set_xlabel(f"Energy, % of {_short(reference)}")
+        for axes in (coverage, energy):
+            axes.grid(axis="y", visible=False)
+        note = "Dots: flights. Diamonds: mean coverage, interquartile mean energy, 95 % intervals."
+        figure.suptitle(note, fontsize=8)
+    return figure
 
 
 def picture(scores: Sequence[Scores], rows: Sequence[Row], reference: str) -> bytes | None:
-    """A PNG; None where matplotlib (extra `view`) is not installed.
-
-    Energy is in percent of the reference's mean on the same scenario, so that small and large
-    scenarios can stand in one picture; flights with a violation are not in it.
-    """
+    """`leaderboard_figure` as a PNG; None where matplotlib (extra `view`) is not installed."""
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
+        from uas_coverage_env.replay.figures import png_of
     except ImportError:
         return None
-    figure = Figure(figsize=_SIZE_IN, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    for n, one in enumerate(scores):
-        energy, coverage = one.relative_energy_percent, one.mean_coverage_percent
-        if energy.value is None or coverage.value is None:
-            continue
-        colour, mark = f"C{n % 10}", _MARKS[n % len(_MARKS)]
-        axes.plot(*_dots(rows, one.player, reference), ".", color=colour, alpha=0.35, markersize=4)
-        axes.errorbar(
-            *(energy.value, coverage.value),
-            xerr=_whiskers(energy),
-            yerr=_whiskers(coverage),
-            **{"fmt": mark, "color": colour, "markersize": 8, "capsize": 3, "label": one.player},
-        )
-    axes.set_xlabel(f"energy of flights without violation, % of {reference} on the same scenario")
-    axes.set_ylabel("waypoints covered, %")
-    axes.set_title("Players: interquartile mean energy, mean coverage, 95 % intervals", fontsize=10)
-    axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="best", fontsize=9)
-    png = BytesIO()
-    figure.savefig(png, format="png", dpi=_DPI)
-    return png.getvalue()
+    return png_of(leaderboard_figure(scores, rows, reference))
 
 
-def _dots(rows: Sequence[Row], player: str, reference: str) -> tuple[list[float], list[float]]:
-    """Energy and coverage of each flight of a player that counts, in percent."""
+def _draw(axes: "Axes", place: int, values: Sequence[float], found: Estimate) -> None:
+    """One player in one panel."""
+    from uas_coverage_env.replay.figures.style import shade
+
+    heights = [place + _FIRST_LINE + _SPREAD * (k % _LINES) / _LINES for k in range(len(values))]
+    axes.plot(values, heights, ".", color=shade(colours.SKY), markersize=3)
+    if found.value is None:
+        return
+    height, blue = place + _MEAN, shade(colours.BLUE)
+    if found.low is not None and found.high is not None:
+        ends = [found.low, found.high]
+        axes.plot(ends, [height, height], "|-", color=blue, linewidth=1.6, markersize=6)
+    axes.plot(found.value, height, "D", color=blue, markeredgecolor="white", mew=0.6, markersize=5)
+
+
+def _short(name: str) -> str:
+    """A label may be the path of a policy: its end tells it from others."""
+    return name if len(name) <= _LONGEST_NAME else f"...{name[3 - _LONGEST_NAME :]}"
+
+
+def _relative_energies(rows: Sequence[Row], player: str, reference: str) -> list[float]:
+    """Energy of each flight of a player that counts, in percent."""
     base: dict[str, list[float]] = {}
     for row in rows:
         if row.player == reference and row.ranked and row.energy_Wh:
             base.setdefault(row.scenario, []).append(row.energy_Wh)
-    mine = [row for row in rows if row.player == player and row.ranked and row.scenario in base]
-    return (
-        [
-            100.0 * (row.energy_Wh or 0.0) / (sum(base[row.scenario]) / len(base[row.scenario]))
-            for row in mine
-        ],
-        [100.0 * row.coverage for row in mine],
-    )
-
-
-def _whiskers(found: Estimate) -> list[list[float]] | None:
-    if found.value is None or found.low is None or found.high is None:
-        return None
-    # a mean of equal numbers may lie a rounding outside of its interval
-    return [[max(0.0, found.value - found.low)], [max(0.0, found.high - found.value)]]
+    mean = {scenario: sum(energies) / len(energies) for scenario, energies in base.items()}
+    mine = [row for row in rows if row.player == player and row.ranked and row.scenario in mean]
+    return [100.0 * (row.energy_Wh or 0.0) / mean[row.scenario] for row in mine]

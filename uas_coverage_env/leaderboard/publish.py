@@ -24,7 +24,8 @@ from uas_coverage_env.leaderboard.table import (
 )
 from uas_coverage_env.strict_toml import InputError
 
-FLIGHTS, TABLE, PICTURE = "flights.parquet", "table.md", "coverage-energy.png"
+FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
+PICTURE = "coverage-energy.png"
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def write(comparison: Comparison, directory: Path) -> list[str]:
     files = {
         FLIGHTS: _parquet(comparison.rows),
         "table.csv": _csv(comparison.scores).encode(),
-        "table.json": _json(comparison).encode(),
+        SCORES: _json(comparison).encode(),
         TABLE: _markdown(comparison).encode(),
         PICTURE: picture(comparison.scores, comparison.rows, comparison.reference),
     }
@@ -101,7 +102,34 @@ def write(comparison: Comparison, directory: Path) -> list[str]:
     return list(there)
 
 
-def _parquet(rows: Sequence[Row]) -> bytes:
+def published(directory: Path) -> tuple[list[Row], str]:
+    """The flights of a comparison and the label of its reference, from the files that it wrote.
+
+    Raises:
+        InputError: A file is missing, or is none that this version writes.
+    """
+    import polars
+
+    flights, table = directory / FLIGHTS, directory / SCORES
+    try:
+        frame = polars.read_parquet(flights.read_bytes())
+    except (OSError, polars.exceptions.PolarsError) as error:
+        raise InputError(f"{flights}: cannot be read ({error})") from error
+    if dict(frame.schema) != _schema():
+        raise InputError(f"{flights}: has other columns than this version writes; compare again")
+    try:
+        reference = json.loads(table.read_bytes())["reference"]
+    except (OSError, ValueError, RecursionError, KeyError, TypeError) as error:
+        raise InputError(f"{table}: cannot be read, or names no reference ({error})") from error
+    rows = [Row(**row) for row in frame.iter_rows(named=True)]
+    if not rows:
+        raise InputError(f"{flights}: holds no flight")
+    if reference not in {row.player for row in rows}:
+        raise InputError(f"{table}: the reference {reference!r} has no flight in {flights.name}")
+    return rows, reference
+
+
+def _schema() -> dict[str, Any]:
     import polars  # 50 MB of code that only this needs
 
     kinds = {"str": polars.String, "int": polars.Int64, "bool": polars.Boolean}
@@ -109,9 +137,15 @@ def _parquet(rows: Sequence[Row]) -> bytes:
     for field in dataclasses.fields(Row):
         kind = str(getattr(field.type, "__name__", field.type)).partition(" | ")[0]
         schema[field.name] = kinds.get(kind, polars.Float64)
-    frame = polars.DataFrame([dataclasses.astuple(row) for row in rows], schema, orient="row")
+    return schema
+
+
+def _parquet(rows: Sequence[Row]) -> bytes:
+    import polars
+
+    values = [dataclasses.astuple(row) for row in rows]
     file = io.BytesIO()
-    frame.write_parquet(file)
+    polars.DataFrame(values, _schema(), orient="row").write_parquet(file)
     return file.getvalue()
 
 

@@ -2,15 +2,16 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.checkpoint import CurvePoint
+from uas_coverage_env.replay.figures import CURVE, png_of, training_figure
 
-TABLE = "learning_curve.csv"
+TABLE = CURVE
 PICTURE = "learning_curve.png"
 
 
@@ -21,27 +22,15 @@ def write(points: Sequence[CurvePoint], directory: Path) -> None:
     table.writeheader()
     table.writerows(point.model_dump() for point in points)
     write_atomically(directory / TABLE, text.getvalue().encode())
-    picture = io.BytesIO()
-    draw({"": points}).savefig(picture, format="png", dpi=120)
-    write_atomically(directory / PICTURE, picture.getvalue())
+    write_atomically(directory / PICTURE, png_of(draw({"": points})))
 
 
-def draw(runs: dict[str, Sequence[CurvePoint]]) -> Figure:
-    """Coverage, energy and duration over the steps learned from, a line per run."""
-    figure = Figure(figsize=(9.0, 2.8), layout="constrained")
-    measures = (
-        ("coverage", "covered"),
-        ("energy_Wh", "energy, Wh"),
-        ("flight_steps", "steps until all are home"),
+def draw(runs: Mapping[str, Sequence[CurvePoint]]) -> Figure:
+    """The figure of `uas-coverage figure --kind training`, a line per run."""
+    columns = CurvePoint.model_fields
+    return training_figure(
+        {
+            name: {column: [getattr(point, column) for point in points] for column in columns}
+            for name, points in runs.items()
+        }
     )
-    axes = figure.subplots(1, len(measures))
-    for axis, (name, label) in zip(axes, measures, strict=True):
-        for run, points in runs.items():
-            steps = [point.steps / 1e6 for point in points]
-            axis.plot(steps, [getattr(point, name) for point in points], ".-", label=run or None)
-        axis.set_xlabel("million steps")
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
-    if any(runs):
-        axes[0].legend()
-    return figure

@@ -1,9 +1,10 @@
-"""Figures of a flight for print, drawn with matplotlib (extra `view`).
+"""Figures for print, drawn with matplotlib (extra `view`): of a flight, and of trainings.
 
-A new figure is one file with a function `flight -> Figure`, and one line in `KINDS`.
+A new figure of a flight is one file with a function `flight -> Figure`, and one line in `KINDS`.
 """
 
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -14,6 +15,7 @@ from uas_coverage_env.replay.figures.decision_time import decision_time_figure
 from uas_coverage_env.replay.figures.map import map_figure
 from uas_coverage_env.replay.figures.modes import modes_figure
 from uas_coverage_env.replay.figures.style import printed
+from uas_coverage_env.replay.figures.training import CURVE, learning_curve, training_figure
 from uas_coverage_env.strict_toml import InputError
 
 KINDS: dict[str, Callable[[Flight], Figure]] = {
@@ -24,12 +26,16 @@ KINDS: dict[str, Callable[[Flight], Figure]] = {
 }
 
 __all__ = [
+    "CURVE",
     "KINDS",
     "battery_figure",
     "decision_time_figure",
+    "learning_curve",
     "map_figure",
     "modes_figure",
+    "png_of",
     "save_figure",
+    "training_figure",
 ]
 
 
@@ -46,3 +52,11 @@ def save_figure(figure: Figure, path: Path) -> Path:
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     return path
+
+
+def png_of(figure: Figure) -> bytes:
+    """A figure as the content of a PNG."""
+    content = BytesIO()
+    with printed():
+        figure.savefig(content, format="png")
+    return content.getvalue()

@@ -14,7 +14,8 @@ from uas_coverage_env.replay.figures.style import line_style, printed, rows, uas
 _PUBLISHED_SCENARIO = "village"
 """The paper's mission; beside another one its curves would say nothing."""
 
-_GREY = "#9a9a9a"
+# broad and pale: seen on either side of ours where the two agree
+_GREY, _BREADTH = "#bcbcbc", 1.9
 _PANELS = (("State of charge, %", 100.0), ("Voltage, V", 1.0), ("Current, A", 1.0))
 
 
@@ -79,7 +80,7 @@ def _draw_published(axes: list[Axes]) -> None:
                 scale * series[airborne],
                 color=_GREY,
                 linestyle=line_style(i),
-                linewidth=0.8,
+                linewidth=_BREADTH,
             )
 
 
@@ -89,8 +90,9 @@ def _legend(flight: Flight, published: bool) -> list[Line2D]:
         for i, name in enumerate(flight.names)
     ]
     limit = Line2D([], [], color="#c81e2d", linestyle=":", linewidth=0.8, label="lowest allowed")
+    style = {"color": _GREY, "linewidth": _BREADTH}
     theirs = [
-        Line2D([], [], color=_GREY, linestyle=line_style(i), label=f"UAS {i + 1}, Gasche et al.")
+        Line2D([], [], **style, linestyle=line_style(i), label=f"UAS {i + 1}, Gasche et al.")
         for i in range(2)
     ]
     return [*ours, *(theirs if published else []), limit]

@@ -1,0 +1,60 @@
+"""The commands in the blocks of the pages are run one after the other, in a folder of their own.
+
+As they stand, but where a mission, a sweep or a training would take minutes: these are cut short.
+"""
+
+from itertools import pairwise
+
+import pytest
+from markdown_blocks import PAGES, ROOT, blocks, command_lines
+from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
+
+from uas_coverage_env import generate_scenario
+from uas_coverage_env.cli import main
+
+QUICK = {"nearest-waypoint", "lawnmower", "learned-velocity"}
+SHORTER = {
+    "run": ["--steps", "1"],
+    "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
+}
+COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}
+DONE, FAILED = 0, 1
+
+
+def shortened(words):
+    """The command, cut short where it would take minutes."""
+    if words[0] == "run" and any(word in QUICK for word in words):
+        return words
+    if words[0] == "compare":
+        return [COMPARED.get(option, word) for option, word in pairwise(["", *words])]
+    return [*words, *SHORTER.get(words[0], [])]
+
+
+def commands_of(page):
+    """The words of our commands in the blocks of a page, without the program's name."""
+    return [words[1:] for words in command_lines(page, inline=False) if words[0] == "uas-coverage"]
+
+
+PAGES_WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES_WITH_COMMANDS, ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    # what is watched is watched in the terminal
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    for display in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER"):
+        monkeypatch.delenv(display, raising=False)  # no window opens
+    # nobody is timed here, so nothing has to be compiled before the first decision
+    monkeypatch.setattr(MovingHorizon, "warm_up", lambda planner, scenario: None)
+    # what the reader brings along: a scenario of one's own, and those the page says to save
+    generate_scenario(seed=1, n_uas=1, n_waypoints=4, n_obstacles=2).to_file("my_area.toml")
+    for block in blocks(page):
+        if block.language == "toml" and block.text.startswith("schema"):
+            (tmp_path / "garden.toml").write_text(block.text, encoding="utf-8")
+    for words in commands_of(page):
+        words = shortened(words)
+        # a player may fail its mission, and the text may say so; the command has done its work
+        assert main(words) in (DONE, FAILED), f"{words}: {capsys.readouterr().err}"

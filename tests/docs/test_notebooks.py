@@ -1,0 +1,78 @@
+"""The lessons in notebooks/: they run from top to bottom, and are kept without what they print."""
+
+import re
+
+import nbformat
+import pytest
+from markdown_blocks import ROOT
+from nbclient import NotebookClient
+
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+SECONDS_FOR_A_CELL = 600  # the longest takes half a minute; a busy machine several times that
+MACHINE_PATH = re.compile(r"/(?:home|Users|private|var)/|\b[A-Z]:\\")
+PRIVATE_NAME = re.compile(r"(?:[.,(]|\bimport)\s*_(?!_)\w+")
+
+
+def name_of(path):
+    return path.stem
+
+
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def test_there_are_four_lessons_and_pages_lead_to_them():
+    assert [path.name[0] for path in NOTEBOOKS] == ["1", "2", "3", "4"]
+    for page in (ROOT / "docs" / "notebooks.md", ROOT / "notebooks" / "README.md"):
+        text = page.read_text(encoding="utf-8")
+        assert all(f"{path.name})" in text for path in NOTEBOOKS), page
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)
+def test_a_notebook_is_committed_without_what_it_printed(path):
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    for cell in code_cells(notebook):
+        assert cell.outputs == []
+        assert cell.execution_count is None
+    for cell in notebook.cells:
+        assert cell.metadata == {}
+        assert not MACHINE_PATH.search(cell.source)
+    # who opens it elsewhere has another kernel, and other versions
+    assert notebook.metadata.kernelspec.name == "python3"
+    assert notebook.metadata.language_info == {"name": "python"}
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)
+def test_a_notebook_uses_public_names_only(path):
+    for cell in code_cells(nbformat.read(path, as_version=4)):
+        assert not PRIVATE_NAME.search(cell.source)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)
+def test_the_links_of_a_notebook_lead_somewhere(path):
+    for cell in nbformat.read(path, as_version=4).cells:
+        if cell.cell_type == "markdown":
+            for target in re.findall(r"\]\(([^)#\s]+)", cell.source):
+                assert (path.parent / target).exists(), target
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)
+def test_a_notebook_runs_from_top_to_bottom_without_a_warning(path, tmp_path, monkeypatch):
+    # nothing of the person's own settings, and nothing left behind
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path / "runtime"))
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(
+        notebook,
+        timeout=SECONDS_FOR_A_CELL,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(folder)}},
+    ).execute()
+    outputs = [output for cell in code_cells(notebook) for output in cell.outputs]
+    warned = [output.text for output in outputs if output.get("name") == "stderr"]
+    assert warned == []
+    assert sum("image/png" in output.get("data", {}) for output in outputs) >= 3

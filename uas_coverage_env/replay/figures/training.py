@@ -1,0 +1,97 @@
+"""How policies got better while they were trained, from the tables that trainings leave."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from uas_coverage_env.replay.figures.style import WIDTH_IN, line_style, printed, uas_colour
+from uas_coverage_env.strict_toml import InputError
+
+CURVE = "learning_curve.csv"
+
+Curve = Mapping[str, Sequence[float] | NDArray[np.float64]]
+"""Column of `learning_curve.csv` -> its values, a row for each time that the policy was tried."""
+
+_STEPS = "steps"
+_PANELS = (
+    ("coverage", 100.0, "Covered, %"),
+    ("violations", 1.0, "Violations per mission"),
+    ("energy_Wh", 1.0, "Energy, Wh"),
+    ("flight_steps", 1.0, "Steps until all are home"),
+)
+
+
+def training_figure(runs: Mapping[str, Curve]) -> Figure:
+    """Coverage, violations, energy and duration over the steps learned from, a line per training.
+
+    Args:
+        runs: What a training is called in the legend, "" for nothing -> its curve.
+    """
+    with printed():
+        figure = Figure(figsize=(WIDTH_IN, 4.2), layout="constrained")
+        grid = figure.subplots(2, 2, sharex=True)
+        for axis, (column, scale, label) in zip(grid.flat, _PANELS, strict=True):
+            for i, (name, curve) in enumerate(runs.items()):
+                axis.plot(
+                    np.asarray(curve[_STEPS], float) / 1e6,
+                    scale * np.asarray(curve[column], float),
+                    color=uas_colour(i),
+                    linestyle=line_style(i),
+                    marker=".",
+                    markersize=4,
+                    label=name or None,
+                )
+            axis.set_ylabel(label)
+            axis.margins(x=0.02)
+        grid[0, 0].set_ylim(-3, 103)
+        # where nothing is ever touched, the line lies at the foot of the panel, not in its middle
+        highest = max(1.0, grid[0, 1].get_ylim()[1])
+        grid[0, 1].set_ylim(-0.03 * highest, highest)
+        for axis in grid[1]:
+            axis.set_ylim(bottom=0)
+            axis.set_xlabel("Steps learned from, million")
+        figure.align_ylabels()
+        if any(runs):
+            handles, labels = grid[0, 0].get_legend_handles_labels()
+            columns = min(4, len(labels))
+            figure.legend(handles, labels, loc="outside upper center", ncols=columns)
+    return figure
+
+
+def learning_curve(directory: Path) -> dict[str, NDArray[np.float64]]:
+    """The curve that `uas-coverage train` has left in a directory.
+
+    Raises:
+        InputError: There is none, or it cannot be read.
+    """
+    path = directory / CURVE
+    wanted = [_STEPS, *(column for column, _, _ in _PANELS)]
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file, strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from error
+    if not rows:
+        raise InputError(f"{path}: holds no row; the training has not come so far yet")
+    lacking = [column for column in wanted if column not in rows[0]]
+    if lacking:
+        raise InputError(f"{path}: has no column {lacking[0]}")
+    curve = {column: np.empty(len(rows)) for column in wanted}
+    for k, row in enumerate(rows):
+        for column in wanted:
+            curve[column][k] = _number(row[column], f"{path}, line {k + 2}, {column}")
+    return curve
+
+
+def _number(text: str | None, place: str) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(f"{place}: {text!r} should be a finite number")
+    return value
