@@ -1,1 +1,1 @@
-"""Learners: trained policies that fly the same scenarios as the planners (none shipped yet)."""
+"""Learners: trained policies that fly the same scenarios as the planners."""

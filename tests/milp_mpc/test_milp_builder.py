@@ -26,6 +26,8 @@ def test_columns_keep_the_shape_of_the_mathematics():
     assert built.integer.tolist() == [False] * 6 + [True] * 2
     assert milp.column_names()[4] == "first(1,1)"
     assert milp.columns("second") is second
+    with pytest.raises(ValueError, match="'third' are not there"):
+        milp.columns("third")
 
 
 def test_a_column_that_is_not_made_is_zero_wherever_it_is_used():

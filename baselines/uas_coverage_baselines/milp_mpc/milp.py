@@ -148,7 +148,15 @@ class Milp:
         self._whole.append(columns[columns >= 0])
 
     def columns(self, name: str) -> Columns:
-        """Index array of a group added before; blocks find each other's columns by name."""
+        """Index array of a group added before; blocks find each other's columns by name.
+
+        Raises:
+            ValueError: Nobody has added it: the block that does is missing or comes later.
+        """
+        if name not in self._columns:
+            raise ValueError(
+                f"columns {name!r} are not there (yet); the block that adds them goes first"
+            )
         return self._columns[name]
 
     def subject_to(

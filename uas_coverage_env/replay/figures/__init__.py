@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.replay.figures.battery import battery_figure
+from uas_coverage_env.replay.figures.battery import battery_figure, published_battery
 from uas_coverage_env.replay.figures.decision_time import decision_time_figure
 from uas_coverage_env.replay.figures.map import map_figure
 from uas_coverage_env.replay.figures.modes import modes_figure
@@ -34,6 +34,7 @@ __all__ = [
     "map_figure",
     "modes_figure",
     "png_of",
+    "published_battery",
     "save_figure",
     "training_figure",
 ]
