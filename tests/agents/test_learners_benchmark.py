@@ -13,6 +13,7 @@ from uas_coverage_env import generate_scenario
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
+import fleets
 import learners
 
 
@@ -58,6 +59,7 @@ def test_a_report_tells_what_was_flown_with_and_without_the_filter(readme, tmp_p
     study = learners.Study("ppo", "learned-velocity")
     text = learners.report(study, [directory], towns, reference)
     assert "`nearest-waypoint` | " in text
+    assert "| before training | " in text
     assert "| seed 0 = `learned-velocity` |" in text
     assert "| seed 0, filter off |" in text
     assert (tmp_path / "pictures" / "learning-ppo.png").exists()
@@ -65,13 +67,26 @@ def test_a_report_tells_what_was_flown_with_and_without_the_filter(readme, tmp_p
 
 def test_means_stand_with_their_intervals_and_differences_in_percent(tmp_path):
     write(tmp_path / "policy")
-    reference = np.tile([1.0, 1.0, 0.0, 20.0, 100.0], (4, 1))
+    reference = np.tile([1.0, 1.0, 0.0, 20.0, 100.0, 0.125], (4, 1))
     result = reference.copy()
     result[:, MEASURES.index("energy_Wh")] = [18.0, 22.0, 16.0, 16.0]
     row = learners.table_row("seed 0", load_policy(tmp_path / "policy"), result, reference)
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert len(cells) == learners.table_head().splitlines()[1].count("|") - 1
     assert cells[2] == "100.00"
-    assert cells[5].startswith("18.00 [16.")
-    assert cells[7].startswith("-10.0 [-2")
-    assert cells[8] == "0.0"
+    assert cells[5] == "12.5"
+    assert cells[6].startswith("18.00 [16.")
+    assert cells[8].startswith("-10.0 [-2")
+    assert cells[9] == "0.0"
+
+
+def test_fleets_of_any_size_have_their_row_and_their_place_in_the_readme():
+    text = learners.README.read_text(encoding="utf-8")
+    assert text.count(f"<!-- {fleets.NAME} -->") == 1
+    assert [len(town.uas) for town in fleets.towns_of(8, 2)] == [8, 8]
+    reference = np.tile([1.0, 1.0, 0.0, 20.0, 100.0, 0.0], (4, 1))
+    row = fleets.row(8, "learned-waypoint", reference * 0.5, reference)
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert len(cells) == len(fleets.HEAD)
+    assert cells[:3] == ["8", "`learned-waypoint`", "50.00"]
+    assert cells[-2:] == ["-50.0", "-50.0"]

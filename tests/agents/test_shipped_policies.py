@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
-from uas_coverage_agents.training.scenarios import VALIDATION, town
+from uas_coverage_agents.training.scenarios import VALIDATION, town, validation_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly
 from uas_coverage_agents.velocity.planner import SHIPPED, LearnedVelocity
 
@@ -35,8 +35,23 @@ def test_learned_velocity_repeats_the_first_flights_of_its_score():
     assert not violations.any()
 
 
+def test_learned_velocity_accomplishes_the_village():
+    flight = rollout("village", "learned-velocity")
+    assert accomplished(flight)
+    assert flight.breaches == 0
+
+
+def test_learned_velocity_is_small_and_says_how_it_was_made():
+    described = load_policy(SHIPPED).description
+    assert described.scenarios.towns.first_seed >= 1_000_000
+    assert described.score.measures["coverage"].mean >= 0.95
+    assert described.score.measures["all_home"].mean == 1.0
+    assert described.score.measures["violations"].mean == 0.0
+    assert sum(file.stat().st_size for file in SHIPPED.iterdir()) < 100_000
+
+
 def test_learned_velocity_flies_more_uas_than_it_was_trained_with():
-    scenario = town(VALIDATION.model_copy(update={"n_uas": (6, 6)}), 1)
+    scenario = town(VALIDATION.model_copy(update={"n_uas": (8, 8)}), 1)
     flight = rollout(scenario, "learned-velocity")
     assert flight.planner == "learned-velocity"
     assert accomplished(flight)
@@ -59,7 +74,7 @@ def test_learned_velocity_scores_inside_its_published_intervals():
     policy = load_policy(SHIPPED)
     score = policy.description.score
     assert score is not None
-    towns = [town(VALIDATION, number) for number in range(score.missions)]
+    towns = validation_scenarios(policy.description.scenarios, score.missions)
     means = dict(zip(MEASURES, np.mean(fly(policy, towns), axis=0), strict=True))
     for name, measure in score.measures.items():
         # a mean of hundreds of floats may differ in its last digits

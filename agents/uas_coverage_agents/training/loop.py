@@ -176,7 +176,7 @@ class _Watch(BaseCallback):
                 steps=self.model.num_timesteps,
                 process_s=self._trainee.process_s,
                 wall_s=self._trainee.wall_s,
-                **means,
+                **{name: mean for name, mean in means.items() if name in CurvePoint.model_fields},
             )
         )
         for name, mean in means.items():

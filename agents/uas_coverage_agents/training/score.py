@@ -8,12 +8,20 @@ from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Interval, Policy, Score
 from uas_coverage_agents.policy.planner import PILOTS
-from uas_coverage_env.flight import Assistants, Flight, coverage, energy_Wh, home, rollout
+from uas_coverage_env.flight import (
+    Assistants,
+    Flight,
+    coverage,
+    energy_Wh,
+    filtered_share,
+    home,
+    rollout,
+)
 from uas_coverage_env.scenario import Scenario
 
-MEASURES = ("coverage", "all_home", "violations", "energy_Wh", "flight_steps")
-"""Share covered, whether all are home, violations, energy of the swarm, steps until all are home;
-means over missions."""
+MEASURES = ("coverage", "all_home", "violations", "energy_Wh", "flight_steps", "filtered_share")
+"""Share covered, whether all are home, violations, energy of the swarm, steps until all are home,
+share of the commands that the safety filter replaced; means over missions."""
 
 _RESAMPLES = 2000
 
@@ -48,6 +56,7 @@ def measured(flight: Flight) -> tuple[float, ...]:
         float(len(flight.violations)),
         float(energy_Wh(flight).sum()),
         float(flight.steps),
+        filtered_share(flight),
     )
 
 

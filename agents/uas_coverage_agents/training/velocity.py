@@ -16,9 +16,11 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from uas_coverage_agents.policy import Mlp, Network, Observation
 from uas_coverage_agents.training.config import SacSettings, TrainingConfig
+from uas_coverage_agents.training.gaze import GazePolicy
+from uas_coverage_agents.training.moving_obstacles import some_with_moving_obstacles
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
-from uas_coverage_agents.velocity.pilot import OUTPUTS, observation
+from uas_coverage_agents.velocity.pilot import OUTPUTS, gaze, observation
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
 from uas_coverage_env.env.layout import NEARBY_M
@@ -108,6 +110,25 @@ class DecidingRollouts(RolloutBuffer):
             yield self._get_samples(samples[start : start + size])
 
 
+class SettlingPPO(PPO):
+    """PPO that explores less and less: the deviation of the actions falls as the learning rate.
+
+    What flies in the end is the mean action. Where the deviation stays large, as it does when it is
+    learned, noise is what gets a UAS out of a circle round a waypoint, and nothing is learned about
+    it: such policies flew circles until the battery was empty.
+    """
+
+    first_deviation: float
+
+    def train(self) -> None:
+        """Learn from a rollout."""
+        super().train()
+        policy: Any = self.policy
+        share = policy.optimizer.param_groups[0]["lr"] / self.learning_rate
+        with torch.no_grad():
+            policy.log_std.fill_(float(np.log(self.first_deviation * share)))
+
+
 class VelocityLearner:
     """See `Learner`."""
 
@@ -116,7 +137,9 @@ class VelocityLearner:
         player = _player(config)
         lanes = CoverageVecEnv(
             config.lanes,
-            training_scenarios(config.scenarios, seed),
+            some_with_moving_obstacles(
+                training_scenarios(config.scenarios, seed), player.moving_share, seed
+            ),
             return_mode=player.return_mode,
             safety_filter=player.safety_filter,
             reward_weights=player.rewards,
@@ -143,11 +166,14 @@ class VelocityLearner:
                 device="cpu",
                 seed=seed,
             )
+        kind: Any = "MlpPolicy"
+        if player.network == "gaze":
+            kind, network = GazePolicy, {"gaze": gaze(player.hidden[0], player.keys)}
         with warnings.catch_warnings():
             # of a rest that is no whole batch: `DecidingRollouts` leaves it out
             warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
-            return PPO(
-                "MlpPolicy",
+            model = SettlingPPO(
+                kind,
                 lanes,
                 **learning.keywords,
                 rollout_buffer_class=DecidingRollouts,
@@ -155,9 +181,15 @@ class VelocityLearner:
                 device="cpu",
                 seed=seed,
             )
+        model.first_deviation = player.first_deviation
+        policy: Any = model.policy
+        policy.log_std.requires_grad_(False)
+        return model
 
     def export(self, model: BaseAlgorithm) -> tuple[Network, dict[str, NDArray[np.float32]]]:
         """The network that gives the mean action, and its weights."""
+        if isinstance(model.policy, GazePolicy):
+            return model.policy.gaze, model.policy.tensors()
         parts = _actor(model)
         modules = [part for part in parts if isinstance(part, torch.nn.Linear)]
         tensors = {}

@@ -10,11 +10,11 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from uas_coverage_agents.policy import Network, Observation
 from uas_coverage_agents.training.config import PpoSettings, TrainingConfig
+from uas_coverage_agents.training.moving_obstacles import some_with_moving_obstacles
 from uas_coverage_agents.training.pointer import PointerPolicy
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.waypoint_env import WaypointVecEnv
 from uas_coverage_agents.waypoint.pilot import network, observation
-from uas_coverage_agents.waypoint.scenarios import with_moving_obstacles
 from uas_coverage_agents.waypoint.settings import WaypointSettings
 
 
@@ -24,13 +24,9 @@ class WaypointLearner:
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
         """Teams on the scenarios of the configuration, some of them with moving obstacles."""
         player = _player(config)
-        scenarios = training_scenarios(config.scenarios, seed)
-        lots = np.random.default_rng([seed, len(scenarios)])
-        moving = lots.random(len(scenarios)) < player.moving_share
-        scenarios = [
-            with_moving_obstacles(scenario, seed * len(scenarios) + number) if moves else scenario
-            for number, (scenario, moves) in enumerate(zip(scenarios, moving, strict=True))
-        ]
+        scenarios = some_with_moving_obstacles(
+            training_scenarios(config.scenarios, seed), player.moving_share, seed
+        )
         return WaypointVecEnv(scenarios, player, config.lanes, seed)
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:

@@ -6,7 +6,9 @@ import numpy as np
 
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
-from uas_coverage_env.env import Observer
+from uas_coverage_agents.policy.gaze import Gaze
+from uas_coverage_agents.velocity.patience import Patience
+from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.layout import OBSERVATION_LAYOUT, SCALES
 from uas_coverage_env.scenario import Scenario
@@ -19,6 +21,20 @@ OUTPUTS = 3
 def observation() -> Observation:
     """What the policy reads: the observation of the environment, as it is."""
     return Observation.of(LAYOUT, OBSERVATION_LAYOUT, SCALES)
+
+
+def gaze(hidden: int, keys: int) -> Gaze:
+    """The gaze network that reads `observation()`."""
+    there = observation_columns("waypoints", "valid")[:, 0].tolist()
+    return Gaze(
+        inputs=OBSERVATION_SIZE,
+        outputs=OUTPUTS,
+        before=there[0],
+        candidates=len(there),
+        features=there[1] - there[0],
+        keys=keys,
+        hidden=hidden,
+    )
 
 
 class VelocityPilot:
@@ -43,6 +59,7 @@ class VelocityPilot:
     def reset(self, scenario: Scenario, seed: int) -> None:
         """Start a new mission; nothing is drawn."""
         self._observer = Observer(scenario)
+        self._patience = Patience(len(scenario.uas), len(scenario.waypoints), scenario.dt_s)
         ranges = actions_of("velocity", scenario).ranges
         self._middle = ranges["middle"][:, :OUTPUTS]
         self._below = self._middle - ranges["lowest"][:, :OUTPUTS]
@@ -50,7 +67,8 @@ class VelocityPilot:
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """The mean action of the policy, scaled to the vehicle as the environment does."""
-        outputs = self._policy.forward(self._observer.observe(swarm))
+        view = self._patience.look(self._observer.observe(swarm), self._observer.candidates)
+        outputs = self._policy.forward(view)
         shares = np.clip(outputs, -1.0, 1.0)
         values = self._middle + shares * np.where(shares < 0.0, self._below, self._above)
         return {

@@ -1,8 +1,8 @@
 """What a velocity learner reads and is paid for."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from uas_coverage_agents.policy.tensors import Width
 from uas_coverage_env.strict_toml import StrictModel
@@ -13,20 +13,33 @@ class VelocitySettings(StrictModel):
 
     Attributes:
         interface: "velocity".
-        hidden: Widths of the layers of actor and of critic.
-        activation: Of these layers.
-        first_deviation: Of the actions before training, 1: the largest action.
+        network: "layers", one after the other; or "gaze", see `policy.gaze.Gaze`.
+        hidden: Widths of the layers of actor and of critic; of "gaze" the one of its actor.
+        keys: Of "gaze", see there.
+        activation: Of the layers of "layers".
+        first_deviation: Of the actions before training, 1: the largest action. In PPO it falls as
+            the learning rate does.
         safety_filter: Whether the filter flies along while learning.
         return_mode: Whether return mode flies along while learning.
+        moving_share: Share of the scenarios that get moving obstacles.
         rewards: Reward term -> weight, see `REWARD_TERMS`; the others keep their defaults.
         nearing: Paid for every 68 m that it comes nearer to the nearest open waypoint.
     """
 
     interface: Literal["velocity"]
+    network: Literal["layers", "gaze"] = "layers"
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)] = (128, 128)
+    keys: Width = 32
     activation: Literal["tanh", "relu"] = "tanh"
     first_deviation: Annotated[float, Field(gt=0.0, le=2.0)] = 0.6
     safety_filter: bool = True
     return_mode: bool = True
+    moving_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     rewards: dict[str, float] = Field(default_factory=dict)
     nearing: Annotated[float, Field(ge=0.0)] = 0.5
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.network == "gaze" and len(self.hidden) != 1:
+            raise ValueError(f"hidden is {list(self.hidden)}; the network 'gaze' has one width")
+        return self

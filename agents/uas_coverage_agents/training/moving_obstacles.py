@@ -1,5 +1,7 @@
 """Moving obstacles for generated towns, which have none."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from uas_coverage_env.scenario import MovingObstacle, Scenario, ScheduledVelocity
@@ -9,6 +11,24 @@ _DEPARTURE_S = (20.0, 200.0)
 _SPEED_MPS = (0.5, 3.0)
 _FREE_WEST_M = 100.0
 """The west belongs to the starts [m]."""
+
+
+def some_with_moving_obstacles(
+    scenarios: Sequence[Scenario], share: float, seed: int
+) -> list[Scenario]:
+    """The scenarios, a share of them with moving obstacles; each seed of a training draws others.
+
+    Args:
+        scenarios: Of the training.
+        share: Of those that get some, 0 to 1.
+        seed: Of the training.
+    """
+    lots = np.random.default_rng([seed, len(scenarios)])
+    moving = lots.random(len(scenarios)) < share
+    return [
+        with_moving_obstacles(scenario, seed * len(scenarios) + number) if moves else scenario
+        for number, (scenario, moves) in enumerate(zip(scenarios, moving, strict=True))
+    ]
 
 
 def with_moving_obstacles(scenario: Scenario, seed: int) -> Scenario:

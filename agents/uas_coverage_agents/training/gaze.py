@@ -1,0 +1,127 @@
+"""The gaze network in torch, as a policy of Stable-Baselines3; see `policy.gaze.Gaze`."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch import nn
+
+from uas_coverage_agents.policy.gaze import Gaze
+from uas_coverage_env.env import observation_columns
+from uas_coverage_env.env.layout import HEIGHT_M
+
+_FIRST = int(observation_columns("waypoints", "valid")[0, 0])
+_NORTH, _EAST = (observation_columns("waypoints", "direction")[0] - _FIRST).tolist()
+_CLOSENESS = int(observation_columns("waypoints", "closeness")[0, 0]) - _FIRST
+_BELOW = int(observation_columns("waypoints", "below")[0, 0]) - _FIRST
+_UP = int(observation_columns("own", "position")[0, 2])
+
+_BENT_ON_THE_NEAREST = 40.0
+"""At first, one that is nearer by a tenth of the closeness weighs e⁴ times as much."""
+
+_FIRST_SPEED = 0.9
+"""At first, as a share of the largest."""
+
+_HALF_CEILING_M = 25.0
+"""Half the height of generated towns: what a step of 1 in the altitude that is asked for is [m]."""
+
+_CRITIC = 128
+"""Width of the layers that estimate the value; they do not fly along."""
+
+
+class Actor(nn.Module):
+    """The network that flies, weight for weight, but for its last layer."""
+
+    def __init__(self, gaze: Gaze) -> None:
+        super().__init__()
+        self._gaze = gaze
+        seen = gaze.features + gaze.keys
+        self.own = nn.Linear(gaze.own, gaze.hidden)
+        self.key = nn.Linear(gaze.features, gaze.keys)
+        self.query = nn.Linear(gaze.hidden, gaze.keys)
+        self.bent = nn.Linear(gaze.features, 1, bias=False)
+        self.hidden = nn.Linear(gaze.hidden + seen, gaze.hidden)
+        for tensor in (self.query.weight, self.query.bias, self.bent.weight):
+            nn.init.zeros_(tensor)
+        with torch.no_grad():
+            self.bent.weight[0, _CLOSENESS] = _BENT_ON_THE_NEAREST
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """(n, inputs) -> (n, numbers that the outputs are a linear function of)."""
+        gaze = self._gaze
+        end = gaze.before + gaze.candidates * gaze.features
+        own = torch.cat([x[:, : gaze.before], x[:, end:]], 1)
+        w = x[:, gaze.before : end].reshape(-1, gaze.candidates, gaze.features)
+        c = torch.tanh(self.own(own))
+        e = torch.tanh(self.key(w))
+        score = (torch.matmul(e, self.query(c)[:, :, None]) + self.bent(w))[..., 0]
+        there = w[..., 0] > 0.0
+        share = torch.softmax(score.masked_fill(~there, -1e9), 1) * there
+        a = torch.matmul(share[:, None], torch.cat([w, e], 2))[:, 0]
+        h = torch.tanh(self.hidden(torch.cat([c, a], 1)))
+        return torch.cat([h, a, own], 1)
+
+
+class ActorCritic(nn.Module):
+    """Both, with nothing in common, in the place where SB3 has its layers."""
+
+    def __init__(self, gaze: Gaze) -> None:
+        super().__init__()
+        self.actor = Actor(gaze)
+        self.critic = nn.Sequential(
+            nn.Linear(gaze.inputs, _CRITIC), nn.Tanh(), nn.Linear(_CRITIC, _CRITIC), nn.Tanh()
+        )
+        self.latent_dim_pi = gaze.last
+        self.latent_dim_vf = _CRITIC
+
+    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Both."""
+        return self.actor(x), self.critic(x)
+
+    def forward_actor(self, x: torch.Tensor) -> torch.Tensor:
+        """What the action is a linear function of."""
+        return self.actor(x)
+
+    def forward_critic(self, x: torch.Tensor) -> torch.Tensor:
+        """What the value is a linear function of."""
+        return self.critic(x)
+
+
+class GazePolicy(ActorCriticPolicy):
+    """Flies with a gaze network; before training, straight to the nearest open waypoint.
+
+    Args:
+        args: As of the base.
+        gaze: The network.
+        kwargs: As of the base; `ortho_init` has to be off, it would scramble the first actions.
+    """
+
+    def __init__(self, *args: Any, gaze: Gaze, **kwargs: Any) -> None:
+        self.gaze = gaze
+        super().__init__(*args, **{"ortho_init": False, **kwargs})
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor = ActorCritic(self.gaze)  # pyright: ignore[reportAttributeAccessIssue]
+
+    def _build(self, lr_schedule: Any) -> None:
+        super()._build(lr_schedule)
+        target = self.gaze.hidden
+        own = self.gaze.last - self.gaze.own
+        out: Any = self.action_net
+        with torch.no_grad():
+            out.weight.zero_()
+            out.bias.zero_()
+            out.weight[0, target + _NORTH] = _FIRST_SPEED
+            out.weight[1, target + _EAST] = _FIRST_SPEED
+            out.weight[2, target + _BELOW] = -HEIGHT_M / _HALF_CEILING_M
+            out.weight[2, own + _UP] = 1.0
+
+    def tensors(self) -> dict[str, NDArray[np.float32]]:
+        """The weights by the names of `Gaze.shapes`."""
+        parts = {
+            **self.mlp_extractor.actor.state_dict(),
+            **{f"out.{name}": tensor for name, tensor in self.action_net.state_dict().items()},
+        }
+        return {k: v.detach().cpu().numpy().astype(np.float32) for k, v in parts.items()}

@@ -1,0 +1,73 @@
+"""The memory of a pilot: looking away for a while from a waypoint that is not to be had now."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.env import observation_columns
+from uas_coverage_env.env.layout import NEARBY_M
+
+PATIENCE_S = 20.0
+"""For how long a waypoint may be the next one near by; covering one takes less than ten [s]."""
+
+LOOK_AWAY_S = 60.0
+"""[s]"""
+
+_NEAR_M = 60.0
+_NEAR = 1.0 / (1.0 + _NEAR_M / NEARBY_M)
+
+_THERE = observation_columns("waypoints", "valid")[:, 0]
+_CLOSENESS = int(observation_columns("waypoints", "closeness")[0, 0])
+_FIRST = int(_THERE[0])
+_FEATURES = int(_THERE[1] - _THERE[0])
+_END = _FIRST + len(_THERE) * _FEATURES
+
+
+class Patience:
+    """Hides from each UAS the waypoints that it has tried for too long.
+
+    A policy without memory that waits for a moving obstacle to leave a waypoint, or flies circles
+    round one, would do so until the battery is empty. A waypoint that was for `PATIENCE_S` the
+    nearest that is shown, and near, is hidden for `LOOK_AWAY_S`, unless there is no other.
+
+    Args:
+        n_uas: Size of the swarm.
+        n_waypoints: Of the scenario.
+        dt_s: Time between two samples [s].
+    """
+
+    def __init__(self, n_uas: int, n_waypoints: int, dt_s: float) -> None:
+        self._tried_s = np.zeros((n_uas, n_waypoints))
+        self._hidden_s = np.zeros((n_uas, n_waypoints))
+        self._dt_s = dt_s
+
+    def look(
+        self, view: NDArray[np.float32], candidates: NDArray[np.integer]
+    ) -> NDArray[np.float32]:
+        """What is left of a view; to be asked once per sample.
+
+        Args:
+            view: (U, OBSERVATION_SIZE).
+            candidates: (U, K) the waypoints in it, -1 where there is none.
+
+        Returns:
+            The same, the waypoints that are hidden taken out and the others moved up.
+        """
+        seen = view.copy()
+        self._hidden_s = np.maximum(self._hidden_s - self._dt_s, 0.0)
+        for i, offered in enumerate(candidates):
+            offered = offered[offered >= 0]
+            shown = np.flatnonzero(self._hidden_s[i, offered] == 0.0)
+            if len(shown) == 0:
+                continue
+            if len(shown) < len(offered):
+                rows = view[i, _FIRST:_END].reshape(-1, _FEATURES)
+                kept = np.zeros_like(rows)
+                kept[: len(shown)] = rows[shown]
+                seen[i, _FIRST:_END] = kept.reshape(-1)
+            if seen[i, _CLOSENESS] > _NEAR:
+                w = offered[shown[0]]
+                self._tried_s[i, w] += self._dt_s
+                if self._tried_s[i, w] >= PATIENCE_S:
+                    self._tried_s[i, w] = 0.0
+                    self._hidden_s[i, w] = LOOK_AWAY_S
+        return seen
