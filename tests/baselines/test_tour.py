@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from uas_coverage_baselines.tour import Tour, TourOptions
@@ -6,6 +8,7 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.flight import Assistants, accomplished
 from uas_coverage_env.scenario import Scenario, generate_scenario
+from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import LOST, World, build_arena
 
 QUICK = {"moves": 20_000, "changes": 60}
@@ -91,6 +94,41 @@ def test_who_is_lost_leaves_its_waypoints_to_the_others(village):
     schedule.update(view_of(village, may_work=alone, flies=alone, time_s=1.0))
     assert len(schedule.order.routes[1]) == 0
     assert len(schedule.order.routes[0]) + len(schedule.order.left_out) == 49
+
+
+def flown(schedule, scenario, view, seconds, slower):
+    """The view after so many seconds in which each UAS flew its route, slower than at top speed."""
+    at_m = np.array([w.position_m for w in scenario.waypoints])
+    for _ in range(seconds):
+        x, uncovered = view.x.copy(), view.uncovered.copy()
+        for u, route in enumerate(schedule.order.routes):
+            way_m = at_m[route[0]] - x[u, :3]
+            x[u, :3] += way_m * min(1.0, 12.0 / slower[u] / np.linalg.norm(way_m))
+            x[u, DOD] += build_arena(scenario).uas["dod_per_s"][u]
+            uncovered[route[0]] = np.linalg.norm(at_m[route[0]] - x[u, :3]) > 10.0
+        view = replace(view, x=x, uncovered=uncovered, time_s=view.time_s + 1.0)
+        schedule.update(view)
+    return view
+
+
+def test_who_flies_slower_than_thought_hands_over_what_its_battery_does_not_last_for(village):
+    schedule = schedule_of(village, view_of(village))
+    view = flown(schedule, village, view_of(village), 60, slower=(1.2, 1.8))
+    assert 1.4 < schedule.pace[1] <= 1.8
+    arena = build_arena(village)
+    battery_s = (0.75 - view.x[1, DOD]) / arena.uas["dod_per_s"][1]
+    route, legs = schedule.order.routes[1], schedule.legs
+    first_m = legs.waypoints_m[route[0]] - view.x[1, :3]
+    left_s = np.linalg.norm(first_m) / 12.0 + legs.between_s[0][route[:-1], route[1:]].sum()
+    assert 1.8 * (left_s + legs.home_s[1, route[-1]]) < battery_s
+    assert len(schedule.order.left_out) == 0
+
+
+def test_a_short_clock_leaves_out_what_nobody_comes_home_from_in_time(village):
+    short = changed(village, max_steps=120)
+    schedule = schedule_of(short, view_of(short))
+    assert len(schedule.order.left_out) > 0
+    assert schedule.order.seconds.max() < 120.0
 
 
 def test_a_lost_uas_gets_no_command_and_the_other_goes_on(small_town):

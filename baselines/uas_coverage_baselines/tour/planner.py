@@ -29,7 +29,7 @@ from uas_coverage_env.world import (
 )
 
 FloatArray = NDArray[np.float64]
-_HORIZON_S = 20.0
+_HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improve
 _STEPS_AT_MOST = 60
 _COVERED_WITHIN_M = 0.3  # nearer than the radius by this, or by a fiftieth of it
 _NEAR = 0.7  # share of the radius at which the leg to a waypoint is expected to end
@@ -47,11 +47,11 @@ class TourOptions(AssistedOptions):
         description="let the world fly it home; else it flies home itself, by the same rule",
     )
     moves: int = Field(default=2_000_000, ge=0, description="changes tried by the order search")
-    changes: int = Field(default=400, ge=0, description="changes tried of each flight plan")
+    changes: int = Field(default=700, ge=0, description="changes tried of each flight plan")
 
 
 class Tour:
-    """Flies a global order of the waypoints, each UAS its own route, with plans of 20 s.
+    """Flies a global order of the waypoints, each UAS its own route, with plans of 8 s.
 
     Before take-off simulated annealing gives every UAS a route (`schedule`); on events the order
     is searched again. At every step each UAS's commands for the coming seconds are improved in
@@ -88,6 +88,8 @@ class Tour:
         self._rng = np.random.default_rng([seed, n_uas])
         self._command = np.zeros(1, dtype=COMMAND_DTYPE)[0]
         self._plans = [empty_plan(self._n_steps) for _ in range(n_uas)]
+        for plan, uas in zip(self._plans, scenario.uas, strict=True):
+            plan.path_m[:] = uas.start_m
         self._trial = empty_plan(self._n_steps)
         self._is_flown = np.zeros(n_uas, np.bool_)
         self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
@@ -103,19 +105,14 @@ class Tour:
         ).reshape(-1, 2) + (max(u.radius_m for u in scenario.uas) + _MOVING_MARGIN_M)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(scenario, self._arena, self.options.moves)
-        self._seed = seed
-        self._begun = False
+        self._find_order(self._view(World(scenario).swarm_state()), seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Plan for each flying UAS, in order, and fly the first command of each plan."""
         self._arena.moving_path_m[0] = swarm.moving_position_m
         self._arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
         view = self._view(swarm)
-        if self._begun:
-            self._schedule.update(view)
-        else:
-            self._find_order(view)
-            self._begun = True
+        self._schedule.update(view)
         others_m = self._where_others_go(view)
         commands: dict[str, Command] = {}
         predicted_m: dict[str, FloatArray] = {}
@@ -126,8 +123,8 @@ class Tour:
         self.last_decision = Decision(predicted_m)
         return commands
 
-    def _find_order(self, view: View) -> None:
-        self._schedule.begin(view, self._seed)
+    def _find_order(self, view: View, seed: int) -> None:
+        self._schedule.begin(view, seed)
 
     def _fly(self, i: int, view: View, others_m: FloatArray) -> Command:
         task = self._task(i, view)
@@ -197,7 +194,7 @@ class Tour:
             paths_m[i, :-1] = path_m[1:]
             paths_m[i, -1] = path_m[-1]
             # where it is now is known
-            if not self._begun or np.linalg.norm(paths_m[i, 0] - view.x[i, :3]) > 1.0:
+            if np.linalg.norm(paths_m[i, 0] - view.x[i, :3]) > 1.0:
                 paths_m[i] = view.x[i, :3]
         return paths_m
 

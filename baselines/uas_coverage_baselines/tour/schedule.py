@@ -15,13 +15,17 @@ from uas_coverage_env.world import Arena
 FloatArray = NDArray[np.float64]
 
 LANDING_S = 3.0  # from full speed over the start to rest on it
-_RESERVE_S = 30.0  # what return mode asks for beyond the way home at full speed
+_RESERVE_S = 30.0  # what the return rule asks for beyond the way home at full speed
+_SPARE_S = 10.0  # left beside it in a new order, so that not every delay upsets the order
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
-_SLOWER = 1.15  # flights take so much longer than their legs, when batteries are counted on
+_AGAIN_S = 5.0  # what a search could not mend is searched again after so long
+_PACE = 1.2  # flights take so much longer than their legs, until it is known better
+_PACE_KNOWN_S = 30.0  # that weighs as much as so long a flight
+_SLOWEST_PACE = 2.0
 _OPENS_AFTER = 0.75  # share of the mean flight left after which what is blocked may be open
 _OPENS_AFTER_S = 10.0  # and at least so long
 _FIRST_SEARCHES = 3
-_MOVES_AGAIN = 600_000  # of each of two searches on an event, one of them hot
+_MOVES_AGAIN = 400_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
 
 
@@ -54,7 +58,10 @@ class Schedule:
         self._arena = arena
         self._moves = moves
         self._weight = np.array([w.weight for w in scenario.waypoints], float)
+        self._until_s = scenario.max_steps * scenario.dt_s
         self.order = no_order(len(scenario.uas))
+        self._flown_s = np.full(len(scenario.uas), _PACE_KNOWN_S * _PACE)
+        self._legs_flown_s = np.full(len(scenario.uas), _PACE_KNOWN_S)
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
@@ -73,6 +80,7 @@ class Schedule:
         routes = tuple(route[open_[route]] for route in self.order.routes)
         left_out = self.order.left_out[open_[self.order.left_out]]
         self.order = Order(routes, left_out, self.order.seconds, self.order.cost_s)
+        self._time_legs(view)
         if self._has_changed(view):
             task = self.task(view)
             kept = improved(task, self.order, Effort(0), 0)
@@ -85,23 +93,55 @@ class Schedule:
     def take(self, order: Order, view: View) -> None:
         """Fly an order from now on."""
         self.order = order
-        self._taken_under = view
-        self._expected_s = self._expected_home_s(view)
+        self._taken_under = self._seen = view
+        self._legs_left_s = self._legs_left(view)
+        self._expected_s = view.time_s + self._legs_left_s
 
     def _has_changed(self, view: View) -> bool:
-        """Whether somebody came home or was lost, something opened or closed, or time is off."""
+        """Whether somebody came home or was lost, something opened or closed, or time is off.
+
+        Or a battery no longer lasts for its route, which somebody else has to be told of as long
+        as there is somebody else in the air; or it may last for more than was thought.
+        """
         before = self._taken_under
-        late_s = (self._expected_home_s(view) - self._expected_s)[view.may_work]
-        return (
+        late_s = (view.time_s + self._legs_left_s - self._expected_s)[view.may_work]
+        if (
             not np.array_equal(view.may_work, before.may_work)
             or not np.array_equal(view.blocked & view.uncovered, before.blocked & view.uncovered)
-            or bool((np.abs(late_s) > _LATE_S).any())
-        )
+            or (np.abs(late_s) > _LATE_S).any()
+        ):
+            return True
+        if view.time_s < before.time_s + _AGAIN_S:
+            return False
+        spare_s = self._budget_s(view) + _SPARE_S / self.pace - self._legs_left_s
+        too_long = [len(route) and spare_s[u] < 0.0 for u, route in enumerate(self.order.routes)]
+        return bool(len(self.order.left_out) or any(too_long))
 
-    def _expected_home_s(self, view: View) -> FloatArray:
-        """(U,) when each UAS will have flown its route, turns not counted."""
-        left_s = [self._seconds_left(u, x[:3]) for u, x in enumerate(view.x)]
-        return view.time_s + np.array(left_s)
+    def _time_legs(self, view: View) -> None:
+        """Measure how long flights take beside their legs, waiting not counted."""
+        left_s = self._legs_left(view)
+        for u, route in enumerate(self.order.routes):
+            if view.may_work[u] and len(route) and not view.blocked[route[0]]:
+                self._flown_s[u] += view.time_s - self._seen.time_s
+                self._legs_flown_s[u] += self._legs_left_s[u] - left_s[u]
+        self._seen, self._legs_left_s = view, left_s
+
+    @property
+    def pace(self) -> FloatArray:
+        """(U,) how much longer flights take than their legs."""
+        legs_s = np.maximum(self._legs_flown_s, 1.0)  # who was driven away flew backwards
+        return np.clip(self._flown_s / legs_s, 1.0, _SLOWEST_PACE)
+
+    def _budget_s(self, view: View) -> FloatArray:
+        """(U,) seconds of legs that battery and clock allow each UAS."""
+        uas = self._arena.uas
+        left_s = (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
+        left_s = np.minimum(left_s, self._until_s - view.time_s)
+        return (left_s - _RESERVE_S - _SPARE_S) / self.pace
+
+    def _legs_left(self, view: View) -> FloatArray:
+        """(U,) seconds of legs along each route and home, turns not counted."""
+        return np.array([self._seconds_left(u, x[:3]) for u, x in enumerate(view.x)])
 
     def rest_s(self, uas: int, slower: float, per_waypoint_s: float) -> FloatArray:
         """Flight time from each waypoint of a UAS's route to its end.
@@ -137,11 +177,9 @@ class Schedule:
         n_uas = len(x)
         first_s = np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)])
         idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
-        uas = self._arena.uas
-        budget_s = (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"] / _SLOWER - _RESERVE_S
         # nobody knows when a blocked waypoint opens: late enough to do other work before, and soon
         # enough to be thought of while there is other work near it
-        work_s = (self._expected_home_s(view) - view.time_s)[view.may_work]
+        work_s = self._legs_left(view)[view.may_work]
         opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0
         return Task(
             open_waypoints=np.flatnonzero(view.uncovered),
@@ -160,5 +198,5 @@ class Schedule:
             neighbours=legs.neighbours,
             weight=self._weight,
             not_before_s=np.where(view.blocked, opens_s, 0.0),
-            budget_s=np.where(view.may_work, budget_s, -np.inf),
+            budget_s=np.where(view.may_work, self._budget_s(view), -np.inf),
         )
