@@ -25,6 +25,9 @@ inlined_kernel = _compiler(cache=True, error_model="numpy", _nrt=False, forceinl
 """A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
 to hand over their hundred machine words takes longer than most of these parts themselves."""
 
+lending_kernel = _compiler(cache=True, error_model="numpy", _nrt=True, forceinline=True)
+"""Compiles a function that returns borrowed arrays (`world/borrow.py`), part of its callers."""
+
 allocating_kernel = _compiler(cache=True, error_model="numpy", _nrt=True)
 """Compiles a function that makes arrays; also what it calls, unless that is a `kernel`."""
 

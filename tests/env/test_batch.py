@@ -11,7 +11,7 @@ from uas_coverage_env.env.batch_kernel import ABSENT, drawn
 from uas_coverage_env.env.kernel import ENERGY, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.world import FLYING, STATUS_NAMES, build_arena
+from uas_coverage_env.world import FLYING, LOST, STATUS_NAMES, build_arena
 from uas_coverage_env.world.pool import arena_of, pool_arenas
 
 MIXED = (
@@ -44,6 +44,7 @@ def assert_is(batch, lane, env, observations, rewards=None, infos=None):
             assert batch.lanes.rewards[lane, i] == pytest.approx(rewards[agent], abs=1e-12)
         if infos is not None:
             info = infos[agent]
+            assert tuple(info["reward_terms"]) == REWARD_TERMS
             assert list(info["reward_terms"].values()) == report[: len(REWARD_TERMS)].tolist()
             assert info["energy_Wh"] == report[ENERGY]
             assert info["status"] == STATUS_NAMES[int(report[STATUS])]
@@ -149,6 +150,26 @@ def test_equal_vehicles_are_stored_once():
     pool = pool_arenas([*grounds, practice_ground(vehicles=("hexacopter",))])
     assert pool.spans["vehicles"].tolist() == [[0, 2], [0, 2], [0, 2], [2, 4]]
     assert len(pool.vehicles) == 4
+
+
+def test_what_a_lost_uas_saw_last_stays_also_after_going_on_from_a_state():
+    batch = CoverageBatch(8, MIXED)
+    batch.reset(seed=3)
+    for step in range(14):
+        batch.step(random_actions(batch, step))
+    status = batch.worlds.status
+    waits = (status == LOST) & (status == FLYING).any(axis=1, keepdims=True)
+    assert waits.any()
+    last, mission = batch.observation.copy(), batch.lanes.mission.copy()
+    other = CoverageBatch(8, MIXED)
+    other.reset(seed=4)
+    other.load_state_dict(batch.state_dict())
+    for step in range(3):
+        actions = random_actions(batch, 100 + step)
+        np.testing.assert_array_equal(other.step(actions), batch.step(actions))
+        stays = waits & (batch.lanes.mission == mission)[:, None]
+        assert stays.any()
+        np.testing.assert_array_equal(batch.observation[stays], last[stays])
 
 
 def test_an_action_that_is_refused_changes_nothing():

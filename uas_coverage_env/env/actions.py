@@ -39,6 +39,8 @@ ALTITUDE_MARGIN_M = 1.0
 HOME_CHOICE = K_WAYPOINTS
 """The waypoint action that flies home."""
 
+_REAL = (np.dtype(np.float32), np.dtype(np.float64))
+
 ACTION_NAMES = ("velocity", "acceleration", "wrench", "waypoint")
 
 RANGES_DTYPE = np.dtype(
@@ -78,8 +80,8 @@ class Actions(Protocol):
         """A new space of the whole swarm."""
         ...
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
-        """Write an action into `asked` (size,), not yet known to be finite.
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
+        """Write an action into row i of `asked` (U, size), not yet known to be finite.
 
         Raises:
             ValueError: It has a wrong type or shape; names UAS and value.
@@ -111,24 +113,24 @@ class Continuous:
         """The boxes of all UAS, one after the other."""
         return spaces.Box(-1.0, 1.0, (n_uas * self.size,), np.float32)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
         """Write the numbers; any real numbers in the right shape will do."""
         if type(action) is not np.ndarray:
             action = _as_array(name, action)
-        if action.dtype.char in "fd" and action.shape == asked.shape:
+        if action.dtype in _REAL and action.shape == (self.size,):
             # what learners give; all others are looked at more closely
-            asked[:] = action
+            asked[i] = action
             return
         if action.dtype.kind not in "fiu":
             raise ValueError(
                 f"action of {name} has dtype {action.dtype}: {_shown(action)}; give real numbers"
             )
-        if action.shape != asked.shape:
+        if action.shape != (self.size,):
             raise ValueError(
                 f"action of {name} has shape {action.shape}: {_shown(action)}; "
                 f"give {self.size} numbers, shape ({self.size},)"
             )
-        asked[:] = action
+        asked[i] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One row of numbers for each UAS."""
@@ -157,7 +159,7 @@ class Choice:
         """One choice for each UAS."""
         return spaces.MultiDiscrete([HOME_CHOICE + 1] * n_uas)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
         """Write the choice; any whole number in range will do, also as an array without axes."""
         if isinstance(action, np.ndarray) and action.shape == ():
             action = action[()]
@@ -167,7 +169,7 @@ class Choice:
                 f"action of {name} is {_shown(action)} of type {type(action).__name__}; "
                 f"give a whole number from 0 to {HOME_CHOICE} (home)"
             )
-        asked[:] = action
+        asked[i] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One choice for each UAS."""

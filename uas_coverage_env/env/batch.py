@@ -254,13 +254,16 @@ class CoverageBatch:
                 )
         for name, array in own.items():
             array[...] = state[name]
+        # the other array of observations is not what it was
+        self.lanes.settled[:] = False
         self._begun = bool((self.lanes.mission >= 0).all())
 
     def _changing(self) -> dict[str, NDArray[Any]]:
         # commands and outcomes are written anew in every step
         lanes = {k: v for k, v in self.lanes._asdict().items() if v.dtype.names is None}
         arrays = {**self.worlds._asdict(), **lanes, "observation": self.observation}
-        return {name: array for name, array in arrays.items() if not name.startswith("final_")}
+        own = ("final_", "settled")
+        return {name: array for name, array in arrays.items() if not name.startswith(own)}
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a player of this lane sees now, in arrays of their own."""
@@ -374,6 +377,7 @@ def _empty_lanes(pool: ScenarioPool, n: int, threads: int) -> Lanes:
         swarm=np.zeros((n, SWARM_SIZE)),
         terminated=np.zeros(n, dtype=np.bool_),
         truncated=np.zeros(n, dtype=np.bool_),
+        settled=np.zeros((n, n_uas), dtype=np.bool_),
         final_observation=np.zeros((n, n_uas, OBSERVATION_SIZE), np.float32),
         final_report=np.zeros((n, n_uas, REPORT_SIZE)),
         final_swarm=np.zeros((n, SWARM_SIZE)),

@@ -15,14 +15,15 @@ from uas_coverage_env.env.kernel import (
     COVERED,
     ENERGY,
     REPORT_SIZE,
+    REWARD,
     STATUS,
     step_learners,
 )
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
-from uas_coverage_env.env.nearest import NO_TARGET, count_company
-from uas_coverage_env.env.observation import observe
-from uas_coverage_env.env.pool import tables_of
+from uas_coverage_env.env.nearest import NO_TARGET
+from uas_coverage_env.env.pool import first_look_of, tables_of
 from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.borrow import borrow
 from uas_coverage_env.world.pool import arena_of, begin, state_of
@@ -84,6 +85,8 @@ class Lanes(NamedTuple):
     """(L,) no UAS flies any more."""
     truncated: NDArray[np.bool_]
     """(L,) one still flies after the last step allowed."""
+    settled: NDArray[np.bool_]
+    """(L, U) it does not fly, and what it saw last lies in both arrays of observations."""
     final_observation: NDArray[np.float32]
     """(L, U, OBSERVATION_SIZE) of the last mission that ended in a lane; SAME_STEP only."""
     final_report: NDArray[np.float64]
@@ -94,7 +97,7 @@ class Lanes(NamedTuple):
     """(L, U, K_WAYPOINTS), likewise."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _mixed(z):
     """The output function of SplitMix64 (Steele, Lea, Flood 2014): every bit depends on all."""
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -102,7 +105,7 @@ def _mixed(z):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def drawn(seed, mission, n):
     """Which of n scenarios a mission is flown in: a function of seed and number, with no state.
 
@@ -117,124 +120,144 @@ def drawn(seed, mission, n):
     return np.int64(_mixed(_mixed(seed) + counter) % np.uint64(n))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
+def _copy(source, target):
+    """Copy the rows of an array into another of the same shape."""
+    for i in range(target.shape[0]):
+        for k in range(target.shape[1]):
+            target[i, k] = source[i, k]
+
+
+@inlined_kernel
 def _begin_lane(pool, tables, worlds, lanes, lane, order, observation):
     """Begin a mission in a lane, as `Episode.reset` does for a single one."""
     s = order
     if order == DRAW:
         s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.spans.shape[0])
-    arena = arena_of(pool, s)
-    n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
-    _, scales, neighbours = tables_of(tables, s)
+    candidates, company, seen = first_look_of(tables, s)
+    n_uas, n_waypoints = candidates.shape[0], company.shape[0]
     state = state_of(worlds, lane, n_uas, n_waypoints)
-    company = borrow(lanes.company, lane, (n_waypoints, 2))
+    begin(pool, s, state)
     lanes.scenario[lane] = s
     lanes.mission[lane] += 1
     lanes.orders[lane] = FLY
-    worlds.status[lane, n_uas:] = ABSENT
-    begin(pool, s, state)
-    lanes.targets[lane] = NO_TARGET
-    lanes.candidates[lane, n_uas:] = -1
-    report = lanes.report[lane]
-    report[:] = 0.0
-    report[:, CONTACT_WITH] = -1.0
-    report[:, STATUS] = worlds.status[lane]
-    report[:, COVERED] = n_waypoints - state.uncovered.sum()
-    swarm = lanes.swarm[lane]
-    swarm[:] = 0.0
-    swarm[SWARM_COVERED] = report[0, COVERED]
-    count_company(state.uncovered, neighbours, company)
-    observation[lane, n_uas:] = 0.0
-    observe(
-        arena, state, scales, company, state.status == FLYING,
-        borrow(lanes.targets, lane, (n_uas,)), arena.rules[0].max_steps,
-        borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
-        borrow(observation, lane, (n_uas, OBSERVATION_SIZE)),
-    )  # fmt: skip
+    n_covered = 0
+    for w in range(n_waypoints):
+        n_covered += not state.uncovered[w]
+    for i in range(lanes.report.shape[1]):
+        if i >= n_uas:
+            worlds.status[lane, i] = ABSENT
+            for k in range(K_WAYPOINTS):
+                lanes.candidates[lane, i, k] = -1
+            for k in range(OBSERVATION_SIZE):
+                observation[lane, i, k] = 0.0
+        lanes.targets[lane, i] = NO_TARGET
+        lanes.settled[lane, i] = False
+        for column in range(REPORT_SIZE):
+            lanes.report[lane, i, column] = 0.0
+        lanes.report[lane, i, CONTACT_WITH] = -1.0
+        lanes.report[lane, i, STATUS] = worlds.status[lane, i]
+        lanes.report[lane, i, COVERED] = n_covered
+    for column in range(SWARM_SIZE):
+        lanes.swarm[lane, column] = 0.0
+    lanes.swarm[lane, SWARM_COVERED] = n_covered
+    _copy(candidates, borrow(lanes.candidates, lane, candidates.shape))
+    _copy(company, borrow(lanes.company, lane, company.shape))
+    _copy(seen, borrow(observation, lane, seen.shape))
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def _settle(worlds, lanes, lane, n_uas, max_steps):
     """Add up what a step has brought, in the order of UAS and terms; says if the mission is over.
 
     The order matters: sums of floats depend on it, and a lane must equal a single mission.
     """
     report = borrow(lanes.report, lane, (n_uas, REPORT_SIZE))
-    rewards = borrow(lanes.rewards, lane, (lanes.rewards.shape[1],))
-    swarm = borrow(lanes.swarm, lane, (SWARM_SIZE,))
     flies = False
-    for i in range(n_uas):
-        flies = flies or worlds.status[lane, i] == FLYING
-        reward = 0.0
-        for term in range(N_TERMS):
-            reward += report[i, term]
-        rewards[i] = reward
-    for i in range(n_uas, rewards.shape[0]):
-        rewards[i] = 0.0
+    for i in range(lanes.rewards.shape[1]):
+        lanes.rewards[lane, i] = 0.0
+        if i < n_uas:
+            flies |= worlds.status[lane, i] == FLYING
+            lanes.rewards[lane, i] = report[i, REWARD]
     reward = 0.0
     for column in range(SWARM_COVERED):
         total = 0.0
         for i in range(n_uas):
             total += report[i, column]
-        swarm[column] = total
+        lanes.swarm[lane, column] = total
         if column < N_TERMS:
             reward += total
-    swarm[SWARM_COVERED] = report[0, COVERED]
-    swarm[SWARM_REWARD] = reward
+    lanes.swarm[lane, SWARM_COVERED] = report[0, COVERED]
+    lanes.swarm[lane, SWARM_REWARD] = reward
     lanes.terminated[lane] = not flies
     lanes.truncated[lane] = flies and worlds.step[lane, 0] >= max_steps
     return lanes.terminated[lane] or lanes.truncated[lane]
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
+def _keep_last_looks(worlds, lanes, lane, n_uas, before, observation):
+    """What a UAS that does not fly has seen last stays its observation.
+
+    Two arrays take turns: once it lies in both, nothing has to be copied any more.
+    """
+    for i in range(observation.shape[1]):
+        flies = i < n_uas and worlds.status[lane, i] == FLYING
+        if not flies and not lanes.settled[lane, i]:
+            for k in range(OBSERVATION_SIZE):
+                observation[lane, i, k] = before[lane, i, k]
+        lanes.settled[lane, i] = not flies
+
+
+@inlined_kernel
 def step_lane(
     pool, tables, worlds, lanes, lane, order, thread, kind, weights, nonlinear, return_mode,
     safety_filter, autoreset, before, observation,
 ):  # fmt: skip
     """One lane of `step_batch`."""
+    whole = (observation.shape[1], OBSERVATION_SIZE)
     if order == REST:
-        observation[lane] = before[lane]
+        _copy(borrow(before, lane, whole), borrow(observation, lane, whole))
         return
-    if order != FLY:
-        lanes.terminated[lane] = lanes.truncated[lane] = False
-        lanes.rewards[lane] = 0.0
+    begins = order != FLY
+    if begins:
+        lanes.terminated[lane] = False
+        lanes.truncated[lane] = False
+        for i in range(lanes.rewards.shape[1]):
+            lanes.rewards[lane, i] = 0.0
+    else:
+        s = lanes.scenario[lane]
+        arena = arena_of(pool, s)
+        ranges, scales, neighbours = tables_of(tables, s)
+        n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
+        max_steps = arena.rules[0].max_steps
+        state = state_of(worlds, lane, n_uas, n_waypoints)
+        _keep_last_looks(worlds, lanes, lane, n_uas, before, observation)
+        step_learners(
+            arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode,
+            safety_filter, borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
+            borrow(lanes.targets, lane, (n_uas,)),
+            borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
+            borrow(lanes.company, lane, (n_waypoints, 2)),
+            borrow(lanes.commands, thread, (n_uas,)), borrow(lanes.outcome, thread, (n_uas,)),
+            borrow(lanes.report, lane, (n_uas, REPORT_SIZE)), max_steps,
+            borrow(observation, lane, (n_uas, OBSERVATION_SIZE)),
+        )  # fmt: skip
+        over = _settle(worlds, lanes, lane, n_uas, max_steps)
+        if over and autoreset == NEXT_STEP:
+            lanes.orders[lane] = DRAW
+        elif over and autoreset == SAME_STEP:
+            _copy(borrow(observation, lane, whole), borrow(lanes.final_observation, lane, whole))
+            _copy(lanes.report[lane], lanes.final_report[lane])
+            _copy(lanes.candidates[lane], lanes.final_candidates[lane])
+            for column in range(SWARM_SIZE):
+                lanes.final_swarm[lane, column] = lanes.swarm[lane, column]
+            begins = True
+            order = DRAW
+    if begins:
         _begin_lane(pool, tables, worlds, lanes, lane, order, observation)
-        return
-    s = lanes.scenario[lane]
-    arena = arena_of(pool, s)
-    ranges, scales, neighbours = tables_of(tables, s)
-    n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
-    max_steps = arena.rules[0].max_steps
-    state = state_of(worlds, lane, n_uas, n_waypoints)
-    for i in range(observation.shape[1]):
-        # what is not written below: a UAS that did not fly keeps its last observation
-        if i >= n_uas:
-            for k in range(OBSERVATION_SIZE):
-                observation[lane, i, k] = 0.0
-        elif state.status[i] != FLYING:
-            for k in range(OBSERVATION_SIZE):
-                observation[lane, i, k] = before[lane, i, k]
-    step_learners(
-        arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode,
-        safety_filter, borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
-        borrow(lanes.targets, lane, (n_uas,)),
-        borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
-        borrow(lanes.company, lane, (n_waypoints, 2)), borrow(lanes.commands, thread, (n_uas,)),
-        borrow(lanes.outcome, thread, (n_uas,)), borrow(lanes.report, lane, (n_uas, REPORT_SIZE)),
-        max_steps, borrow(observation, lane, (n_uas, OBSERVATION_SIZE)),
-    )  # fmt: skip
-    over = _settle(worlds, lanes, lane, n_uas, max_steps)
-    if over and autoreset == NEXT_STEP:
-        lanes.orders[lane] = DRAW
-    elif over and autoreset == SAME_STEP:
-        lanes.final_observation[lane] = observation[lane]
-        lanes.final_report[lane] = lanes.report[lane]
-        lanes.final_swarm[lane] = lanes.swarm[lane]
-        lanes.final_candidates[lane] = lanes.candidates[lane]
-        _begin_lane(pool, tables, worlds, lanes, lane, DRAW, observation)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _all_finite(numbers):
     finite = True
     for k in range(numbers.shape[0]):
@@ -243,10 +266,10 @@ def _all_finite(numbers):
     return finite
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _first_refused(pool, lanes, orders):
     """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
-    if _all_finite(lanes.asked.reshape(-1)):
+    if _all_finite(borrow(lanes.asked, 0, (lanes.asked.size,))):
         return ACCEPTED
     for lane in range(lanes.scenario.shape[0]):
         if orders[lane] != FLY:
@@ -259,7 +282,7 @@ def _first_refused(pool, lanes, orders):
     return ACCEPTED
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def step_batch(
     pool, tables, worlds, lanes, orders, kind, weights, nonlinear, return_mode, safety_filter,
     autoreset, before, observation,

@@ -3,14 +3,34 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 from numba import typeof
+from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import first_not_finite, write_commands
-from uas_coverage_env.env.nearest import count_company
-from uas_coverage_env.env.observation import look
+from uas_coverage_env.env.actions import RANGES_DTYPE, first_not_finite, write_commands
+from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
+from uas_coverage_env.env.nearest import NEIGHBOURS_DTYPE, count_company
+from uas_coverage_env.env.observation import SCALES_DTYPE, look
 from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.kernels import inlined_kernel, kernel
-from uas_coverage_env.world import FLYING, Arena, WorldState, advance
+from uas_coverage_env.vehicle import N_STATES
+from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    FLYING,
+    OUTCOME_DTYPE,
+    Arena,
+    WorldState,
+    advance,
+)
+from uas_coverage_env.world.arena import (
+    MOVING_DTYPE,
+    OBSTACLE_DTYPE,
+    RULES_DTYPE,
+    UAS_DTYPE,
+    WAYPOINT_DTYPE,
+)
+from uas_coverage_env.world.borrow import lend
 
 ENERGY, CONTACT, CONTACT_WITH, STATUS, FILTERED, RETURNING, COVERED, REWARD = range(
     len(REWARD_TERMS), len(REWARD_TERMS) + 8
@@ -22,6 +42,8 @@ their order (Python's own `sum` rounds in another way since 3.12)."""
 REPORT_SIZE = REWARD + 1
 
 ACCEPTED = -1
+
+FLOAT, INT, BOOL = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.bool_)
 
 
 @inlined_kernel
@@ -100,39 +122,93 @@ def step_learners(
     return ACCEPTED
 
 
+N_SIZES = 8
+"""Numbers of UAS, obstacles, planes, moving obstacles, samples of their way, waypoints, corners of
+routes, and numbers of an action."""
+
+
 @kernel
 def step_episode(
-    vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
-    waypoints, rules, nodes_m, node_distance_m,
-    x, reference, status, departed, returning, uncovered, step,
-    kind, ranges, scales, neighbours, weights, nonlinear, return_mode, safety_filter,
-    asked, targets, candidates, company, commands, outcome, report, max_cycles, before, observation,
-):  # fmt: skip
-    """`step_learners` called from Python: arrays one by one cost less than two named tuples.
+    at, sizes, kind, nonlinear, return_mode, safety_filter, max_cycles, before, observation
+):
+    """`step_learners` called from Python.
 
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
+
+    Args:
+        at: Addresses of the arrays, see `addresses_of`: to hand over every array would take longer
+            than the flight of a UAS.
+        sizes: (N_SIZES,) what their shapes are made of.
+        kind: See `step_learners`, also the next three.
+        nonlinear: Whether.
+        return_mode: Whether.
+        safety_filter: Whether.
+        max_cycles: Steps after which the episode is cut.
+        before: (U, OBSERVATION_SIZE) float32, the observation of the step before.
+        observation: (U, OBSERVATION_SIZE) float32, another array; written.
     """
+    u = sizes[0]
+    o = sizes[1]
+    f = sizes[2]
+    m = sizes[3]
+    t = sizes[4]
+    w = sizes[5]
+    n = sizes[6]
     arena = Arena(
-        vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
-        waypoints, rules, nodes_m, node_distance_m,
+        lend(at[0], VEHICLE_DTYPE, (u,)), lend(at[1], UAS_DTYPE, (u,)),
+        lend(at[2], OBSTACLE_DTYPE, (o,)), lend(at[3], FLOAT, (f, 3)), lend(at[4], FLOAT, (f,)),
+        lend(at[5], MOVING_DTYPE, (m,)), lend(at[6], FLOAT, (t, m, 3)),
+        lend(at[7], FLOAT, (t, m, 3)), lend(at[8], WAYPOINT_DTYPE, (w,)),
+        lend(at[9], FLOAT, (5, w)), lend(at[10], RULES_DTYPE, (1,)), lend(at[11], FLOAT, (n, 2)),
+        lend(at[12], FLOAT, (w + u, n)),
     )  # fmt: skip
-    state = WorldState(x, reference, status, departed, returning, uncovered, step)
-    for i in range(status.shape[0]):
-        if status[i] != FLYING:
-            for k in range(before.shape[1]):
+    state = WorldState(
+        lend(at[13], FLOAT, (u, N_STATES)), lend(at[14], FLOAT, (u, 2)), lend(at[15], INT, (u,)),
+        lend(at[16], BOOL, (u,)), lend(at[17], BOOL, (u,)), lend(at[18], BOOL, (w,)),
+        lend(at[19], INT, (1,)),
+    )  # fmt: skip
+    for i in range(u):
+        if state.status[i] != FLYING:
+            for k in range(OBSERVATION_SIZE):
                 observation[i, k] = before[i, k]
     return step_learners(
-        arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode,
-        safety_filter, asked, targets, candidates, company, commands, outcome, report, max_cycles,
-        observation,
+        arena, state, kind, lend(at[20], RANGES_DTYPE, (u,)), lend(at[21], SCALES_DTYPE, (u,)),
+        lend(at[22], NEIGHBOURS_DTYPE, (w,)), lend(at[23], FLOAT, (len(REWARD_TERMS),)),
+        nonlinear, return_mode, safety_filter, lend(at[24], FLOAT, (u, sizes[7])),
+        lend(at[25], INT, (u,)), lend(at[26], INT, (u, K_WAYPOINTS)), lend(at[27], FLOAT, (w, 2)),
+        lend(at[28], COMMAND_DTYPE, (u,)), lend(at[29], OUTCOME_DTYPE, (u,)),
+        lend(at[30], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,
     )  # fmt: skip
+
+
+def addresses_of(
+    arena: Arena, state: WorldState, learners: Sequence[NDArray[Any]]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where the arrays of an episode lie; they have to stay there.
+
+    Args:
+        arena: The arena.
+        state: The state of the world.
+        learners: The arrays of `step_learners` in the order of its arguments: ranges, scales,
+            neighbours, weights, asked, targets, candidates, company, commands, outcome, report.
+
+    Returns:
+        Addresses and sizes, see `step_episode`.
+    """
+    arrays = (*arena, *state, *learners)
+    assert all(array.flags.c_contiguous for array in arrays)
+    asked = learners[4]
+    sizes = (
+        len(arena.uas), len(arena.obstacles), len(arena.normals), *arena.moving_path_m.shape[1::-1],
+        len(arena.waypoints), len(arena.nodes_m), asked.shape[1],
+    )  # fmt: skip
+    return np.array([array.ctypes.data for array in arrays]), np.array(sizes)
 
 
 def compiled_step(arguments: Sequence[Any]) -> Callable[..., int]:
-    """`step_episode` as machine code for arguments of these types.
+    """`step_episode` as machine code for arguments of these types, which the caller has to keep to.
 
-    Called directly, it spares numba's look at the type of each of its 37 arguments, a tenth of a
-    step. The caller has to keep to the types.
+    Called directly, it spares numba's look at the type of each argument.
     """
     if not hasattr(step_episode, "compile"):
         return step_episode  # NUMBA_DISABLE_JIT=1: a function like any other

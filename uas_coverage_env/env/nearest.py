@@ -103,10 +103,10 @@ def _holds(index, found, which):
 
 
 @inlined_kernel
-def _away_m2(waypoint, x, y, z):
-    dx = waypoint.position_m[0] - x
-    dy = waypoint.position_m[1] - y
-    dz = waypoint.position_m[2] - z
+def _away_m2(columns, w, x, y, z):
+    dx = columns[0, w] - x
+    dy = columns[1, w] - y
+    dz = columns[2, w] - z
     return dx * dx + dy * dy + dz * dz
 
 
@@ -119,28 +119,29 @@ def nearest_waypoints(arena, state, i, candidates):
         state: The state of the world.
         i: Index of the UAS.
         candidates: (K_WAYPOINTS,) indices of waypoints, -1 where there are no more; written.
-            What is in it, from the step before, hardly changes and is looked at first; anything
-            may be in it.
+            What is in it, from the step before, hardly changes and is looked at first; it may be
+            anything in which nothing is twice.
     """
     x = state.x[i, X]
     y = state.x[i, Y]
     z = state.x[i, Z]
+    columns = arena.waypoint_columns
     uncovered = state.uncovered
     n_waypoints = uncovered.shape[0]
     away_m2 = room(K_WAYPOINTS)
     found = 0
     for c in range(K_WAYPOINTS):
         w = candidates[c]
-        if 0 <= w < n_waypoints and uncovered[w] and not _holds(candidates, found, w):
-            m2 = _away_m2(arena.waypoints[w], x, y, z)
+        if 0 <= w < n_waypoints and uncovered[w]:
+            m2 = _away_m2(columns, w, x, y, z)
             found = _insert(candidates, away_m2, found, w, m2)
     limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
     near = 0
     for w in range(n_waypoints):
-        near += uncovered[w] and _away_m2(arena.waypoints[w], x, y, z) <= limit_m2
+        near += uncovered[w] & (_away_m2(columns, w, x, y, z) <= limit_m2)
     if near > found:
         for w in range(n_waypoints):
-            m2 = _away_m2(arena.waypoints[w], x, y, z)
+            m2 = _away_m2(columns, w, x, y, z)
             if uncovered[w] and m2 <= limit_m2 and not _holds(candidates, found, w):
                 found = _insert(candidates, away_m2, found, w, m2)
     for c in range(found, K_WAYPOINTS):
@@ -237,11 +238,12 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     below = room(K_WAYPOINTS)
     from_home = room(K_WAYPOINTS)
     margin = room(K_WAYPOINTS)
+    columns = arena.waypoint_columns
     for c in range(n):
-        position_m = arena.waypoints[candidates[c]].position_m
-        north_m[c] = position_m[0]
-        east_m[c] = position_m[1]
-        down_m[c] = position_m[2]
+        w = candidates[c]
+        north_m[c] = columns[0, w]
+        east_m[c] = columns[1, w]
+        down_m[c] = columns[2, w]
     _rivals(state, i, targets, candidates, n, north_m, east_m, down_m, rival_m, taken)
     for c in range(n):
         dx = north_m[c] - x
@@ -267,7 +269,7 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
         row[k + 2] = east[c]
         row[k + 3] = there[c]
         row[k + 4] = below[c]
-        row[k + 5] = within(arena.waypoints[w].weight * scale.per_heaviest, 0.0, 1.0)
+        row[k + 5] = within(columns[4, w] * scale.per_heaviest, 0.0, 1.0)
         row[k + 6] = company[w, 0]
         row[k + 7] = company[w, 1]
         row[k + 8] = rival_m[c]

@@ -194,14 +194,14 @@ def _remaining(arena, state, i, row, k):
         sectors[sector] = 0.0
     x = state.x[i, X]
     y = state.x[i, Y]
+    columns = arena.waypoint_columns
     weight = 0.0
     north_m = 0.0
     east_m = 0.0
     for w in range(state.uncovered.shape[0]):
-        waypoint = arena.waypoints[w]
-        open_weight = waypoint.weight if state.uncovered[w] else 0.0
-        dx = waypoint.position_m[0] - x
-        dy = waypoint.position_m[1] - y
+        open_weight = columns[4, w] if state.uncovered[w] else 0.0
+        dx = columns[0, w] - x
+        dy = columns[1, w] - y
         weight += open_weight
         north_m += open_weight * dx
         east_m += open_weight * dy

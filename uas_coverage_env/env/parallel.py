@@ -217,11 +217,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             self._refuse(actions)
         if not agents:
             return {}, {}, {}, {}, {}
-        accept, asked = episode.actions.accept, episode.asked_rows
+        accept, asked = episode.actions.accept, episode.asked
         for agent in agents:
             if agent not in actions:
                 self._refuse(actions)
-            accept(agent, actions[agent], asked[index[agent]])
+            accept(agent, actions[agent], asked, index[agent])
         report = episode.step()
 
         observation = episode.observation
@@ -258,8 +258,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Raises:
             ValueError: It could not; names agent and value.
         """
-        asked = np.zeros(self._episode.actions.size)
-        self._episode.actions.accept(agent, action, asked)
+        asked = np.zeros((1, self._episode.actions.size))
+        self._episode.actions.accept(agent, action, asked, 0)
         if not np.isfinite(asked).all():
             raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
 

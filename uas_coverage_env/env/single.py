@@ -139,8 +139,8 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             raise ResetNeeded("step() before reset(): call reset() first")
         episode = self._episode
         rows = episode.actions.joint_rows(action, len(episode.names))
-        for name, row, asked in zip(episode.names, rows, episode.asked_rows, strict=True):
-            episode.actions.accept(name, row, asked)
+        for i, (name, row) in enumerate(zip(episode.names, rows, strict=True)):
+            episode.actions.accept(name, row, episode.asked, i)
         report = episode.step()
         info = self._info(report)
         flies = any(row[STATUS] == FLYING for row in report)

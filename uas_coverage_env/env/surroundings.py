@@ -11,6 +11,7 @@ _BEYOND_M = RAY_M + 1e-6
 """A plane at this distance is out of reach of all rays, whatever is rounded [m]."""
 
 _DIAGONAL = math.sqrt(0.5)
+
 _RAYS = (
     (1.0, 0.0, 0.0),
     (_DIAGONAL, _DIAGONAL, 0.0),
@@ -24,18 +25,20 @@ _RAYS = (
     (0.0, 0.0, 1.0),
 )
 
+_WITHIN_BOX = 1.000001
+"""So many times as far from the middle of a box as its walls: inside, whatever is rounded."""
 
-@kernel
-def _farthest_face(normals, offsets_m, first, last, x, y, z):
-    """The face plane that a point is farthest out of, and how far [m]."""
-    farthest = first
+_N, _NE, _E, _SE, _S, _SW, _W, _NW, _UP, _DOWN = range(N_RAYS)
+
+
+@inlined_kernel
+def _farthest_out_m(normals, offsets_m, first, last, x, y, z):
+    """How far a point is out of the face plane that it is farthest out of [m]."""
     largest = -math.inf
     for h in range(first, last):
         d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
-        if d > largest:
-            largest = d
-            farthest = h
-    return farthest, largest
+        largest = max(largest, d)
+    return largest
 
 
 @kernel
@@ -43,24 +46,30 @@ def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
     """How far a ray goes before it enters a hull, at most free_m."""
     enters_m = 0.0
     leaves_m = free_m
+    misses = False
     for h in range(first, last):
+        # selections rather than branches: every face is another case
         d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
         slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
-        if d > 0.0:
-            if slope >= 0.0:
-                return free_m
-            enters_m = max(enters_m, -d / slope)
-        elif slope > 0.0:
-            leaves_m = min(leaves_m, -d / slope)
-        if enters_m >= leaves_m:
-            return free_m
-    return enters_m
+        at_m = -d / slope
+        outside = d > 0.0
+        misses |= outside & (slope >= 0.0)
+        enters_m = max(enters_m, at_m if outside & (slope < 0.0) else 0.0)
+        leaves_m = min(leaves_m, at_m if (not outside) & (slope > 0.0) else free_m)
+    return free_m if misses | (enters_m >= leaves_m) else enters_m
 
 
 @inlined_kernel
-def _rays_to_fence(normals, offsets_m, first, last, x, y, z, row, k):
+def _both_ways(inside_m, slope, free_m, ahead, behind):
+    """Shorten two opposite rays where a plane cuts them, inside_m away; slope is the first's."""
+    way_m = inside_m / abs(slope)
+    free_m[ahead] = min(free_m[ahead], way_m if slope > 0.0 else RAY_M)
+    free_m[behind] = min(free_m[behind], way_m if slope < 0.0 else RAY_M)
+
+
+@inlined_kernel
+def _rays_to_fence(normals, offsets_m, first, last, x, y, z, free_m):
     """Write how far the rays go before they leave the fence; returns how far away that is."""
-    free_m = room(N_RAYS)
     for ray in range(N_RAYS):
         free_m[ray] = RAY_M
     outermost = -math.inf
@@ -69,31 +78,119 @@ def _rays_to_fence(normals, offsets_m, first, last, x, y, z, row, k):
         outermost = max(outermost, d)
         if d < -_BEYOND_M:
             continue
-        for ray in range(N_RAYS):
-            dx, dy, dz = _RAYS[ray]
-            slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
-            if slope > 0.0:
-                free_m[ray] = min(free_m[ray], max(0.0, -d / slope))
-    for ray in range(N_RAYS):
-        row[k + ray] = free_m[ray]
+        inside_m = max(0.0, -d)
+        north = normals[h, 0]
+        east = normals[h, 1]
+        diagonal_north = north * _DIAGONAL
+        diagonal_east = east * _DIAGONAL
+        _both_ways(inside_m, north, free_m, _N, _S)
+        _both_ways(inside_m, diagonal_north + diagonal_east, free_m, _NE, _SW)
+        _both_ways(inside_m, east, free_m, _E, _W)
+        _both_ways(inside_m, diagonal_east - diagonal_north, free_m, _SE, _NW)
+        _both_ways(inside_m, normals[h, 2], free_m, _DOWN, _UP)
     return -outermost
 
 
+@kernel
+def _obstruct(
+    normals, offsets_m, first, last, x, y, z, along_m, half_m, dx, dy, dz, free_m, ahead, behind
+):
+    """Shorten two opposite rays at a hull.
+
+    Args:
+        normals: (F, 3) all planes.
+        offsets_m: (F,) [m].
+        first: First face of the hull.
+        last: The one after its last.
+        x: North of the UAS [m].
+        y: East of it [m].
+        z: Down of it [m].
+        along_m: How far ahead the middle of the box around the hull is [m].
+        half_m: How far the box reaches from there, ahead and back [m].
+        dx: The direction ahead, north.
+        dy: East.
+        dz: Down.
+        free_m: (N_RAYS,) [m] written.
+        ahead: Index of the ray in this direction.
+        behind: Index of the other.
+    """
+    if along_m + half_m >= 0.0 and along_m - half_m < free_m[ahead]:
+        free_m[ahead] = _ray_to_hull(
+            normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m[ahead]
+        )
+    if along_m - half_m <= 0.0 and -along_m - half_m < free_m[behind]:
+        free_m[behind] = _ray_to_hull(
+            normals, offsets_m, first, last, x, y, z, -dx, -dy, -dz, free_m[behind]
+        )
+
+
+@kernel
+def _rays_in_box(normals, offsets_m, first, last, x, y, z, free_m):
+    """Shorten all rays of a UAS that is inside the box around a hull.
+
+    Inside of the hull itself, where it is lost, a ray that leaves through the nearest face is free.
+    """
+    face = first
+    away_m = -math.inf
+    for h in range(first, last):
+        d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+        if d > away_m:
+            away_m = d
+            face = h
+    for ray in range(N_RAYS):
+        dx, dy, dz = _RAYS[ray]
+        slope = normals[face, 0] * dx + normals[face, 1] * dy + normals[face, 2] * dz
+        if away_m <= -slope * free_m[ray]:
+            free_m[ray] = _ray_to_hull(
+                normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m[ray]
+            )
+
+
 @inlined_kernel
-def _out_of_sight(obstacle, x, y, z):
-    """Whether the obstacle is surely farther than rays and clearance reach."""
-    # its box reaches near_m farther than the hull in every direction
-    beyond_m = max(0.0, RAY_M - obstacle.near_m)
-    lower = obstacle.lower_m
-    upper = obstacle.upper_m
-    return (
-        x < lower[0] - beyond_m
-        or x > upper[0] + beyond_m
-        or y < lower[1] - beyond_m
-        or y > upper[1] + beyond_m
-        or z < lower[2] - beyond_m
-        or z > upper[2] + beyond_m
-    )
+def _rays_to_obstacle(arena, o, x, y, z, free_m):
+    """Shorten the rays that meet an obstacle; most miss the box around it."""
+    normals = arena.normals
+    offsets_m = arena.offsets_m
+    obstacle = arena.obstacles[o]
+    first = obstacle.first_face
+    last = obstacle.last_face
+    half_north_m = obstacle.hull_half_m[0]
+    half_east_m = obstacle.hull_half_m[1]
+    north_m = obstacle.hull_middle_m[0] - x
+    east_m = obstacle.hull_middle_m[1] - y
+    down_m = obstacle.hull_middle_m[2] - z
+    half_both_m = half_north_m + half_east_m
+    level = abs(down_m) <= obstacle.hull_half_m[2]
+    along_north = abs(east_m) <= half_east_m
+    along_east = abs(north_m) <= half_north_m
+    if level & along_north & along_east:
+        _rays_in_box(normals, offsets_m, first, last, x, y, z, free_m)
+        return
+    if level & along_north:
+        _obstruct(
+            normals, offsets_m, first, last, x, y, z,
+            north_m, half_north_m, 1.0, 0.0, 0.0, free_m, _N, _S,
+        )  # fmt: skip
+    if level & along_east:
+        _obstruct(
+            normals, offsets_m, first, last, x, y, z,
+            east_m, half_east_m, 0.0, 1.0, 0.0, free_m, _E, _W,
+        )  # fmt: skip
+    if level & (abs(north_m - east_m) <= half_both_m):
+        _obstruct(
+            normals, offsets_m, first, last, x, y, z, (north_m + east_m) * _DIAGONAL,
+            half_both_m * _DIAGONAL, _DIAGONAL, _DIAGONAL, 0.0, free_m, _NE, _SW,
+        )  # fmt: skip
+    if level & (abs(north_m + east_m) <= half_both_m):
+        _obstruct(
+            normals, offsets_m, first, last, x, y, z, (east_m - north_m) * _DIAGONAL,
+            half_both_m * _DIAGONAL, -_DIAGONAL, _DIAGONAL, 0.0, free_m, _SE, _NW,
+        )  # fmt: skip
+    if along_north & along_east:
+        _obstruct(
+            normals, offsets_m, first, last, x, y, z,
+            down_m, obstacle.hull_half_m[2], 0.0, 0.0, 1.0, free_m, _DOWN, _UP,
+        )  # fmt: skip
 
 
 @inlined_kernel
@@ -105,30 +202,31 @@ def surroundings(arena, state, i, row, k):
     x = state.x[i, X]
     y = state.x[i, Y]
     z = state.x[i, Z]
+    free_m = room(N_RAYS)
     inside_m = _rays_to_fence(
-        normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z, row, k
+        normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z, free_m
     )
     clearance_m = HEIGHT_M
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
-        if _out_of_sight(obstacle, x, y, z):
-            continue
-        first = obstacle.first_face
-        last = obstacle.last_face
-        face, away_m = _farthest_face(normals, offsets_m, first, last, x, y, z)
-        clearance_m = min(clearance_m, away_m)
-        if away_m > _BEYOND_M:
-            continue
-        for ray in range(N_RAYS):
-            dx, dy, dz = _RAYS[ray]
-            slope = normals[face, 0] * dx + normals[face, 1] * dy + normals[face, 2] * dz
-            # most rays do not even reach the plane of this face
-            if away_m <= -slope * row[k + ray]:
-                row[k + ray] = _ray_to_hull(
-                    normals, offsets_m, first, last, x, y, z, dx, dy, dz, row[k + ray]
-                )
-    for ray in range(k, k + N_RAYS):
-        row[ray] = within(1.0 - row[ray] / RAY_M, 0.0, 1.0)
+        middle_m = obstacle.middle_m
+        per_half_m = obstacle.per_half_m
+        beyond = max(
+            abs(x - middle_m[0]) * per_half_m[0],
+            abs(y - middle_m[1]) * per_half_m[1],
+            abs(z - middle_m[2]) * per_half_m[2],
+        )
+        if beyond < _WITHIN_BOX:
+            clearance_m = min(
+                clearance_m,
+                _farthest_out_m(
+                    normals, offsets_m, obstacle.first_face, obstacle.last_face, x, y, z
+                ),
+            )
+        _rays_to_obstacle(arena, o, x, y, z, free_m)
+    for ray in range(N_RAYS):
+        row[k + ray] = free_m[ray]
+        row[k + ray] = within(1.0 - row[k + ray] / RAY_M, 0.0, 1.0)
     k += N_RAYS
     row[k] = within(clearance_m / HEIGHT_M, -1.0, 1.0)
     row[k + 1] = within((inside_m - rules.fence_margin_m) / HEIGHT_M, -1.0, 1.0)

@@ -12,6 +12,9 @@ from uas_coverage_env.vehicle.params import VehicleParams
 
 MAX_SEGMENTS = 8
 MAX_GOVERNOR_ROWS = 128
+GOVERNOR_BLOCK = 8
+"""So many governor rows are looked at together."""
+
 MAX_MOTORS = 32
 PHYSICAL_SIDES = 8
 """H_P, the sides of the polygons that stand for norms in the thrust correction."""
@@ -73,7 +76,8 @@ VEHICLE_DTYPE = np.dtype(
                 ("reference_max_mps", _f8),
                 ("gain", _f8, (3,)),
                 ("n_governor_rows", _i8),
-                ("governor_rows", _f8, (MAX_GOVERNOR_ROWS, 5)),
+                # row by row side by side, so that a processor takes several at a time; zero beyond
+                ("governor_rows", _f8, (5, MAX_GOVERNOR_ROWS)),
                 # nonlinear plant
                 ("n_motors", _i8),
                 # motor thrusts from (thrust, torques), and torques from each motor's thrust
@@ -164,7 +168,7 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
         raise ValueError(f"dt_s is {dt_s}; too short for the limits of {vehicle.name!r}")
     record["gain"] = gain
     record["n_governor_rows"] = len(rows)
-    record["governor_rows"][0, : len(rows)] = rows
+    record["governor_rows"][0, :, : len(rows)] = rows.T
     for name in (
         "n_motors",
         "drag_kgps",

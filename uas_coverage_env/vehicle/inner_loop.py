@@ -14,6 +14,7 @@ led far beyond the bounds, the UAS is levelled out first, with torques within th
 import math
 
 from uas_coverage_env.kernels import kernel
+from uas_coverage_env.vehicle.compiled import GOVERNOR_BLOCK
 from uas_coverage_env.vehicle.layout import (
     LIFT,
     PHI,
@@ -70,14 +71,16 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
     if abs(dn) + abs(de) < _TINY:
         return
     share = 1.0
+    rows = vehicle.governor_rows
     for q in range(vehicle.n_governor_rows):
-        row = vehicle.governor_rows[q]
         # tilt and rate forward along north are negative pitch and pitch rate
-        n0 = row[0] * x[VX] - row[1] * x[THETA] - row[2] * x[WY] + row[3] * reference[0]
-        e0 = row[0] * x[VY] + row[1] * x[PHI] + row[2] * x[WX] + row[3] * reference[1]
-        n1 = row[3] * dn
-        e1 = row[3] * de
-        bound = row[4] * row[4]
+        n0 = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
+        n0 += rows[3, q] * reference[0]
+        e0 = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
+        e0 += rows[3, q] * reference[1]
+        n1 = rows[3, q] * dn
+        e1 = rows[3, q] * de
+        bound = rows[4, q] * rows[4, q]
         n = n0 + share * n1
         e = e0 + share * e1
         if n * n + e * e > bound:
@@ -140,14 +143,18 @@ def _speed_towards(distance, speed, per_speed, per_next_speed, brake):
 @kernel
 def _far_outside(vehicle, x, reference):
     """Whether the state breaks a governor row by so much that the feedback would saturate."""
-    for q in range(vehicle.n_governor_rows):
-        row = vehicle.governor_rows[q]
-        n = row[0] * x[VX] - row[1] * x[THETA] - row[2] * x[WY] + row[3] * reference[0]
-        e = row[0] * x[VY] + row[1] * x[PHI] + row[2] * x[WX] + row[3] * reference[1]
-        bound = _FAR_OUTSIDE * row[4]
-        if n * n + e * e > bound * bound:
-            return True
-    return False
+    rows = vehicle.governor_rows
+    outside = False
+    for block in range(0, vehicle.n_governor_rows, GOVERNOR_BLOCK):
+        # all of a block: rows beyond the last are zero, and without branches it is done at once
+        for q in range(block, block + GOVERNOR_BLOCK):
+            n = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
+            n += rows[3, q] * reference[0]
+            e = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
+            e += rows[3, q] * reference[1]
+            bound = _FAR_OUTSIDE * rows[4, q]
+            outside |= n * n + e * e > bound * bound
+    return outside
 
 
 @kernel

@@ -55,6 +55,9 @@ OBSTACLE_DTYPE = _record(
         ("first_side", "i8"),
         ("last_side", "i8"),
         ("safe_distance_m", "f8"),
+        # the box around the hull, by its middle and half its sides
+        ("hull_middle_m", "f8", (3,)),
+        ("hull_half_m", "f8", (3,)),
         # outside of this box every point is at least near_m away
         ("near_m", "f8"),
         ("lower_m", "f8", (3,)),
@@ -124,6 +127,9 @@ class Arena(NamedTuple):
     """(T+1, M, 3) [m/s] velocities at every sample."""
     waypoints: NDArray[np.void]
     """(W,) of WAYPOINT_DTYPE."""
+    waypoint_columns: NDArray[np.float64]
+    """(5, W) north, east, down [m], radius² [m²] and weight: what all waypoints are asked for, in
+    the order in which a processor takes four at a time."""
     rules: NDArray[np.void]
     """(1,) of RULES_DTYPE."""
     nodes_m: NDArray[np.float64]
@@ -166,6 +172,7 @@ def build_arena(scenario: Scenario) -> Arena:
         moving_path_m=moving_path_m,
         moving_velocity_mps=moving_velocity_mps,
         waypoints=waypoints,
+        waypoint_columns=_columns(waypoints),
         rules=rules,
         nodes_m=nodes_m,
         node_distance_m=node_distances(
@@ -195,6 +202,12 @@ def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
 def _waypoints(scenario: Scenario) -> NDArray[np.void]:
     rows = [(w.position_m, w.radius_m, w.weight) for w in scenario.waypoints]
     return np.array(rows, dtype=WAYPOINT_DTYPE)
+
+
+def _columns(waypoints: NDArray[np.void]) -> NDArray[np.float64]:
+    reach_m2 = waypoints["radius_m"] * waypoints["radius_m"]
+    rows = [*waypoints["position_m"].T, reach_m2, waypoints["weight"]]
+    return np.array(rows, dtype=np.float64, order="C")
 
 
 def _uas(scenario: Scenario) -> NDArray[np.void]:
@@ -293,6 +306,9 @@ def _obstacles(
         sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
         planes.append((hull.normals, hull.offsets_m))
         planes.append((sides, footprint.equations[:, 2]))
+        low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
+        record["hull_middle_m"] = (low_m + high_m) / 2
+        record["hull_half_m"] = (high_m - low_m) / 2 + 1e-6
         near = _widened(hull, near_m)
         record["first_face"] = first
         record["last_face"] = record["first_side"] = first + hull.n_faces

@@ -6,13 +6,15 @@ nothing: whoever makes one keeps the array alive for as long, as the arguments o
 They must not leave compiled code.
 """
 
+import ctypes
 import math
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
@@ -28,45 +30,82 @@ def borrow(array: NDArray, row: int, shape: tuple[int, ...]) -> Any:
     return array[row:].reshape(-1)[: math.prod(shape)].reshape(shape)
 
 
-@intrinsic
-def _borrow(typing_context, array, row, shape):
-    view = types.Array(
-        array.dtype, len(shape), "C", readonly=not array.mutable, aligned=array.aligned
+def lend(address: int, dtype: np.dtype, shape: tuple[int, ...]) -> Any:
+    """The C-contiguous array that lies at an address, for as long as its owner keeps it.
+
+    Args:
+        address: Of its first element.
+        dtype: Of its elements; a constant.
+        shape: Its shape.
+    """
+    n_bytes = int(math.prod(shape)) * dtype.itemsize
+    memory = memoryview((ctypes.c_char * n_bytes).from_address(int(address)))
+    return np.ndarray(shape, dtype, memory)
+
+
+def _view(builder, context, view_type, start, shape, itemsize):
+    """An array that owns nothing, of the sizes `shape`, at a pointer."""
+    strides = [itemsize]
+    for size in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], size))
+    part = make_array(view_type)(context, builder)
+    populate_array(
+        part,
+        data=start,
+        shape=shape,
+        strides=strides,
+        itemsize=itemsize,
+        meminfo=None,
+        parent=None,
     )
+    return part._getvalue()
 
-    def generate(context, builder, signature, arguments):
-        array_type, row_type, shape_type = signature.args
-        whole = make_array(array_type)(context, builder, arguments[0])
-        row_bytes = cgutils.unpack_tuple(builder, whole.strides)[0]
-        first = builder.mul(context.cast(builder, arguments[1], row_type, types.intp), row_bytes)
-        start = builder.gep(builder.bitcast(whole.data, ir.IntType(8).as_pointer()), [first])
-        sizes = [
-            context.cast(builder, size, size_type, types.intp)
-            for size, size_type in zip(
-                cgutils.unpack_tuple(builder, arguments[2]), shape_type, strict=True
-            )
-        ]
-        strides = [whole.itemsize]
-        for size in reversed(sizes[1:]):
-            strides.insert(0, builder.mul(strides[0], size))
-        part = make_array(signature.return_type)(context, builder)
-        populate_array(
-            part,
-            data=builder.bitcast(start, whole.data.type),
-            shape=sizes,
-            strides=strides,
-            itemsize=whole.itemsize,
-            meminfo=None,
-            parent=None,
+
+def _sizes(builder, context, shape, shape_type):
+    return [
+        context.cast(builder, size, size_type, types.intp)
+        for size, size_type in zip(cgutils.unpack_tuple(builder, shape), shape_type, strict=True)
+    ]
+
+
+@type_callable(borrow)
+def _type_of_borrowed(context):
+    def typer(array, row, shape):
+        if not isinstance(array, types.Array) or array.layout != "C":
+            return None
+        return types.Array(
+            array.dtype, len(shape), "C", readonly=not array.mutable, aligned=array.aligned
         )
-        return part._getvalue()
 
-    return view(array, row, shape), generate
+    return typer
 
 
-@overload(borrow)
-def _compiled_borrow(array, row, shape):
-    if isinstance(array, types.Array) and array.layout == "C":
-        # the typing context is numba's own argument
-        return lambda array, row, shape: _borrow(array, row, shape)  # pyright: ignore
-    return None
+@lower_builtin(borrow, types.Array, types.Integer, types.BaseTuple)
+def _borrowed(context, builder, signature, arguments):
+    array_type, row_type, shape_type = signature.args
+    whole = make_array(array_type)(context, builder, arguments[0])
+    row_bytes = cgutils.unpack_tuple(builder, whole.strides)[0]
+    first = builder.mul(context.cast(builder, arguments[1], row_type, types.intp), row_bytes)
+    start = builder.gep(builder.bitcast(whole.data, ir.IntType(8).as_pointer()), [first])
+    sizes = _sizes(builder, context, arguments[2], shape_type)
+    start = builder.bitcast(start, whole.data.type)
+    return _view(builder, context, signature.return_type, start, sizes, whole.itemsize)
+
+
+@type_callable(lend)
+def _type_of_lent(context):
+    def typer(address, dtype, shape):
+        return types.Array(dtype.dtype, len(shape), "C")
+
+    return typer
+
+
+@lower_builtin(lend, types.Integer, types.DType, types.BaseTuple)
+def _lent(context, builder, signature, arguments):
+    address_type, dtype_type, shape_type = signature.args
+    element = context.get_data_type(dtype_type.dtype)
+    number = context.cast(builder, arguments[0], address_type, types.intp)
+    start = builder.inttoptr(number, element.as_pointer())
+    itemsize = context.get_constant(types.intp, context.get_abi_sizeof(element))
+    sizes = _sizes(builder, context, arguments[2], shape_type)
+    return _view(builder, context, signature.return_type, start, sizes, itemsize)

@@ -9,6 +9,15 @@ from uas_coverage_env.world.state import FLYING, LANDED
 
 
 @inlined_kernel
+def _reaches(columns, w, x, y, z):
+    """Whether a place is within the radius of a waypoint."""
+    dx = x - columns[0, w]
+    dy = y - columns[1, w]
+    dz = z - columns[2, w]
+    return dx * dx + dy * dy + dz * dz <= columns[3, w]
+
+
+@inlined_kernel
 def cover(arena, state, outcome):
     """Cover the waypoints within reach of a flying UAS at its position now.
 
@@ -22,16 +31,17 @@ def cover(arena, state, outcome):
         x = state.x[i, X]
         y = state.x[i, Y]
         z = state.x[i, Z]
+        columns = arena.waypoint_columns
+        within = 0
         for w in range(state.uncovered.shape[0]):
-            waypoint = arena.waypoints[w]
-            dx = x - waypoint.position_m[0]
-            dy = y - waypoint.position_m[1]
-            dz = z - waypoint.position_m[2]
-            within = dx * dx + dy * dy + dz * dz <= waypoint.radius_m * waypoint.radius_m
-            if within and state.uncovered[w]:
+            within += _reaches(columns, w, x, y, z) & state.uncovered[w]
+        if within == 0:
+            continue
+        for w in range(state.uncovered.shape[0]):
+            if _reaches(columns, w, x, y, z) & state.uncovered[w]:
                 state.uncovered[w] = False
                 event.newly_covered += 1
-                event.newly_covered_weight += waypoint.weight
+                event.newly_covered_weight += columns[4, w]
 
 
 @inlined_kernel

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from uas_coverage_env.kernels import inlined_kernel, lending_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.borrow import borrow
@@ -40,6 +40,8 @@ class ArenaPool(NamedTuple):
     moving_velocity_mps: NDArray[np.float64]
     """Flat."""
     waypoints: NDArray[np.void]
+    waypoint_columns: NDArray[np.float64]
+    """Flat."""
     rules: NDArray[np.void]
     nodes_m: NDArray[np.float64]
     node_distance_m: NDArray[np.float64]
@@ -52,7 +54,7 @@ class ArenaPool(NamedTuple):
     """(S,) of SPANS_DTYPE."""
 
 
-_FLAT = ("moving_path_m", "moving_velocity_mps", "node_distance_m")
+_FLAT = ("waypoint_columns", "moving_path_m", "moving_velocity_mps", "node_distance_m")
 
 
 def end_to_end(blocks: Sequence[NDArray]) -> tuple[NDArray, NDArray[np.int64]]:
@@ -113,7 +115,7 @@ def pool_arenas(scenarios: Sequence[Scenario]) -> ArenaPool:
     return ArenaPool(**arrays, spans=spans)
 
 
-@njit(cache=True, error_model="numpy")
+@lending_kernel
 def arena_of(pool, s):
     """The arena of scenario s, in a kernel: borrowed views into the arrays of the pool.
 
@@ -138,13 +140,14 @@ def arena_of(pool, s):
         borrow(pool.moving_path_m, at.moving_path_m[0], path_shape),
         borrow(pool.moving_velocity_mps, at.moving_velocity_mps[0], path_shape),
         borrow(pool.waypoints, at.waypoints[0], (n_waypoints,)),
+        borrow(pool.waypoint_columns, at.waypoint_columns[0], (5, n_waypoints)),
         borrow(pool.rules, at.rules[0], (1,)),
         borrow(pool.nodes_m, at.nodes_m[0], (n_nodes, 2)),
         borrow(pool.node_distance_m, at.node_distance_m[0], (n_waypoints + n_uas, n_nodes)),
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def begin(pool, s, state):
     """Put a world of scenario s at t = 0.
 
@@ -154,12 +157,16 @@ def begin(pool, s, state):
         state: `WorldState` with as many UAS and waypoints as the scenario; written.
     """
     at = pool.spans[s]
-    state.x[:] = pool.start_x[at.start_x[0] : at.start_x[1]]
-    state.reference[:] = 0.0
-    state.status[:] = FLYING
-    state.departed[:] = False
-    state.returning[:] = False
-    state.uncovered[:] = pool.start_uncovered[at.start_uncovered[0] : at.start_uncovered[1]]
+    for i in range(state.status.shape[0]):
+        for k in range(state.x.shape[1]):
+            state.x[i, k] = pool.start_x[at.start_x[0] + i, k]
+        state.reference[i, 0] = 0.0
+        state.reference[i, 1] = 0.0
+        state.status[i] = FLYING
+        state.departed[i] = False
+        state.returning[i] = False
+    for w in range(state.uncovered.shape[0]):
+        state.uncovered[w] = pool.start_uncovered[at.start_uncovered[0] + w]
     state.step[0] = 0
 
 
@@ -186,7 +193,7 @@ def lanes_of(n_lanes: int, pool: ArenaPool) -> WorldState:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@lending_kernel
 def state_of(lanes, lane, n_uas, n_waypoints):
     """The state of one lane, of the size of its scenario, in a kernel: borrowed views."""
     return WorldState(

@@ -184,7 +184,7 @@ def begin_mission(arena, state, outcome):
 @kernel
 def step_world(
     vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
-    waypoints, rules, nodes_m, node_distance_m,
+    waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
     x, reference, status, departed, returning, uncovered, step,
     commands, nonlinear, return_mode, safety_filter, outcome,
 ):  # fmt: skip
@@ -195,7 +195,7 @@ def step_world(
     """
     arena = Arena(
         vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
-        waypoints, rules, nodes_m, node_distance_m,
+        waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
     )  # fmt: skip
     state = WorldState(x, reference, status, departed, returning, uncovered, step)
     invalid = first_invalid(arena, state, commands)
