@@ -47,6 +47,8 @@ def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference:
         energy.axvline(100.0, color=shade(colours.FAINT), linewidth=0.8, linestyle=":", zorder=1)
         coverage.set_yticks(range(len(scores)), [_short(one.player) for one in scores])
         coverage.set_ylim(len(scores) - 0.5, -0.5)
+        worst = min(one.worst_coverage_percent for one in scores)
+        coverage.set_xlim(min(worst, 90.0) - 2.0, 102.0)
         coverage.set_xlabel("Waypoints covered, %")
         energy.set_xlabel(f"Energy, % of {_short(reference)}")
         for axes in (coverage, energy):
