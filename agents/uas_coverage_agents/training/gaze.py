@@ -9,6 +9,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import nn
 
 from uas_coverage_agents.policy.gaze import Gaze
+from uas_coverage_agents.training.actor_critic import ActorCritic
 from uas_coverage_env.env import observation_columns
 from uas_coverage_env.env.layout import HEIGHT_M
 
@@ -64,31 +65,6 @@ class Actor(nn.Module):
         return torch.cat([h, a, own], 1)
 
 
-class ActorCritic(nn.Module):
-    """Both, with nothing in common, in the place where SB3 has its layers."""
-
-    def __init__(self, gaze: Gaze) -> None:
-        super().__init__()
-        self.actor = Actor(gaze)
-        self.critic = nn.Sequential(
-            nn.Linear(gaze.inputs, _CRITIC), nn.Tanh(), nn.Linear(_CRITIC, _CRITIC), nn.Tanh()
-        )
-        self.latent_dim_pi = gaze.last
-        self.latent_dim_vf = _CRITIC
-
-    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Both."""
-        return self.actor(x), self.critic(x)
-
-    def forward_actor(self, x: torch.Tensor) -> torch.Tensor:
-        """What the action is a linear function of."""
-        return self.actor(x)
-
-    def forward_critic(self, x: torch.Tensor) -> torch.Tensor:
-        """What the value is a linear function of."""
-        return self.critic(x)
-
-
 class GazePolicy(ActorCriticPolicy):
     """Flies with a gaze network; before training, straight to the nearest open waypoint.
 
@@ -103,7 +79,14 @@ class GazePolicy(ActorCriticPolicy):
         super().__init__(*args, **{"ortho_init": False, **kwargs})
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = ActorCritic(self.gaze)  # pyright: ignore[reportAttributeAccessIssue]
+        gaze = self.gaze
+        # the actor first: the order in which weights are drawn is part of what a seed means
+        actor = Actor(gaze)
+        critic = nn.Sequential(
+            nn.Linear(gaze.inputs, _CRITIC), nn.Tanh(), nn.Linear(_CRITIC, _CRITIC), nn.Tanh()
+        )
+        both: Any = ActorCritic(actor, gaze.last, critic, _CRITIC)
+        self.mlp_extractor = both
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)

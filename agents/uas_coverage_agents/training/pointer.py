@@ -9,6 +9,7 @@ from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
 from torch import nn
 
 from uas_coverage_agents.policy.pointer import HOME_AT_FIRST, Pointer
+from uas_coverage_agents.training.actor_critic import ActorCritic
 from uas_coverage_agents.waypoint.layout import TEAM
 
 _OUTLOOK = [
@@ -84,29 +85,6 @@ class Critic(nn.Module):
         return torch.cat([torch.relu(self.out(t)), x[:, _OUTLOOK]], 1)
 
 
-class ActorCritic(nn.Module):
-    """Both, with nothing in common, in the place where SB3 has its layers."""
-
-    def __init__(self, pointer: Pointer) -> None:
-        super().__init__()
-        self.actor = Actor(pointer)
-        self.critic = Critic(pointer)
-        self.latent_dim_pi = pointer.outputs
-        self.latent_dim_vf = pointer.hidden + len(_OUTLOOK)
-
-    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Both."""
-        return self.actor(x), self.critic(x)
-
-    def forward_actor(self, x: torch.Tensor) -> torch.Tensor:
-        """The scores."""
-        return self.actor(x)
-
-    def forward_critic(self, x: torch.Tensor) -> torch.Tensor:
-        """What the value is a linear function of."""
-        return self.critic(x)
-
-
 class PointerPolicy(MaskableActorCriticPolicy):
     """Chooses by the scores of a pointer network.
 
@@ -121,7 +99,10 @@ class PointerPolicy(MaskableActorCriticPolicy):
         super().__init__(*args, **{"ortho_init": False, **kwargs})
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = ActorCritic(self.pointer)  # pyright: ignore[reportAttributeAccessIssue]
+        pointer = self.pointer
+        critic_width = pointer.hidden + len(_OUTLOOK)
+        both: Any = ActorCritic(Actor(pointer), pointer.outputs, Critic(pointer), critic_width)
+        self.mlp_extractor = both
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
