@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-from learners import COVERAGE, ENERGY, FILTERED, HOME, STEPS, VIOLATIONS, machine, put, shown
+from learners import MEASURED, machine, measured_cells, put
 from numpy.typing import NDArray
 from uas_coverage_agents.training.scenarios import VALIDATION, town
 from uas_coverage_agents.training.score import measured
@@ -28,10 +28,7 @@ PLAYERS: dict[str, dict[str, str]] = {
     "learned-waypoint": {"simulations": "0"},
     "learned-velocity": {},
 }
-HEAD = (
-    "UAS", "planner", "covered, %", "all home, %", "violations per mission",
-    "filter changed, % of commands", "energy, Wh", "steps", "Δ energy, %", "Δ steps, %",
-)  # fmt: skip
+HEAD = ("UAS", "planner", *MEASURED)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -40,8 +37,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--fleets", default="1,2,4,8", help="numbers of UAS; default 1,2,4,8")
     parser.add_argument("--missions", type=int, default=20, help="towns for each")
     arguments = parser.parse_args(argv)
-    fleets = [int(number) for number in arguments.fleets.split(",")]
-    if not 1 <= arguments.missions <= 100 or not all(1 <= n_uas <= 64 for n_uas in fleets):
+    numbers = arguments.fleets.split(",")
+    fleets = [int(number) for number in numbers if number.isdecimal()]
+    fits = len(fleets) == len(numbers) and all(1 <= n_uas <= 64 for n_uas in fleets)
+    if not 1 <= arguments.missions <= 100 or not fits:
         parser.error("--missions: 1 to 100; --fleets: 1 to 64 each")
     lines = [
         f"`python benchmarks/fleets.py --fleets {arguments.fleets} "
@@ -74,20 +73,8 @@ def flown(name: str, towns: Sequence[Scenario]) -> NDArray[np.float64]:
 
 def row(n_uas: int, name: str, result: NDArray[np.float64], reference: NDArray[np.float64]) -> str:
     """A line of the table."""
-    cells = [
-        str(n_uas),
-        f"`{name}`",
-        shown(100 * result[:, COVERAGE], 2),
-        shown(100 * result[:, HOME], 1),
-        shown(result[:, VIOLATIONS], 2),
-        shown(100 * result[:, FILTERED], 1),
-        shown(result[:, ENERGY], 2),
-        shown(result[:, STEPS], 1),
-    ]
-    for measure in (ENERGY, STEPS):
-        apart = (result - reference)[:, measure] / reference[:, measure].mean()
-        cells.append("" if name == REFERENCE else shown(100 * apart, 1))
-    return f"| {' | '.join(cells)} |"
+    others = None if name == REFERENCE else reference
+    return f"| {' | '.join([str(n_uas), f'`{name}`', *measured_cells(result, others)])} |"
 
 
 if __name__ == "__main__":

@@ -39,6 +39,10 @@ README = ROOT / "agents" / "README.md"
 PICTURES = ROOT / "docs" / "pictures"
 SHIPPED = ROOT / "agents" / "uas_coverage_agents" / "shipped"
 COVERAGE, HOME, VIOLATIONS, ENERGY, STEPS, FILTERED = range(len(MEASURES))
+MEASURED = (
+    "covered, %", "all home, %", "violations per mission", "filter changed, % of commands",
+    "energy, Wh", "steps", "Δ energy, %", "Δ steps, %",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,10 +163,7 @@ def report(
 
 def table_head() -> str:
     """The first two lines of a table."""
-    names = (
-        "policy", "training", "covered, %", "all home, %", "violations per mission",
-        "filter changed, % of commands", "energy, Wh", "steps", "Δ energy, %", "Δ steps, %",
-    )  # fmt: skip
+    names = ("policy", "training", *MEASURED)
     return f"| {' | '.join(names)} |\n|---|---|{'---:|' * (len(names) - 2)}"
 
 
@@ -172,12 +173,17 @@ def table_row(
     result: NDArray[np.float64],
     reference: NDArray[np.float64] | None,
 ) -> str:
-    """Means with 95 % intervals; differences to the reference are paired, town by town.
+    """A policy, or a planner that was not trained."""
+    training = "" if policy is None else training_of(policy)
+    return f"| {' | '.join([name, training, *measured_cells(result, reference)])} |"
+
+
+def measured_cells(result: NDArray[np.float64], reference: NDArray[np.float64] | None) -> list[str]:
+    """Means with 95 % intervals, under `MEASURED`; differences are paired, town by town.
 
     Who is lost saves energy: where there were violations, there is no difference.
     """
-    cells = [name, "" if policy is None else training_of(policy)]
-    cells += [
+    cells = [
         shown(100 * result[:, COVERAGE], 2),
         shown(100 * result[:, HOME], 1),
         shown(result[:, VIOLATIONS], 2),
@@ -191,7 +197,7 @@ def table_row(
         else:
             apart = (result - reference)[:, measure] / reference[:, measure].mean()
             cells.append(shown(100 * apart, 1))
-    return f"| {' | '.join(cells)} |"
+    return cells
 
 
 def shown(values: NDArray[np.float64], digits: int) -> str:
