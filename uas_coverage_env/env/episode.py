@@ -120,24 +120,27 @@ class Episode:
         self._settings += (bool(return_mode), bool(safety_filter))
         self._prepare()
 
-    def _prepare(self) -> None:
-        addresses = addresses_of(
-            self._world.arena,
-            self._world.state,
-            (
-                self.actions.ranges,
-                self._scales,
-                self._neighbours,
-                self._weights,
-                self.asked,
-                self._targets,
-                self._candidates,
-                self._company,
-                self._commands,
-                self._outcome,
-                self._report,
-            ),
+    @property
+    def _fixed(self) -> tuple[NDArray[Any], ...]:
+        """The first arrays of a learners' step, which nothing writes."""
+        return self.actions.ranges, self._scales, self._neighbours, self._weights
+
+    @property
+    def _changing(self) -> tuple[NDArray[Any], ...]:
+        """The arrays of a learners' step after them, but for the observation."""
+        return (
+            self.asked,
+            self._targets,
+            self._candidates,
+            self._company,
+            self._commands,
+            self._outcome,
+            self._report,
         )
+
+    def _prepare(self) -> None:
+        arrays = (*self._fixed, *self._changing)
+        addresses = addresses_of(self._world.arena, self._world.state, arrays)
         # what the kernel is given in every step: the arrays are written in place
         self._given = (*addresses, *self._settings)
         look = self.observation
@@ -224,7 +227,7 @@ class Episode:
         world = self._world
         return (
             world.arena,
-            (self.actions.ranges, self._scales, self._neighbours, self._weights),
+            self._fixed,
             (
                 world.state.x,
                 world.state.uncovered,
@@ -234,13 +237,7 @@ class Episode:
             ),
             (
                 *world.state,
-                self.asked,
-                self._targets,
-                self._candidates,
-                self._company,
-                self._commands,
-                self._outcome,
-                self._report,
+                *self._changing,
                 self.observation,
             ),
         )
