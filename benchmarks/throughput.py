@@ -42,7 +42,7 @@ SYNC_ENVS = 64
 
 DEFAULT_CACHE = Path(typer.get_app_dir("uas-coverage")) / "peers"
 
-console = Console(width=130)
+console = Console(width=160)
 
 
 @dataclass
@@ -55,6 +55,7 @@ class Case:
         threads: How many it may use.
         peer: The library; None: ours.
         rates: Agent-steps per second, turn by turn.
+        row_rates: Rows per second: also those of UAS that are lost or home.
         peak_mb: Largest memory of its process so far [MB].
     """
 
@@ -63,6 +64,7 @@ class Case:
     threads: int
     peer: str | None = None
     rates: list[float] = field(default_factory=list)
+    row_rates: list[float] = field(default_factory=list)
     peak_mb: float = 0.0
 
 
@@ -105,6 +107,7 @@ class Player:
         self._process.stdin.flush()
         answer = self.answer()
         self.case.rates.append(answer["agent_steps"] / answer[f"{clock}_s"])
+        self.case.row_rates.append(answer["rows"] / answer[f"{clock}_s"])
         self.case.peak_mb = answer["peak_mb"]
 
     def close(self) -> None:
@@ -184,6 +187,7 @@ def measure(
                 # the first turn is not kept: it finds how many steps a turn has
                 player.play(seconds / 2, clock)
                 case.rates.clear()
+                case.row_rates.clear()
             except CaseFailedError as error:
                 failed.append((case, str(error)))
         alive = [player for player in players if player.case not in (case for case, _ in failed)]
@@ -200,12 +204,25 @@ def _spread(values: list[float], shown: str) -> str:
     return f"{middle} [{format(min(values), shown)} .. {format(max(values), shown)}]"
 
 
-def ratios(case: Case, cases: list[Case]) -> dict[str, list[float]]:
-    """How many times as fast as each peer of its group one of ours is, turn by turn."""
+def _thousands(rates: list[float]) -> str:
+    return _spread([rate / 1e3 for rate in rates], ",.0f")
+
+
+def ratios(case: Case, cases: list[Case], counted: str = "rates") -> dict[str, list[float]]:
+    """How many times as fast as each peer of its group one of ours is, turn by turn.
+
+    Args:
+        case: Ours.
+        cases: All.
+        counted: "rates" or "row_rates".
+    """
     if case.peer is not None:
         return {}
     return {
-        other.peer: [ours / theirs for ours, theirs in zip(case.rates, other.rates, strict=True)]
+        other.peer: [
+            ours / theirs
+            for ours, theirs in zip(getattr(case, counted), getattr(other, counted), strict=True)
+        ]
         for other in cases
         if other.peer is not None
         and other.rates
@@ -214,18 +231,24 @@ def ratios(case: Case, cases: list[Case]) -> dict[str, list[float]]:
     }
 
 
+def _beside(case: Case, cases: list[Case], counted: str) -> str:
+    lines = ratios(case, cases, counted).items()
+    return "\n".join(f"{peer}: {_spread(values, '.2f')}" for peer, values in lines)
+
+
 def table_of(cases: list[Case]) -> Table:
     """One row for each case."""
-    table = Table("environment", "envs", "threads", "1000 agent-steps/s", "times a peer", "peak MB")
+    table = Table("environment", "envs", "threads", "1000 agent-steps/s", "1000 rows/s")
+    table.add_column("times a peer: agent-steps")
+    table.add_column("rows")
+    table.add_column("peak MB")
     for case in cases:
         if not case.rates:
             continue
-        beside = "\n".join(
-            f"{peer}: {_spread(values, '.2f')}" for peer, values in ratios(case, cases).items()
-        )
-        rates = [rate / 1e3 for rate in case.rates]
         table.add_row(
-            case.name, str(case.num_envs), str(case.threads), _spread(rates, ",.0f"), beside,
+            case.name, str(case.num_envs), str(case.threads),
+            _thousands(case.rates), _thousands(case.row_rates),
+            *(_beside(case, cases, counted) for counted in ("rates", "row_rates")),
             f"{case.peak_mb:.0f}",
         )  # fmt: skip
     return table
@@ -274,7 +297,12 @@ def main(
         console.print(f"failed: {why}", markup=False)
     if json_file is not None:
         rows = [
-            {**asdict(case), "clock": clock, "ratios": ratios(case, cases)}
+            {
+                **asdict(case),
+                "clock": clock,
+                "ratios": ratios(case, cases),
+                "row_ratios": ratios(case, cases, "row_rates"),
+            }
             for case in cases
             if case.rates
         ]

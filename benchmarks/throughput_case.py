@@ -4,9 +4,11 @@
 
 It makes the environment, says so on standard output with a line of JSON, and then obeys lines on
 standard input: for "5.0" it steps for about five seconds with random actions, drawn beforehand,
-restarts included, and answers with another line: agent-steps, seconds of the wall clock and of the
-processor, peak memory in MB. An agent-step is a step of an agent that acts: one that is lost or
-home does not count. `throughput.py` starts these programs; they know nothing of each other.
+restarts included, and answers with another line: agent-steps, rows, seconds of the wall clock and
+of the processor, peak memory in MB. An agent-step is a step of an agent that acts: one that is lost
+or home does not count. Rows are what arrays of agents hold, whatever the agents do: what libraries
+count whose agents always act. `throughput.py` starts these programs; they know nothing of each
+other.
 """
 
 import json
@@ -21,8 +23,8 @@ N_DRAWN = 32
 N_ON_GPU = 4
 N_AGENTS = 2
 
-Steps = Callable[[int], Callable[[], float]]
-"""Steps so many times; what it returns counts the agent-steps, when the clock has stopped."""
+Steps = Callable[[int], Callable[[], tuple[float, float]]]
+"""Steps so many times; what it returns counts agent-steps and rows, when the clock has stopped."""
 
 
 def use_threads(threads: int) -> None:
@@ -47,7 +49,7 @@ def _parallel(env: Any) -> Steps:
         for _ in range(N_DRAWN)
     ]
 
-    def steps(n_steps: int) -> Callable[[], float]:
+    def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
         acted = 0
         for step in range(n_steps):
             actions, agents = drawn[step % N_DRAWN], env.agents
@@ -57,7 +59,7 @@ def _parallel(env: Any) -> Steps:
             env.step(actions)
             if not env.agents:
                 env.reset()
-        return lambda: acted
+        return lambda: (acted, acted)
 
     return steps
 
@@ -74,13 +76,13 @@ def _vector(env: Any, count: Callable[[dict[str, Any]], float]) -> Steps:
     env.action_space.seed(0)
     drawn = [env.action_space.sample() for _ in range(N_DRAWN)]
 
-    def steps(n_steps: int) -> Callable[[], float]:
+    def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
         nonlocal latest
         infos = []
         for step in range(n_steps):
             infos.append(latest)
             latest = env.step(drawn[step % N_DRAWN])[4]
-        return lambda: sum(map(count, infos))
+        return lambda: (sum(map(count, infos)), n_steps * env.num_envs * N_AGENTS)
 
     return steps
 
@@ -127,12 +129,15 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
         cuda.to_device(rng.uniform(-1, 1, flown.missions.asked.shape)) for _ in range(N_ON_GPU)
     ]
 
-    def steps(n_steps: int) -> Callable[[], float]:
+    def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
         before = int(flown.missions.acted.copy_to_host().sum())
         for step in range(n_steps):
             flown.step(drawn[step % N_ON_GPU])
         cuda.synchronize()
-        return lambda: int(flown.missions.acted.copy_to_host().sum()) - before
+        return lambda: (
+            int(flown.missions.acted.copy_to_host().sum()) - before,
+            n_steps * num_envs * N_AGENTS,
+        )
 
     return steps
 
@@ -158,7 +163,7 @@ def _vmas(num_envs: int, threads: int) -> Steps:
     drawn = [[env.get_random_action(agent) for agent in env.agents] for _ in range(N_DRAWN)]
     since_reset = 0
 
-    def steps(n_steps: int) -> Callable[[], float]:
+    def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
         nonlocal since_reset
         for step in range(n_steps):
             env.step(drawn[step % N_DRAWN])
@@ -166,7 +171,8 @@ def _vmas(num_envs: int, threads: int) -> Steps:
             if since_reset == 100:
                 env.reset()
                 since_reset = 0
-        return lambda: n_steps * num_envs * N_AGENTS
+        rows = n_steps * num_envs * N_AGENTS
+        return lambda: (rows, rows)
 
     return steps
 
@@ -190,13 +196,14 @@ def _jaxmarl(num_envs: int, threads: int) -> Steps:
     keys = [jax.random.split(jax.random.PRNGKey(draw), num_envs) for draw in range(N_DRAWN)]
     _, state = jax.jit(jax.vmap(env.reset))(keys[0])
 
-    def steps(n_steps: int) -> Callable[[], float]:
+    def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
         nonlocal state
         for step in range(n_steps):
             answer = step_all(keys[step % N_DRAWN], state)
             state = answer[1]
         jax.block_until_ready(answer)
-        return lambda: n_steps * num_envs * N_AGENTS
+        rows = n_steps * num_envs * N_AGENTS
+        return lambda: (rows, rows)
 
     return steps
 
@@ -231,17 +238,20 @@ def main() -> None:
     answers.flush()
     for line in sys.stdin:
         seconds = float(line)
-        wall_s = cpu_s = acted = 0.0
+        wall_s = cpu_s = acted = rows = 0.0
         while wall_s < 0.9 * seconds:
             wall, cpu = time.perf_counter(), time.process_time()
             count = steps(n_steps)
             took_s = time.perf_counter() - wall
             wall_s += took_s
             cpu_s += time.process_time() - cpu
-            acted += count()
+            now_acted, now_rows = count()
+            acted += now_acted
+            rows += now_rows
             wanted_s = min(max(seconds - wall_s, 0.1 * seconds), 0.25 * seconds)
             n_steps = max(1, min(int(n_steps * wanted_s / max(took_s, 1e-6)), 4 * n_steps))
-        answer = {"agent_steps": acted, "wall_s": wall_s, "cpu_s": cpu_s, "peak_mb": _peak_mb()}
+        answer = {"agent_steps": acted, "rows": rows, "wall_s": wall_s, "cpu_s": cpu_s}
+        answer["peak_mb"] = _peak_mb()
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
 

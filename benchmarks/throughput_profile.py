@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 from rich.table import Table
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions import write_commands
 from uas_coverage_env.env.kernel import REPORT_SIZE, step_learners
@@ -25,7 +26,6 @@ from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.env.surroundings import surroundings
 from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
-from uas_coverage_env.world.borrow import borrow
 from uas_coverage_env.world.contacts import (
     count_breaches,
     judge_limits,
@@ -177,7 +177,10 @@ PARTS: dict[str, Callable[..., None]] = {
 """In the order in which they are timed, each from the same states."""
 
 
-def _over_lanes(part: Callable[..., None]) -> Callable[..., None]:
+def _over_lanes(part: Any) -> Callable[..., None]:
+    # part of the loop, as it is part of a step: to call it with a hundred words takes as long
+    part = njit(error_model="numpy", forceinline=True)(part.py_func)
+
     @compiled
     def run(arenas, tables, worlds, lanes, commands, outcome, weights, spare, observation):
         arena = arena_of(arenas, 0)

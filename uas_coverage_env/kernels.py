@@ -25,8 +25,14 @@ inlined_kernel = _compiler(cache=True, error_model="numpy", _nrt=False, forceinl
 """A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
 to hand over their hundred machine words takes longer than most of these parts themselves."""
 
+counting_kernel = _compiler(
+    cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"reassoc", "nsz"}
+)
+"""An `inlined_kernel` that adds floats in any order, several at a time. Only for whole numbers
+below 2⁵³, which have one sum in every order: two compilations of a step must agree to the bit."""
+
 lending_kernel = _compiler(cache=True, error_model="numpy", _nrt=True, forceinline=True)
-"""Compiles a function that returns borrowed arrays (`world/borrow.py`), part of its callers."""
+"""Compiles a function that returns borrowed arrays (`borrow.py`), part of its callers."""
 
 allocating_kernel = _compiler(cache=True, error_model="numpy", _nrt=True)
 """Compiles a function that makes arrays; also what it calls, unless that is a `kernel`."""

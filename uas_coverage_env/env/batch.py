@@ -28,7 +28,7 @@ from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.rewards import weights_of
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, SwarmState
+from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, SwarmState, assistants
 from uas_coverage_env.world.pool import lanes_of
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
@@ -108,8 +108,7 @@ class CoverageBatch:
             self.actions.kind,
             weights_of(reward_weights),
             dynamics == "nonlinear",
-            bool(return_mode),
-            bool(safety_filter),
+            *assistants(bool(return_mode), bool(safety_filter), goes_to=self.chooses),
             self.autoreset,
         )
         shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)

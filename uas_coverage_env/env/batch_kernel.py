@@ -8,6 +8,7 @@ from numba import njit, prange
 from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.actions import first_not_finite
 from uas_coverage_env.env.kernel import (
     ACCEPTED,
@@ -25,7 +26,6 @@ from uas_coverage_env.env.pool import first_look_of, tables_of
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import FLYING
-from uas_coverage_env.world.borrow import borrow
 from uas_coverage_env.world.pool import arena_of, begin, state_of
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)

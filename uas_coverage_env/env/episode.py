@@ -33,6 +33,7 @@ from uas_coverage_env.world import (
     STATUS_NAMES,
     SwarmState,
     World,
+    assistants,
 )
 
 _LONGEST = 100_000
@@ -116,8 +117,11 @@ class Episode:
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
         self._first_look: tuple[NDArray[Any], ...] | None = None
-        self._settings = (self.actions.kind, dynamics == "nonlinear")
-        self._settings += (bool(return_mode), bool(safety_filter))
+        self._settings = (
+            self.actions.kind,
+            dynamics == "nonlinear",
+            *assistants(bool(return_mode), bool(safety_filter), goes_to=self.chooses),
+        )
         self._prepare()
 
     @property

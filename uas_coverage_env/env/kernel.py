@@ -7,6 +7,7 @@ import numpy as np
 from numba import typeof
 from numpy.typing import NDArray
 
+from uas_coverage_env.borrow import lend
 from uas_coverage_env.env.actions import RANGES_DTYPE, first_not_finite, write_commands
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NEIGHBOURS_DTYPE, count_company
@@ -25,12 +26,13 @@ from uas_coverage_env.world import (
 )
 from uas_coverage_env.world.arena import (
     MOVING_DTYPE,
+    N_WAYPOINT_COLUMNS,
     OBSTACLE_DTYPE,
     RULES_DTYPE,
     UAS_DTYPE,
     WAYPOINT_DTYPE,
 )
-from uas_coverage_env.world.borrow import lend
+from uas_coverage_env.world.boxes import N_COLUMNS, padded
 
 ENERGY, CONTACT, CONTACT_WITH, STATUS, FILTERED, RETURNING, COVERED, REWARD = range(
     len(REWARD_TERMS), len(REWARD_TERMS) + 8
@@ -156,28 +158,29 @@ def step_episode(
     n = sizes[6]
     arena = Arena(
         lend(at[0], VEHICLE_DTYPE, (u,)), lend(at[1], UAS_DTYPE, (u,)),
-        lend(at[2], OBSTACLE_DTYPE, (o,)), lend(at[3], FLOAT, (f, 3)), lend(at[4], FLOAT, (f,)),
-        lend(at[5], MOVING_DTYPE, (m,)), lend(at[6], FLOAT, (t, m, 3)),
-        lend(at[7], FLOAT, (t, m, 3)), lend(at[8], WAYPOINT_DTYPE, (w,)),
-        lend(at[9], FLOAT, (5, w)), lend(at[10], RULES_DTYPE, (1,)), lend(at[11], FLOAT, (n, 2)),
-        lend(at[12], FLOAT, (w + u, n)),
+        lend(at[2], OBSTACLE_DTYPE, (o,)), lend(at[3], FLOAT, (N_COLUMNS, padded(o))),
+        lend(at[4], FLOAT, (f, 3)), lend(at[5], FLOAT, (f,)),
+        lend(at[6], MOVING_DTYPE, (m,)), lend(at[7], FLOAT, (t, m, 3)),
+        lend(at[8], FLOAT, (t, m, 3)), lend(at[9], WAYPOINT_DTYPE, (w,)),
+        lend(at[10], FLOAT, (N_WAYPOINT_COLUMNS, w)), lend(at[11], RULES_DTYPE, (1,)),
+        lend(at[12], FLOAT, (n, 2)), lend(at[13], FLOAT, (w + u, n)),
     )  # fmt: skip
     state = WorldState(
-        lend(at[13], FLOAT, (u, N_STATES)), lend(at[14], FLOAT, (u, 2)), lend(at[15], INT, (u,)),
-        lend(at[16], BOOL, (u,)), lend(at[17], BOOL, (u,)), lend(at[18], BOOL, (w,)),
-        lend(at[19], INT, (1,)),
+        lend(at[14], FLOAT, (u, N_STATES)), lend(at[15], FLOAT, (u, 2)), lend(at[16], INT, (u,)),
+        lend(at[17], BOOL, (u,)), lend(at[18], BOOL, (u,)), lend(at[19], BOOL, (w,)),
+        lend(at[20], INT, (1,)),
     )  # fmt: skip
     for i in range(u):
         if state.status[i] != FLYING:
             for k in range(OBSERVATION_SIZE):
                 observation[i, k] = before[i, k]
     return step_learners(
-        arena, state, kind, lend(at[20], RANGES_DTYPE, (u,)), lend(at[21], SCALES_DTYPE, (u,)),
-        lend(at[22], NEIGHBOURS_DTYPE, (w,)), lend(at[23], FLOAT, (len(REWARD_TERMS),)),
-        nonlinear, return_mode, safety_filter, lend(at[24], FLOAT, (u, sizes[7])),
-        lend(at[25], INT, (u,)), lend(at[26], INT, (u, K_WAYPOINTS)), lend(at[27], FLOAT, (w, 2)),
-        lend(at[28], COMMAND_DTYPE, (u,)), lend(at[29], OUTCOME_DTYPE, (u,)),
-        lend(at[30], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,
+        arena, state, kind, lend(at[21], RANGES_DTYPE, (u,)), lend(at[22], SCALES_DTYPE, (u,)),
+        lend(at[23], NEIGHBOURS_DTYPE, (w,)), lend(at[24], FLOAT, (len(REWARD_TERMS),)),
+        nonlinear, return_mode, safety_filter, lend(at[25], FLOAT, (u, sizes[7])),
+        lend(at[26], INT, (u,)), lend(at[27], INT, (u, K_WAYPOINTS)), lend(at[28], FLOAT, (w, 2)),
+        lend(at[29], COMMAND_DTYPE, (u,)), lend(at[30], OUTCOME_DTYPE, (u,)),
+        lend(at[31], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,
     )  # fmt: skip
 
 

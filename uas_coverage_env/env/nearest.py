@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.layout import (
     CROWD,
     CROWD_M,
@@ -32,6 +33,8 @@ NO_TARGET = -2
 """Target of a UAS that has none; home is world's HOME, waypoints are their indices."""
 
 N_NEIGHBOURS = 24
+
+_WAYPOINTS_SIZE = 12 * K_WAYPOINTS
 
 NEIGHBOURS_DTYPE = np.dtype(
     (
@@ -176,15 +179,15 @@ def count_company(uncovered, neighbours, company):
 
 
 @inlined_kernel
-def _rivals(state, i, targets, candidates, n, north_m, east_m, down_m, rival_m, taken):
-    """How near the nearest other flying UAS is to each of n waypoints, and whether one goes there.
+def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m, taken):
+    """How near the nearest other flying UAS is to each waypoint, and whether one goes there.
 
     Args:
         state: The state of the world.
         i: Index of the UAS.
         targets: (U,) where each is flying to.
-        candidates: (K_WAYPOINTS,) the waypoints.
-        n: How many there are.
+        wanted: (K_WAYPOINTS,) indices of the waypoints.
+        n: How many are looked at.
         north_m: (K_WAYPOINTS,) where they are [m]; likewise east_m and down_m.
         east_m: See north_m.
         down_m: See north_m.
@@ -201,18 +204,21 @@ def _rivals(state, i, targets, candidates, n, north_m, east_m, down_m, rival_m, 
         y = state.x[j, Y]
         z = state.x[j, Z]
         for c in range(n):
-            rival_m[c] = min(rival_m[c], apart_m(north_m[c] - x, east_m[c] - y, down_m[c] - z))
+            away_m = apart_m(north_m[c] - x, east_m[c] - y, down_m[c] - z)
+            rival_m[c] = away_m if away_m < rival_m[c] else rival_m[c]
         if targets[j] >= 0 and not state.returning[j]:
+            target = float(targets[j])
             for c in range(n):
-                if candidates[c] == targets[j]:
-                    taken[c] = 1.0
+                taken[c] = 1.0 if wanted[c] == target else taken[c]
 
 
 @inlined_kernel
 def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     """Write the open waypoints nearest to UAS i; returns the next column.
 
-    Feature by feature rather than waypoint by waypoint: so the processor does four at a time.
+    Feature by feature rather than waypoint by waypoint, always for as many as there may be: so
+    the processor does four at a time. Those that are not there are the first waypoint until they
+    become zeros.
     """
     uas = arena.uas[i]
     x = state.x[i, X]
@@ -221,12 +227,9 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     home_north_m = uas.home_m[0]
     home_east_m = uas.home_m[1]
     home_down_m = uas.home_m[2]
-    speed_mps = uas.speed_mps
-    dod_per_s = uas.dod_per_s
-    dod_left = uas.dod_max - state.x[i, DOD]
-    n = 0
-    while n < K_WAYPOINTS and candidates[n] >= 0:
-        n += 1
+    margin_per_m = uas.dod_per_s / (uas.speed_mps * MARGIN)
+    margin_left = (uas.dod_max - state.x[i, DOD]) * (1.0 / MARGIN)
+    wanted = room(K_WAYPOINTS)
     north_m = room(K_WAYPOINTS)
     east_m = room(K_WAYPOINTS)
     down_m = room(K_WAYPOINTS)
@@ -239,48 +242,53 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     from_home = room(K_WAYPOINTS)
     margin = room(K_WAYPOINTS)
     columns = arena.waypoint_columns
-    for c in range(n):
-        w = candidates[c]
+    n = 0
+    for c in range(K_WAYPOINTS):
+        w = max(candidates[c], 0)
+        n += candidates[c] >= 0
+        wanted[c] = w
         north_m[c] = columns[0, w]
         east_m[c] = columns[1, w]
         down_m[c] = columns[2, w]
-    _rivals(state, i, targets, candidates, n, north_m, east_m, down_m, rival_m, taken)
-    for c in range(n):
+    # in fours, and not always twelve: a loop of known length is unrolled before it is vectorised
+    _rivals(state, i, targets, wanted, (n + 3) & -4, north_m, east_m, down_m, rival_m, taken)
+    for c in range(K_WAYPOINTS):
         dx = north_m[c] - x
         dy = east_m[c] - y
         dz = down_m[c] - z
-        there_m = apart_m(dx, dy, dz)
+        level_m2 = dx * dx + dy * dy
+        there_m = math.sqrt(level_m2 + dz * dz)
         home_m = apart_m(
             north_m[c] - home_north_m, east_m[c] - home_east_m, down_m[c] - home_down_m
         )
-        tour_dod = (there_m + home_m) / speed_mps * dod_per_s
-        level_m = math.sqrt(dx * dx + dy * dy)
-        north[c] = within(dx / level_m, -1.0, 1.0) if level_m > STRAIGHT_M else 0.0
-        east[c] = within(dy / level_m, -1.0, 1.0) if level_m > STRAIGHT_M else 0.0
+        per_m = 1.0 / math.sqrt(level_m2) if level_m2 > STRAIGHT_M * STRAIGHT_M else 0.0
+        north[c] = within(dx * per_m, -1.0, 1.0)
+        east[c] = within(dy * per_m, -1.0, 1.0)
         there[c] = close(there_m)
-        below[c] = within(dz / HEIGHT_M, -1.0, 1.0)
+        below[c] = within(dz * (1.0 / HEIGHT_M), -1.0, 1.0)
         rival_m[c] = close(rival_m[c])
         from_home[c] = close(home_m)
-        margin[c] = within((dod_left - tour_dod) / MARGIN, -1.0, 1.0)
-    for c in range(n):
-        w = candidates[c]
-        row[k] = 1.0
-        row[k + 1] = north[c]
-        row[k + 2] = east[c]
-        row[k + 3] = there[c]
-        row[k + 4] = below[c]
-        row[k + 5] = within(columns[4, w] * scale.per_heaviest, 0.0, 1.0)
-        row[k + 6] = company[w, 0]
-        row[k + 7] = company[w, 1]
-        row[k + 8] = rival_m[c]
-        row[k + 9] = taken[c]
-        row[k + 10] = from_home[c]
-        row[k + 11] = margin[c]
-        k += 12
-    for _ in range(12 * (K_WAYPOINTS - n)):
-        row[k] = 0.0
-        k += 1
-    return k
+        margin[c] = within(margin_left - (there_m + home_m) * margin_per_m, -1.0, 1.0)
+    # a view of its own: the compiler knows that its indices are not negative
+    told = borrow(row, k, (_WAYPOINTS_SIZE,))
+    for c in range(K_WAYPOINTS):
+        w = max(candidates[c], 0)
+        told[12 * c] = 1.0
+        told[12 * c + 1] = north[c]
+        told[12 * c + 2] = east[c]
+        told[12 * c + 3] = there[c]
+        told[12 * c + 4] = below[c]
+        told[12 * c + 5] = within(columns[4, w] * scale.per_heaviest, 0.0, 1.0)
+        told[12 * c + 6] = company[w, 0]
+        told[12 * c + 7] = company[w, 1]
+        told[12 * c + 8] = rival_m[c]
+        told[12 * c + 9] = taken[c]
+        told[12 * c + 10] = from_home[c]
+        told[12 * c + 11] = margin[c]
+    if n < K_WAYPOINTS:
+        for at in range(_WAYPOINTS_SIZE):
+            told[at] = told[at] if at < 12 * n else 0.0
+    return k + _WAYPOINTS_SIZE
 
 
 @inlined_kernel
@@ -322,7 +330,8 @@ def moving_obstacles(arena, state, scale, i, row, k):
     found = 0
     for m in range(arena.moving.shape[0]):
         centre_m = arena.moving_path_m[sample, m]
-        beside_m = math.hypot(x[X] - centre_m[0], x[Y] - centre_m[1]) - arena.moving[m].radius_m
+        beside_m = apart_m(x[X] - centre_m[0], x[Y] - centre_m[1], 0.0)
+        beside_m -= arena.moving[m].radius_m
         above_m = abs(x[Z] - centre_m[2]) - arena.moving[m].half_height_m
         found = _insert(index, away_m, found, m, max(beside_m, above_m))
     for c in range(found):

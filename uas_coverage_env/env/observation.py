@@ -7,11 +7,12 @@ from column k on and returns the column after its last.
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.layout import FAR_M, HEIGHT_M, MARGIN, OBSERVATION_LAYOUT
 from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
 from uas_coverage_env.env.relative import charge_left, close, direction, within
 from uas_coverage_env.env.surroundings import surroundings
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.kernels import counting_kernel, inlined_kernel, kernel, room
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import (
     DOD,
@@ -30,13 +31,15 @@ from uas_coverage_env.vehicle import (
     Z,
 )
 from uas_coverage_env.world import FLYING, HOME
+from uas_coverage_env.world.arena import ALL_SHARES
 from uas_coverage_env.world.guidance import target_position
-from uas_coverage_env.world.routes import route
+from uas_coverage_env.world.routes import shortest_way
 
 _OWN_SIZE = OBSERVATION_LAYOUT[0].size
 _HOME_SIZE = OBSERVATION_LAYOUT[1].size
 _REMAINING_SIZE = OBSERVATION_LAYOUT[2].size
 _N_SECTORS = 8
+_N_SUMS = _N_SECTORS + 2
 
 SCALES_DTYPE = np.dtype(
     (
@@ -54,8 +57,7 @@ SCALES_DTYPE = np.dtype(
                 # the box around the fence: its centre and one over half its sides
                 ("centre_m", "f8", (3,)),
                 ("per_half_side", "f8", (3,)),
-                # one over all weight, and over the heaviest
-                ("per_weight", "f8"),
+                # one over the heaviest weight
                 ("per_heaviest", "f8"),
             ],
             align=True,
@@ -86,7 +88,6 @@ def scales_of(scenario: Scenario) -> NDArray[np.void]:
         scale["rank"] = i / max(1, len(scales) - 1)
         scale["centre_m"] = (low_m + high_m) / 2
         scale["per_half_side"] = 2 / (high_m - low_m)
-        scale["per_weight"] = 1 / sum(weights)
         scale["per_heaviest"] = 1 / max(weights)
     return scales
 
@@ -115,7 +116,7 @@ def observe(arena, state, scales, company, sees, targets, max_cycles, candidates
             )  # fmt: skip
 
 
-@kernel
+@inlined_kernel
 def look(arena, state, scale, company, i, targets, max_cycles, candidates, row):
     """Write the observation of UAS i; scale, candidates and row are its own, see `observe`."""
     nearest_waypoints(arena, state, i, candidates)
@@ -156,7 +157,7 @@ def _own(arena, state, scale, i, home_dod, left, max_cycles, row, k):
     row[k + 20] = charge_left(arena, state, i)
     row[k + 21] = within((arena.uas[i].dod_max - x[DOD] - home_dod) / MARGIN, -1.0, 1.0)
     row[k + 22] = within((max_cycles - state.step[0]) / max_cycles, 0.0, 1.0)
-    row[k + 23] = within(left * scale.per_weight, 0.0, 1.0)
+    row[k + 23] = within(left, 0.0, 1.0)
     return k + 24
 
 
@@ -168,51 +169,81 @@ def _home(arena, state, i, row, k):
     y = state.x[i, Y]
     z = state.x[i, Z]
     target, x1, y1, z1 = target_position(arena, i, HOME)
-    leg_x, leg_y, way_m, _ = route(arena, target, x, y, z, x1, y1, z1)
+    leg_x, leg_y, way_m = shortest_way(arena, target, x, y, z, x1, y1, z1)
     direction(leg_x - x, leg_y - y, row, k)
     row[k + 2] = close(way_m)
-    row[k + 3] = within((z1 - z) / HEIGHT_M, -1.0, 1.0)
+    row[k + 3] = within((z1 - z) * (1.0 / HEIGHT_M), -1.0, 1.0)
     return (way_m / uas.speed_mps + max(0.0, z1 - z) / uas.descent_mps) * uas.dod_per_s
+
+
+@inlined_kernel
+def _way(here_m, there_m):
+    return there_m - here_m
 
 
 @inlined_kernel
 def _sector(dx, dy):
     """Which eighth of the horizon a place lies in: 0 from north to north-east, and on clockwise."""
     # selections rather than branches, which waypoints in every direction would mispredict
-    quarter = (0 if dx > 0.0 else 1) if dy >= 0.0 else (2 if dx < 0.0 else 3)
-    along = dx if quarter % 2 == 0 else dy
-    across = dy if quarter % 2 == 0 else dx
-    return 2 * quarter + (0 if abs(across) < abs(along) else 1)
+    forward = dx > 0.0 if dy >= 0.0 else dx < 0.0
+    flat = abs(dy) < abs(dx) if forward else abs(dx) < abs(dy)
+    return (0.0 if dy >= 0.0 else 4.0) + (0.0 if forward else 2.0) + (0.0 if flat else 1.0)
+
+
+@counting_kernel
+def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, y, sums):
+    """Add up the open waypoints: sectors of their shares, then shares times north and east."""
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
+    north = east = 0.0
+    for w in range(uncovered.shape[0]):
+        share = shares[w] if uncovered[w] else 0.0
+        sector = _sector(_way(x, north_m[w]), _way(y, east_m[w]))
+        s0 += share if sector == 0.0 else 0.0
+        s1 += share if sector == 1.0 else 0.0
+        s2 += share if sector == 2.0 else 0.0
+        s3 += share if sector == 3.0 else 0.0
+        s4 += share if sector == 4.0 else 0.0
+        s5 += share if sector == 5.0 else 0.0
+        s6 += share if sector == 6.0 else 0.0
+        s7 += share if sector == 7.0 else 0.0
+        north += shares_north[w] if uncovered[w] else 0.0
+        east += shares_east[w] if uncovered[w] else 0.0
+    sums[0] = s0
+    sums[1] = s1
+    sums[2] = s2
+    sums[3] = s3
+    sums[4] = s4
+    sums[5] = s5
+    sums[6] = s6
+    sums[7] = s7
+    sums[8] = north
+    sums[9] = east
 
 
 @inlined_kernel
 def _remaining(arena, state, i, row, k):
-    """Write where the open weight lies; returns all of it."""
-    # alternately in two sums each: adding to a number that was just written has to wait for it
-    sectors = room(16)
-    for sector in range(2 * _N_SECTORS):
-        sectors[sector] = 0.0
+    """Write where the open weight lies; returns its share of all weight."""
     x = state.x[i, X]
     y = state.x[i, Y]
-    columns = arena.waypoint_columns
-    weight = 0.0
-    north_m = 0.0
-    east_m = 0.0
-    for w in range(state.uncovered.shape[0]):
-        open_weight = columns[4, w] if state.uncovered[w] else 0.0
-        dx = columns[0, w] - x
-        dy = columns[1, w] - y
-        weight += open_weight
-        north_m += open_weight * dx
-        east_m += open_weight * dy
-        sectors[(w % 2) * _N_SECTORS + _sector(dx, dy)] += open_weight
-    for sector in range(_N_SECTORS):
-        row[k + sector] = sectors[sector] + sectors[_N_SECTORS + sector]
-    row[k + 8] = 0.0
-    row[k + 9] = 0.0
-    if weight > 0.0:
-        for sector in range(k, k + _N_SECTORS):
-            row[sector] = within(row[sector] / weight, 0.0, 1.0)
-        row[k + 8] = within(north_m / weight / FAR_M, -1.0, 1.0)
-        row[k + 9] = within(east_m / weight / FAR_M, -1.0, 1.0)
-    return weight
+    n = state.uncovered.shape[0]
+    columns = borrow(arena.waypoint_columns, 0, (arena.waypoint_columns.size,))
+    sums = room(_N_SUMS)
+    _add_open(
+        borrow(columns, 0, (n,)),
+        borrow(columns, n, (n,)),
+        borrow(columns, 5 * n, (n,)),
+        borrow(columns, 6 * n, (n,)),
+        borrow(columns, 7 * n, (n,)),
+        state.uncovered, x, y, sums,
+    )  # fmt: skip
+    left = 0.0
+    for s in range(_N_SECTORS):
+        left += sums[s]
+    per_share = 1.0 / left if left > 0.0 else 0.0
+    for s in range(_N_SECTORS):
+        row[k + s] = within(sums[s] * per_share, 0.0, 1.0)
+    there = 1.0 if left > 0.0 else 0.0
+    to_m = per_share * arena.rules[0].unit_m
+    row[k + 8] = within((sums[8] * to_m - there * x) * (1.0 / FAR_M), -1.0, 1.0)
+    row[k + 9] = within((sums[9] * to_m - there * y) * (1.0 / FAR_M), -1.0, 1.0)
+    return left * (1.0 / ALL_SHARES)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.episode import with_max_steps
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
@@ -14,7 +15,6 @@ from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
 from uas_coverage_env.env.observation import look, scales_of
 from uas_coverage_env.kernels import kernel, lending_kernel
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.world.borrow import borrow
 from uas_coverage_env.world.pool import (
     arena_of,
     begin,

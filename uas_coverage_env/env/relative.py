@@ -21,19 +21,16 @@ def within(value, low, high):
 @inlined_kernel
 def close(distance_m):
     """1 at the place itself, 1/2 at NEARBY_M, towards 0 far away."""
-    return 1.0 / (1.0 + distance_m / NEARBY_M)
+    return NEARBY_M / (NEARBY_M + distance_m)
 
 
 @inlined_kernel
 def direction(dx, dy, row, k):
     """Write the horizontal unit vector towards a place; returns the next column."""
     distance_m = math.sqrt(dx * dx + dy * dy)
-    if distance_m > STRAIGHT_M:
-        row[k] = within(dx / distance_m, -1.0, 1.0)
-        row[k + 1] = within(dy / distance_m, -1.0, 1.0)
-    else:
-        row[k] = 0.0
-        row[k + 1] = 0.0
+    per_m = 1.0 / distance_m if distance_m > STRAIGHT_M else 0.0
+    row[k] = within(dx * per_m, -1.0, 1.0)
+    row[k + 1] = within(dy * per_m, -1.0, 1.0)
     return k + 2
 
 

@@ -2,10 +2,19 @@
 
 import math
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.layout import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.env.relative import within
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.world.boxes import (
+    BLOCK,
+    HULL_HALF,
+    HULL_MIDDLE,
+    MIDDLE,
+    PER_HALF,
+    column,
+)
 
 _BEYOND_M = RAY_M + 1e-6
 """A plane at this distance is out of reach of all rays, whatever is rounded [m]."""
@@ -34,9 +43,11 @@ _N, _NE, _E, _SE, _S, _SW, _W, _NW, _UP, _DOWN = range(N_RAYS)
 @inlined_kernel
 def _farthest_out_m(normals, offsets_m, first, last, x, y, z):
     """How far a point is out of the face plane that it is farthest out of [m]."""
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
     largest = -math.inf
-    for h in range(first, last):
-        d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+    for h in range(away_m.shape[0]):
+        d = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
         largest = max(largest, d)
     return largest
 
@@ -44,13 +55,15 @@ def _farthest_out_m(normals, offsets_m, first, last, x, y, z):
 @kernel
 def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
     """How far a ray goes before it enters a hull, at most free_m."""
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
     enters_m = 0.0
     leaves_m = free_m
     misses = False
-    for h in range(first, last):
+    for h in range(away_m.shape[0]):
         # selections rather than branches: every face is another case
-        d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
-        slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+        d = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
+        slope = faces[h, 0] * dx + faces[h, 1] * dy + faces[h, 2] * dz
         at_m = -d / slope
         outside = d > 0.0
         misses |= outside & (slope >= 0.0)
@@ -70,24 +83,26 @@ def _both_ways(inside_m, slope, free_m, ahead, behind):
 @inlined_kernel
 def _rays_to_fence(normals, offsets_m, first, last, x, y, z, free_m):
     """Write how far the rays go before they leave the fence; returns how far away that is."""
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
     for ray in range(N_RAYS):
         free_m[ray] = RAY_M
     outermost = -math.inf
-    for h in range(first, last):
-        d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+    for h in range(away_m.shape[0]):
+        d = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
         outermost = max(outermost, d)
         if d < -_BEYOND_M:
             continue
         inside_m = max(0.0, -d)
-        north = normals[h, 0]
-        east = normals[h, 1]
+        north = faces[h, 0]
+        east = faces[h, 1]
         diagonal_north = north * _DIAGONAL
         diagonal_east = east * _DIAGONAL
         _both_ways(inside_m, north, free_m, _N, _S)
         _both_ways(inside_m, diagonal_north + diagonal_east, free_m, _NE, _SW)
         _both_ways(inside_m, east, free_m, _E, _W)
         _both_ways(inside_m, diagonal_east - diagonal_north, free_m, _SE, _NW)
-        _both_ways(inside_m, normals[h, 2], free_m, _DOWN, _UP)
+        _both_ways(inside_m, faces[h, 2], free_m, _DOWN, _UP)
     return -outermost
 
 
@@ -147,11 +162,55 @@ def _rays_in_box(normals, offsets_m, first, last, x, y, z, free_m):
 
 
 @inlined_kernel
-def _rays_to_obstacle(arena, o, x, y, z, free_m):
+def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
+    """Which obstacles may be near, and the boxes of which the rays may meet.
+
+    Args:
+        columns: (N_COLUMNS, C) see `obstacle_columns`.
+        first: Index of the first obstacle.
+        n: Number of columns, at most BLOCK.
+        x: North of the UAS [m].
+        y: East of it [m].
+        z: Down of it [m].
+        beyond: (n or more,) written: so many times as far from the middle of an obstacle's larger
+            box as its walls.
+        in_reach: (n or more,) written: 1 where a ray may meet its hull's box, 0 elsewhere.
+    """
+    middle_x = column(columns, MIDDLE, first, n)
+    middle_y = column(columns, MIDDLE + 1, first, n)
+    middle_z = column(columns, MIDDLE + 2, first, n)
+    per_half_x = column(columns, PER_HALF, first, n)
+    per_half_y = column(columns, PER_HALF + 1, first, n)
+    per_half_z = column(columns, PER_HALF + 2, first, n)
+    hull_x = column(columns, HULL_MIDDLE, first, n)
+    hull_y = column(columns, HULL_MIDDLE + 1, first, n)
+    hull_z = column(columns, HULL_MIDDLE + 2, first, n)
+    half_x = column(columns, HULL_HALF, first, n)
+    half_y = column(columns, HULL_HALF + 1, first, n)
+    half_z = column(columns, HULL_HALF + 2, first, n)
+    for o in range(n):
+        beyond[o] = max(
+            abs(x - middle_x[o]) * per_half_x[o],
+            abs(y - middle_y[o]) * per_half_y[o],
+            abs(z - middle_z[o]) * per_half_z[o],
+        )
+        north_m = hull_x[o] - x
+        east_m = hull_y[o] - y
+        down_m = hull_z[o] - z
+        half_both_m = half_x[o] + half_y[o]
+        level = abs(down_m) <= half_z[o]
+        along_north = abs(east_m) <= half_y[o]
+        along_east = abs(north_m) <= half_x[o]
+        diagonal = (abs(north_m - east_m) <= half_both_m) | (abs(north_m + east_m) <= half_both_m)
+        crossed = along_north | along_east | diagonal
+        near = (abs(north_m) - half_x[o] < _BEYOND_M) & (abs(east_m) - half_y[o] < _BEYOND_M)
+        below = along_north & along_east & (abs(down_m) - half_z[o] < _BEYOND_M)
+        in_reach[o] = 1.0 if (level & crossed & near) | below else 0.0
+
+
+@inlined_kernel
+def _rays_to_obstacle(obstacle, normals, offsets_m, x, y, z, free_m):
     """Shorten the rays that meet an obstacle; most miss the box around it."""
-    normals = arena.normals
-    offsets_m = arena.offsets_m
-    obstacle = arena.obstacles[o]
     first = obstacle.first_face
     last = obstacle.last_face
     half_north_m = obstacle.hull_half_m[0]
@@ -207,27 +266,25 @@ def surroundings(arena, state, i, row, k):
         normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z, free_m
     )
     clearance_m = HEIGHT_M
-    for o in range(arena.obstacles.shape[0]):
-        obstacle = arena.obstacles[o]
-        middle_m = obstacle.middle_m
-        per_half_m = obstacle.per_half_m
-        beyond = max(
-            abs(x - middle_m[0]) * per_half_m[0],
-            abs(y - middle_m[1]) * per_half_m[1],
-            abs(z - middle_m[2]) * per_half_m[2],
-        )
-        if beyond < _WITHIN_BOX:
-            clearance_m = min(
-                clearance_m,
-                _farthest_out_m(
+    beyond = room(BLOCK)
+    in_reach = room(BLOCK)
+    columns = arena.obstacle_columns
+    n_obstacles = arena.obstacles.shape[0]
+    for first in range(0, n_obstacles, BLOCK):
+        n = min(BLOCK, columns.shape[1] - first)
+        _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach)
+        for o in range(min(n, n_obstacles - first)):
+            obstacle = arena.obstacles[first + o]
+            if beyond[o] < _WITHIN_BOX:
+                out_m = _farthest_out_m(
                     normals, offsets_m, obstacle.first_face, obstacle.last_face, x, y, z
-                ),
-            )
-        _rays_to_obstacle(arena, o, x, y, z, free_m)
+                )
+                clearance_m = min(clearance_m, out_m)
+            if in_reach[o] != 0.0:
+                _rays_to_obstacle(obstacle, normals, offsets_m, x, y, z, free_m)
     for ray in range(N_RAYS):
-        row[k + ray] = free_m[ray]
-        row[k + ray] = within(1.0 - row[k + ray] / RAY_M, 0.0, 1.0)
+        row[k + ray] = within(1.0 - free_m[ray] * (1.0 / RAY_M), 0.0, 1.0)
     k += N_RAYS
-    row[k] = within(clearance_m / HEIGHT_M, -1.0, 1.0)
-    row[k + 1] = within((inside_m - rules.fence_margin_m) / HEIGHT_M, -1.0, 1.0)
+    row[k] = within(clearance_m * (1.0 / HEIGHT_M), -1.0, 1.0)
+    row[k + 1] = within((inside_m - rules.fence_margin_m) * (1.0 / HEIGHT_M), -1.0, 1.0)
     return k + 2

@@ -2,10 +2,12 @@
 
 A hull is the range [first, last) of rows of `normals` (F, 3) and `offsets_m` (F,), so that all
 hulls of a scenario fit in two arrays. Coordinates are scalars: no array is made in a time step.
+Loops go over views of a hull's own rows: of their indices the compiler knows that none is negative.
 """
 
 import math
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.kernels import inlined_kernel, kernel
 
 _SURE_M = 1e-6
@@ -28,9 +30,11 @@ def signed_distance(normals, offsets_m, first, last, x, y, z):
     Returns:
         [m], negative inside.
     """
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
     largest = -math.inf
-    for h in range(first, last):
-        distance = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+    for h in range(away_m.shape[0]):
+        distance = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
         if distance > largest:
             largest = distance
     return largest
@@ -61,30 +65,33 @@ def segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     dx = x1 - x0
     dy = y1 - y0
     dz = z1 - z0
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
+    n_faces = away_m.shape[0]
     height = -math.inf
     slope = 0.0
-    for h in range(first, last):
-        a = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offsets_m[h]
-        if a > height:
-            height = a
-            slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+    for h in range(n_faces):
+        a = faces[h, 0] * x0 + faces[h, 1] * y0 + faces[h, 2] * z0 + away_m[h]
+        s = faces[h, 0] * dx + faces[h, 1] * dy + faces[h, 2] * dz
+        # both computed before: a selection takes less time than a branch that is guessed wrong
+        slope = s if a > height else slope
+        height = a if a > height else height
     at = 0.0
     while slope < 0.0:
         # of the lines that fall less, the first to cross takes over
         at = 1.0
         takes_over = -1
-        for h in range(first, last):
-            s = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
-            if s > slope:
-                a = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offsets_m[h]
-                if height - a < at * (s - slope):
-                    at = (height - a) / (s - slope)
-                    takes_over = h
+        for h in range(n_faces):
+            s = faces[h, 0] * dx + faces[h, 1] * dy + faces[h, 2] * dz
+            a = faces[h, 0] * x0 + faces[h, 1] * y0 + faces[h, 2] * z0 + away_m[h]
+            if (s > slope) & (height - a < at * (s - slope)):
+                at = (height - a) / (s - slope)
+                takes_over = h
         if takes_over < 0:
             break
         h = takes_over
-        height = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offsets_m[h]
-        slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+        height = faces[h, 0] * x0 + faces[h, 1] * y0 + faces[h, 2] * z0 + away_m[h]
+        slope = faces[h, 0] * dx + faces[h, 1] * dy + faces[h, 2] * dz
     return height + slope * at
 
 
@@ -111,12 +118,14 @@ def segment_meets(normals, offsets_m, first, last, inflation_m, x0, y0, z0, x1, 
     Returns:
         True where some point of the segment is closer than `inflation_m`.
     """
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
     enters = 0.0
     leaves = 1.0
-    for h in range(first, last):
-        offset = offsets_m[h] - inflation_m
-        d0 = normals[h, 0] * x0 + normals[h, 1] * y0 + normals[h, 2] * z0 + offset
-        d1 = normals[h, 0] * x1 + normals[h, 1] * y1 + normals[h, 2] * z1 + offset
+    for h in range(away_m.shape[0]):
+        offset = away_m[h] - inflation_m
+        d0 = faces[h, 0] * x0 + faces[h, 1] * y0 + faces[h, 2] * z0 + offset
+        d1 = faces[h, 0] * x1 + faces[h, 1] * y1 + faces[h, 2] * z1 + offset
         if d0 >= 0.0:
             if d1 >= 0.0:
                 return False

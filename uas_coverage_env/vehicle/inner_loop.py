@@ -32,6 +32,7 @@ from uas_coverage_env.vehicle.layout import (
     Z,
 )
 
+_BLOCKS = -GOVERNOR_BLOCK  # as a mask: to whole blocks
 _TINY = 1e-12
 _SURELY_LESS = 0.999999
 _FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant, say, goes on
@@ -145,21 +146,25 @@ def _far_outside(vehicle, x, reference):
     """Whether the state breaks a governor row by so much that the feedback would saturate."""
     rows = vehicle.governor_rows
     outside = False
-    for block in range(0, vehicle.n_governor_rows, GOVERNOR_BLOCK):
-        # all of a block: rows beyond the last are zero, and without branches it is done at once
-        for q in range(block, block + GOVERNOR_BLOCK):
-            n = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
-            n += rows[3, q] * reference[0]
-            e = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
-            e += rows[3, q] * reference[1]
-            bound = _FAR_OUTSIDE * rows[4, q]
-            outside |= n * n + e * e > bound * bound
+    # whole blocks, so that the processor does all rows of a block at once; those beyond the last
+    # are zero
+    n_rows = (vehicle.n_governor_rows + GOVERNOR_BLOCK - 1) & _BLOCKS
+    for q in range(n_rows):
+        n = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
+        n += rows[3, q] * reference[0]
+        e = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
+        e += rows[3, q] * reference[1]
+        bound = _FAR_OUTSIDE * rows[4, q]
+        outside |= n * n + e * e > bound * bound
     return outside
 
 
 @kernel
 def _turn_towards(vehicle, angle, rate, wanted, rate_max, alpha_max):
     """Angular acceleration that brings an angle to a wanted one, within its limits, and stops."""
+    if angle == wanted and rate == 0.0:
+        # what follows would say the same: nothing to do
+        return 0.0
     dt = vehicle.dt_s
     sign = 1.0 if wanted >= angle else -1.0
     following = _speed_towards(

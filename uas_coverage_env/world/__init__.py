@@ -32,7 +32,7 @@ from uas_coverage_env.world.state import (
     SwarmState,
     WorldState,
 )
-from uas_coverage_env.world.step import advance, begin_mission, first_invalid
+from uas_coverage_env.world.step import advance, assistants, begin_mission, first_invalid
 
 __all__ = [
     "ACCELERATION",
@@ -63,6 +63,7 @@ __all__ = [
     "WorldState",
     "Wrench",
     "advance",
+    "assistants",
     "begin_mission",
     "build_arena",
     "command_mode",

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
+from uas_coverage_env.world.boxes import obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.world.routes import node_distances
 
@@ -24,6 +25,12 @@ NODE_MARGIN_M = 1.0
 
 LOOKAHEAD_S = 14.0
 """A braking flight takes less than this from the highest speed [s]."""
+
+ALL_SHARES = 2.0**30
+"""The weight of all waypoints, as a whole number. With it and positions of at most 2²², every sum
+of `Arena.waypoint_columns` stays below 2⁵³, up to where floats hold all whole numbers."""
+
+N_WAYPOINT_COLUMNS = 8
 
 SAMPLES_AFTER_END = 64
 """Moving obstacles are known this long after max_steps, for missions flown over time."""
@@ -100,6 +107,8 @@ RULES_DTYPE = _record(
         ("ceiling_m", "f8"),
         # how far guidance and safety filter look ahead: time to brake from any speed
         ("lookahead_steps", "i8"),
+        # of `waypoint_columns`
+        ("unit_m", "f8"),
         # the command to stop and hold still
         ("brake", COMMAND_DTYPE),
     ]
@@ -115,6 +124,8 @@ class Arena(NamedTuple):
     """(U,) of UAS_DTYPE."""
     obstacles: NDArray[np.void]
     """(O,) of OBSTACLE_DTYPE."""
+    obstacle_columns: NDArray[np.float64]
+    """(N_COLUMNS, C) see `obstacle_columns`."""
     normals: NDArray[np.float64]
     """(F, 3) faces of the obstacles, the fence, and the walls of footprints."""
     offsets_m: NDArray[np.float64]
@@ -128,8 +139,10 @@ class Arena(NamedTuple):
     waypoints: NDArray[np.void]
     """(W,) of WAYPOINT_DTYPE."""
     waypoint_columns: NDArray[np.float64]
-    """(5, W) north, east, down [m], radius² [m²] and weight: what all waypoints are asked for, in
-    the order in which a processor takes four at a time."""
+    """(N_WAYPOINT_COLUMNS, W) what all waypoints are asked for, in the order in which a processor
+    takes four at a time: north, east, down [m], radius² [m²], weight; then whole numbers: share of
+    all weight in units of 1 / ALL_SHARES, and this times north and east in units of
+    `rules.unit_m`. Sums of whole numbers are exact, whatever their order."""
     rules: NDArray[np.void]
     """(1,) of RULES_DTYPE."""
     nodes_m: NDArray[np.float64]
@@ -147,6 +160,7 @@ def build_arena(scenario: Scenario) -> Arena:
     uas = _uas(scenario)
     rules = _rules(scenario)
     waypoints = _waypoints(scenario)
+    rules["unit_m"] = _unit_m(waypoints["position_m"])
     radius_m = max((entry.radius_m for entry in scenario.uas), default=0.0)
     targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
     overfly_m = _overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
@@ -163,6 +177,7 @@ def build_arena(scenario: Scenario) -> Arena:
         vehicles=_vehicles(scenario),
         uas=uas,
         obstacles=obstacles,
+        obstacle_columns=obstacle_columns(obstacles),
         normals=np.ascontiguousarray(normals),
         offsets_m=np.ascontiguousarray(offsets_m),
         moving=np.array(
@@ -172,7 +187,7 @@ def build_arena(scenario: Scenario) -> Arena:
         moving_path_m=moving_path_m,
         moving_velocity_mps=moving_velocity_mps,
         waypoints=waypoints,
-        waypoint_columns=_columns(waypoints),
+        waypoint_columns=_columns(waypoints, float(rules["unit_m"][0])),
         rules=rules,
         nodes_m=nodes_m,
         node_distance_m=node_distances(
@@ -204,9 +219,18 @@ def _waypoints(scenario: Scenario) -> NDArray[np.void]:
     return np.array(rows, dtype=WAYPOINT_DTYPE)
 
 
-def _columns(waypoints: NDArray[np.void]) -> NDArray[np.float64]:
+def _unit_m(positions_m: NDArray[np.float64]) -> float:
+    """A power of two of which all horizontal positions are at most 2²² [m]."""
+    farthest_m = float(np.abs(positions_m[:, :2]).max())
+    return 2.0 ** (math.ceil(math.log2(max(farthest_m, 1.0))) - 22)
+
+
+def _columns(waypoints: NDArray[np.void], unit_m: float) -> NDArray[np.float64]:
     reach_m2 = waypoints["radius_m"] * waypoints["radius_m"]
-    rows = [*waypoints["position_m"].T, reach_m2, waypoints["weight"]]
+    weight = waypoints["weight"]
+    shares = np.round(weight / weight.sum() * ALL_SHARES)
+    north, east = np.round(waypoints["position_m"].T[:2] / unit_m)
+    rows = [*waypoints["position_m"].T, reach_m2, weight, shares, shares * north, shares * east]
     return np.array(rows, dtype=np.float64, order="C")
 
 

@@ -2,6 +2,7 @@
 
 import math
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.geometry import (
     cylinder_clearance,
     cylinder_gap,
@@ -9,63 +10,48 @@ from uas_coverage_env.geometry import (
     segment_clearance,
     signed_distance,
 )
-from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import DOD, X, Y, Z
+from uas_coverage_env.world.boxes import BLOCK, SURE_M, write_lower_bounds
 from uas_coverage_env.world.outcome import BATTERY, FENCE, MOVING_OBSTACLE, NONE, OBSTACLE, UAS
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
-
-_SURE_M = 1e-6
-"""More than rounding can change in a distance [m]."""
 
 
 @kernel
 def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     """A lower bound of the clearance of a segment: the face that both ends are farthest from."""
+    faces = borrow(normals, first, (last - first, 3))
+    away_m = borrow(offsets_m, first, (last - first,))
     largest = -math.inf
-    for h in range(first, last):
-        n0 = normals[h, 0]
-        n1 = normals[h, 1]
-        n2 = normals[h, 2]
+    for h in range(away_m.shape[0]):
+        n0 = faces[h, 0]
+        n1 = faces[h, 1]
+        n2 = faces[h, 2]
         d0 = n0 * x0 + n1 * y0 + n2 * z0
         d1 = n0 * x1 + n1 * y1 + n2 * z1
-        largest = max(largest, min(d0, d1) + offsets_m[h])
+        largest = max(largest, min(d0, d1) + away_m[h])
     return largest
 
 
 @inlined_kernel
-def _at_least_m(obstacle, x0, y0, z0, x1, y1, z1):
-    """A lower bound of the clearance of a segment from an obstacle, by the boxes around both.
-
-    The distance D is convex. From the middle of the obstacle's box to its walls, where it is
-    near_m, it has risen by rise_m; farther out it rises at least as fast.
-    """
-    times = 0.0
-    middle = obstacle.middle_m
-    per_half = obstacle.per_half_m
-    times = max(times, max(min(x0, x1) - middle[0], middle[0] - max(x0, x1)) * per_half[0])
-    times = max(times, max(min(y0, y1) - middle[1], middle[1] - max(y0, y1)) * per_half[1])
-    times = max(times, max(min(z0, z1) - middle[2], middle[2] - max(z0, z1)) * per_half[2])
-    if times <= 1.0:
-        return -math.inf
-    return obstacle.near_m + obstacle.rise_m * (times - 1.0) - _SURE_M
-
-
-@inlined_kernel
-def _likely_nearest(obstacles, x0, y0, z0, x1, y1, z1):
+def _likely_nearest(columns, x0, y0, z0, x1, y1, z1):
     """The obstacle with the least lower bound."""
+    bound_m = room(BLOCK)
     likely = 0
     least_m = math.inf
-    for o in range(obstacles.shape[0]):
-        bound = _at_least_m(obstacles[o], x0, y0, z0, x1, y1, z1)
-        if bound < least_m:
-            least_m = bound
-            likely = o
+    for first in range(0, columns.shape[1], BLOCK):
+        n = min(BLOCK, columns.shape[1] - first)
+        write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m)
+        for o in range(n):
+            if bound_m[o] < least_m:
+                least_m = bound_m[o]
+                likely = first + o
     return likely
 
 
-@kernel
-def obstacle_clearance(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+@inlined_kernel
+def obstacle_clearance(arena, x0, y0, z0, x1, y1, z1):
     """Smallest clearance of a segment from the fixed obstacles, exact.
 
     The likely nearest comes first: most others cannot be as near as that.
@@ -73,23 +59,35 @@ def obstacle_clearance(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     Returns:
         (clearance [m], index of the obstacle); (inf, -1) where there is none.
     """
-    smallest = math.inf
-    nearest = -1
-    if obstacles.shape[0] == 0:
-        return smallest, nearest
-    likely = _likely_nearest(obstacles, x0, y0, z0, x1, y1, z1)
-    for turn in range(-1, obstacles.shape[0]):
-        o = likely if turn < 0 else turn
-        if turn == likely or _at_least_m(obstacles[o], x0, y0, z0, x1, y1, z1) > smallest:
-            continue
-        first = obstacles[o].first_face
-        last = obstacles[o].last_face
-        if face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1) > smallest:
-            continue
-        clearance = segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
-        if clearance < smallest or (clearance == smallest and o < nearest):
-            smallest = clearance
-            nearest = o
+    obstacles = arena.obstacles
+    columns = arena.obstacle_columns
+    normals = arena.normals
+    offsets_m = arena.offsets_m
+    n_obstacles = obstacles.shape[0]
+    if n_obstacles == 0:
+        return math.inf, -1
+    nearest = _likely_nearest(columns, x0, y0, z0, x1, y1, z1)
+    smallest = segment_clearance(
+        normals, offsets_m, obstacles[nearest].first_face, obstacles[nearest].last_face,
+        x0, y0, z0, x1, y1, z1,
+    )  # fmt: skip
+    likely = nearest
+    bound_m = room(BLOCK)
+    for begin in range(0, n_obstacles, BLOCK):
+        n = min(BLOCK, columns.shape[1] - begin)
+        write_lower_bounds(columns, begin, n, x0, y0, z0, x1, y1, z1, bound_m)
+        for b in range(min(n, n_obstacles - begin)):
+            o = begin + b
+            if o == likely or bound_m[b] > smallest:
+                continue
+            first = obstacles[o].first_face
+            last = obstacles[o].last_face
+            if face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1) > smallest:
+                continue
+            clearance = segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
+            if clearance < smallest or (clearance == smallest and o < nearest):
+                smallest = clearance
+                nearest = o
     return smallest, nearest
 
 
@@ -147,9 +145,7 @@ def judge_obstacles(arena, state, outcome):
         x1 = state.x[i, X]
         y1 = state.x[i, Y]
         z1 = state.x[i, Z]
-        smallest, nearest = obstacle_clearance(
-            arena.obstacles, arena.normals, arena.offsets_m, x0, y0, z0, x1, y1, z1
-        )
+        smallest, nearest = obstacle_clearance(arena, x0, y0, z0, x1, y1, z1)
         radius_m = arena.uas[i].radius_m
         if smallest < radius_m:
             _blame(event, OBSTACLE, nearest)
@@ -261,7 +257,7 @@ def count_breaches(arena, state, outcome):
         radius_m = arena.uas[i].radius_m
         count = 0
         # at the end of the segment nothing is nearer than it was somewhere on it
-        if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + _SURE_M:
+        if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + SURE_M:
             count = _obstacle_breaches(arena, next_m, i, x, y, z)
         for j in range(state.status.shape[0]):
             if j != i and state.status[j] == FLYING and outcome[j].contact == NONE:

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.borrow import borrow
 from uas_coverage_env.kernels import inlined_kernel, lending_kernel
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world.arena import Arena, build_arena
-from uas_coverage_env.world.borrow import borrow
+from uas_coverage_env.world.arena import N_WAYPOINT_COLUMNS, Arena, build_arena
+from uas_coverage_env.world.boxes import N_COLUMNS, padded
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.simulation import initial_state
 from uas_coverage_env.world.state import FLYING, WorldState
@@ -32,6 +33,8 @@ class ArenaPool(NamedTuple):
     vehicles: NDArray[np.void]
     uas: NDArray[np.void]
     obstacles: NDArray[np.void]
+    obstacle_columns: NDArray[np.float64]
+    """Flat."""
     normals: NDArray[np.float64]
     offsets_m: NDArray[np.float64]
     moving: NDArray[np.void]
@@ -54,7 +57,13 @@ class ArenaPool(NamedTuple):
     """(S,) of SPANS_DTYPE."""
 
 
-_FLAT = ("waypoint_columns", "moving_path_m", "moving_velocity_mps", "node_distance_m")
+_FLAT = (
+    "obstacle_columns",
+    "waypoint_columns",
+    "moving_path_m",
+    "moving_velocity_mps",
+    "node_distance_m",
+)
 
 
 def end_to_end(blocks: Sequence[NDArray]) -> tuple[NDArray, NDArray[np.int64]]:
@@ -125,6 +134,7 @@ def arena_of(pool, s):
     """
     at = pool.spans[s]
     n_uas = at.uas[1] - at.uas[0]
+    n_obstacles = at.obstacles[1] - at.obstacles[0]
     n_moving = at.moving[1] - at.moving[0]
     n_planes = at.normals[1] - at.normals[0]
     n_waypoints = at.waypoints[1] - at.waypoints[0]
@@ -133,14 +143,15 @@ def arena_of(pool, s):
     return Arena(
         borrow(pool.vehicles, at.vehicles[0], (n_uas,)),
         borrow(pool.uas, at.uas[0], (n_uas,)),
-        borrow(pool.obstacles, at.obstacles[0], (at.obstacles[1] - at.obstacles[0],)),
+        borrow(pool.obstacles, at.obstacles[0], (n_obstacles,)),
+        borrow(pool.obstacle_columns, at.obstacle_columns[0], (N_COLUMNS, padded(n_obstacles))),
         borrow(pool.normals, at.normals[0], (n_planes, 3)),
         borrow(pool.offsets_m, at.offsets_m[0], (n_planes,)),
         borrow(pool.moving, at.moving[0], (n_moving,)),
         borrow(pool.moving_path_m, at.moving_path_m[0], path_shape),
         borrow(pool.moving_velocity_mps, at.moving_velocity_mps[0], path_shape),
         borrow(pool.waypoints, at.waypoints[0], (n_waypoints,)),
-        borrow(pool.waypoint_columns, at.waypoint_columns[0], (5, n_waypoints)),
+        borrow(pool.waypoint_columns, at.waypoint_columns[0], (N_WAYPOINT_COLUMNS, n_waypoints)),
         borrow(pool.rules, at.rules[0], (1,)),
         borrow(pool.nodes_m, at.nodes_m[0], (n_nodes, 2)),
         borrow(pool.node_distance_m, at.node_distance_m[0], (n_waypoints + n_uas, n_nodes)),

@@ -12,7 +12,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from uas_coverage_env.geometry import segment_meets, signed_distance
-from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.world.boxes import BLOCK, write_meetings
 
 _CREEP_M = 1e-3
 
@@ -107,22 +108,72 @@ def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
 
 
 @kernel
-def line_is_clear(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+def _obstructs(obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+    """Whether a line in space does not keep the distance of routes from an obstacle."""
+    first = obstacle.first_face
+    last = obstacle.last_face
+    keep_m = min(
+        obstacle.wall_m,
+        signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M,
+        signed_distance(normals, offsets_m, first, last, x1, y1, z1) - _CREEP_M,
+    )
+    return segment_meets(normals, offsets_m, first, last, keep_m, x0, y0, z0, x1, y1, z1)
+
+
+@inlined_kernel
+def line_is_clear(arena, x0, y0, z0, x1, y1, z1):
     """Whether the straight line in space keeps the distance of routes from every obstacle."""
-    for o in range(obstacles.shape[0]):
-        obstacle = obstacles[o]
-        if box_apart(obstacle, x0, y0, z0, x1, y1, z1):
-            continue
-        first = obstacle.first_face
-        last = obstacle.last_face
-        keep_m = min(
-            obstacle.wall_m,
-            signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M,
-            signed_distance(normals, offsets_m, first, last, x1, y1, z1) - _CREEP_M,
-        )
-        if segment_meets(normals, offsets_m, first, last, keep_m, x0, y0, z0, x1, y1, z1):
-            return False
+    meets = room(BLOCK)
+    columns = arena.obstacle_columns
+    n_obstacles = arena.obstacles.shape[0]
+    for first in range(0, n_obstacles, BLOCK):
+        n = min(BLOCK, columns.shape[1] - first)
+        write_meetings(columns, first, n, x0, y0, z0, x1, y1, z1, meets)
+        for o in range(min(n, n_obstacles - first)):
+            if meets[o] != 0.0 and _obstructs(
+                arena.obstacles[first + o], arena.normals, arena.offsets_m, x0, y0, z0, x1, y1, z1
+            ):
+                return False
     return True
+
+
+@kernel
+def _next_corner(arena, target, x0, y0):
+    """The corner in sight over which the way to a target is the shortest; -1 where there is none.
+
+    The shortest way is tried first, then the next: mostly the first or second corner is in sight.
+    """
+    nodes_m = arena.nodes_m
+    onward_m = arena.node_distance_m
+    tried = -1
+    tried_m = -math.inf
+    while True:
+        shortest_m = math.inf
+        corner = -1
+        for n in range(nodes_m.shape[0]):
+            dx = nodes_m[n, 0] - x0
+            dy = nodes_m[n, 1] - y0
+            length_m = math.sqrt(dx * dx + dy * dy) + onward_m[target, n]
+            later = (length_m > tried_m) | ((length_m == tried_m) & (n > tried))
+            if later & (length_m < shortest_m):
+                shortest_m = length_m
+                corner = n
+        if corner < 0 or in_sight(
+            arena.obstacles, arena.normals, arena.offsets_m, x0, y0, nodes_m[corner, 0],
+            nodes_m[corner, 1],
+        ):  # fmt: skip
+            return corner
+        tried = corner
+        tried_m = shortest_m
+
+
+@inlined_kernel
+def _round(arena, corner, target, x0, y0):
+    """The way to a target round a corner: north and east of the corner, and its length [m]."""
+    north_m = arena.nodes_m[corner, 0]
+    east_m = arena.nodes_m[corner, 1]
+    way_m = math.hypot(north_m - x0, east_m - y0) + arena.node_distance_m[target, corner]
+    return north_m, east_m, way_m
 
 
 @inlined_kernel
@@ -147,24 +198,29 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
     normals = arena.normals
     offsets_m = arena.offsets_m
     straight_m = math.hypot(x1 - x0, y1 - y0)
-    if line_is_clear(obstacles, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+    if line_is_clear(arena, x0, y0, z0, x1, y1, z1):
         return x1, y1, straight_m, CLEAR
     if in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
         return x1, y1, straight_m, IN_SIGHT
-    nodes_m = arena.nodes_m
-    onward_m = arena.node_distance_m
-    shortest_m = math.inf
-    corner = -1
-    for n in range(nodes_m.shape[0]):
-        length_m = math.hypot(nodes_m[n, 0] - x0, nodes_m[n, 1] - y0) + onward_m[target, n]
-        if length_m < shortest_m and in_sight(
-            obstacles, normals, offsets_m, x0, y0, nodes_m[n, 0], nodes_m[n, 1]
-        ):
-            shortest_m = length_m
-            corner = n
+    corner = _next_corner(arena, target, x0, y0)
     if corner < 0:
         return x1, y1, straight_m, NO_WAY
-    return nodes_m[corner, 0], nodes_m[corner, 1], shortest_m, ROUND_CORNER
+    north_m, east_m, way_m = _round(arena, corner, target, x0, y0)
+    return north_m, east_m, way_m, ROUND_CORNER
+
+
+@inlined_kernel
+def shortest_way(arena, target, x0, y0, z0, x1, y1, z1):
+    """The first three of `route`, for those who need not know what the next leg is like.
+
+    The tall obstacles are asked first: they are few, and mostly none is in the way.
+    """
+    in_view = in_sight(arena.obstacles, arena.normals, arena.offsets_m, x0, y0, x1, y1)
+    if not in_view and not line_is_clear(arena, x0, y0, z0, x1, y1, z1):
+        corner = _next_corner(arena, target, x0, y0)
+        if corner >= 0:
+            return _round(arena, corner, target, x0, y0)
+    return x1, y1, math.hypot(x1 - x0, y1 - y0)
 
 
 @kernel

@@ -1,6 +1,6 @@
 """The world as an object: one mission, step by step."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -12,7 +12,7 @@ from uas_coverage_env.world.arena import build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, SwarmState, WorldState
-from uas_coverage_env.world.step import ACCEPTED, begin_mission, compiled_step
+from uas_coverage_env.world.step import ACCEPTED, assistants, begin_mission, compiled_step
 
 Dynamics = Literal["lpv", "nonlinear"]
 
@@ -68,16 +68,16 @@ class World:
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
         self._before_commands = (*self.arena, *self._state)
-        self._switches = (dynamics == "nonlinear", self.return_mode, self.safety_filter)
+        self._switches = (
+            dynamics == "nonlinear",
+            *assistants(self.return_mode, self.safety_filter),
+        )
         self._prepare()
 
     def _prepare(self) -> None:
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
-        commands = np.zeros(len(self.names), dtype=COMMAND_DTYPE)
-        outcome = self._fresh_outcome()
-        arguments = (*self._before_commands, commands, *self._switches, outcome)
-        self._step = compiled_step(arguments)
+        self._step: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         # machine code does not travel: it is there, or compiled, wherever the copy goes
@@ -119,11 +119,14 @@ class World:
             )
         elif not commands.flags.c_contiguous:
             commands = commands.copy()
-        outcome = self._fresh_outcome()
-        invalid = self._step(*self._before_commands, commands, *self._switches, outcome)
+        arguments = (*self._before_commands, commands, *self._switches, self._fresh_outcome())
+        if self._step is None:
+            # not before: environments have a world, too, and a step of their own
+            self._step = compiled_step(arguments)
+        invalid = self._step(*arguments)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
-        return outcome
+        return arguments[-1]
 
     def _fresh_outcome(self) -> NDArray[np.void]:
         """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""

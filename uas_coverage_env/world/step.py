@@ -164,15 +164,34 @@ def advance(arena, state, commands, nonlinear, return_mode, safety_filter, outco
         state: The state; written in place.
         commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
         nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
-        return_mode: Bring UAS home in time.
-        safety_filter: Keep commands clear of harm.
+        return_mode: Bring UAS home in time; None: neither that, nor is any command a GO_TO.
+        safety_filter: Keep commands clear of harm; None: no, see `assistants`.
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     begin_step(state, commands, outcome)
-    _steer(arena, state, nonlinear, return_mode, outcome)
-    if safety_filter:
+    if return_mode is not None:
+        _steer(arena, state, nonlinear, return_mode, outcome)
+    if safety_filter is not None and safety_filter:
         _filter(arena, state, nonlinear, outcome)
     carry_out(arena, state, nonlinear, outcome)
+
+
+def assistants(
+    return_mode: bool, safety_filter: bool, *, goes_to: bool = True
+) -> tuple[bool | None, bool | None]:
+    """`return_mode` and `safety_filter` as the kernels take them.
+
+    What is None is not even compiled: most of the machine code of a step is guidance and filter.
+
+    Args:
+        return_mode: Whether UAS are brought home in time.
+        safety_filter: Whether commands are kept clear of harm.
+        goes_to: Whether commands of kind GO_TO may come.
+    """
+    return (
+        bool(return_mode) if goes_to or return_mode else None,
+        True if safety_filter else None,
+    )
 
 
 @kernel
@@ -183,8 +202,8 @@ def begin_mission(arena, state, outcome):
 
 @kernel
 def step_world(
-    vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
-    waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
+    vehicles, uas, obstacles, obstacle_columns, normals, offsets_m, moving, moving_path_m,
+    moving_velocity_mps, waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
     x, reference, status, departed, returning, uncovered, step,
     commands, nonlinear, return_mode, safety_filter, outcome,
 ):  # fmt: skip
@@ -194,8 +213,8 @@ def step_world(
         ACCEPTED, or the index of a UAS whose command is invalid; then nothing has changed.
     """
     arena = Arena(
-        vehicles, uas, obstacles, normals, offsets_m, moving, moving_path_m, moving_velocity_mps,
-        waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
+        vehicles, uas, obstacles, obstacle_columns, normals, offsets_m, moving, moving_path_m,
+        moving_velocity_mps, waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
     )  # fmt: skip
     state = WorldState(x, reference, status, departed, returning, uncovered, step)
     invalid = first_invalid(arena, state, commands)

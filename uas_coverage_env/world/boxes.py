@@ -1,0 +1,136 @@
+"""Boxes around all fixed obstacles side by side: what a UAS is far from is known at once.
+
+Most obstacles are far from most UAS in most steps. What their boxes say about them takes the
+processor as long for four of them as for one, as long as they lie in columns.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.borrow import borrow
+from uas_coverage_env.kernels import inlined_kernel, lending_kernel
+
+BLOCK = 64
+"""So many obstacles are looked at at once; kernels take more in several turns."""
+
+SURE_M = 1e-6
+"""More than rounding can change in a distance [m]."""
+
+MIDDLE, PER_HALF, NEAR, RISE, HULL_MIDDLE, HULL_HALF, LOWER, UPPER = 0, 3, 6, 7, 8, 11, 14, 17
+"""First rows of `obstacle_columns`; all but NEAR and RISE have three."""
+
+N_COLUMNS = 20
+
+_FAR_M = 1e9
+
+
+@inlined_kernel
+def padded(n_obstacles):
+    """Number of columns for so many obstacles: the compiler's loops take 16 at a time."""
+    return (n_obstacles + 15) // 16 * 16
+
+
+def obstacle_columns(obstacles: NDArray[np.void]) -> NDArray[np.float64]:
+    """What all obstacles are asked for in every step, field by field.
+
+    Args:
+        obstacles: (O,) of OBSTACLE_DTYPE.
+
+    Returns:
+        (N_COLUMNS, `padded` O) C-contiguous; obstacles beyond the last are far away from all.
+    """
+    n_obstacles = len(obstacles)
+    columns = np.zeros((N_COLUMNS, padded(n_obstacles)))
+    for far in (MIDDLE, HULL_MIDDLE, LOWER):
+        columns[far : far + 3] = _FAR_M
+    columns[UPPER : UPPER + 3] = -_FAR_M
+    columns[PER_HALF : PER_HALF + 3] = 1.0
+    columns[NEAR] = math.inf
+    columns[NEAR, :n_obstacles] = obstacles["near_m"]
+    columns[RISE, :n_obstacles] = obstacles["rise_m"]
+    for first, field in (
+        (MIDDLE, "middle_m"),
+        (PER_HALF, "per_half_m"),
+        (HULL_MIDDLE, "hull_middle_m"),
+        (HULL_HALF, "hull_half_m"),
+        (LOWER, "lower_m"),
+        (UPPER, "upper_m"),
+    ):
+        columns[first : first + 3, :n_obstacles] = obstacles[field].T
+    return columns
+
+
+@lending_kernel
+def column(columns, row, first, n):
+    """Some numbers of a row of `obstacle_columns`, a borrowed view (n,).
+
+    Args:
+        columns: (N_COLUMNS, C).
+        row: Which.
+        first: Index of the first obstacle.
+        n: Number of columns.
+    """
+    flat = borrow(columns, 0, (columns.size,))
+    return borrow(flat, row * columns.shape[1] + first, (n,))
+
+
+@inlined_kernel
+def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
+    """Lower bounds of the clearance of a segment from some obstacles, by the boxes around both.
+
+    The distance D is convex. From the middle of an obstacle's box to its walls, where it is
+    near_m, it has risen by rise_m; farther out it rises at least as fast.
+
+    Args:
+        columns: (N_COLUMNS, C).
+        first: Index of the first obstacle.
+        n: Number of columns, at most BLOCK.
+        x0: Start of the segment, north [m]; then east, down, and its end.
+        y0: See x0.
+        z0: See x0.
+        x1: See x0.
+        y1: See x0.
+        z1: See x0.
+        bound_m: (n or more,) [m] written; -inf where the boxes meet.
+    """
+    x_low, x_high = min(x0, x1), max(x0, x1)
+    y_low, y_high = min(y0, y1), max(y0, y1)
+    z_low, z_high = min(z0, z1), max(z0, z1)
+    middle_x = column(columns, MIDDLE, first, n)
+    middle_y = column(columns, MIDDLE + 1, first, n)
+    middle_z = column(columns, MIDDLE + 2, first, n)
+    per_half_x = column(columns, PER_HALF, first, n)
+    per_half_y = column(columns, PER_HALF + 1, first, n)
+    per_half_z = column(columns, PER_HALF + 2, first, n)
+    near_m = column(columns, NEAR, first, n)
+    rise_m = column(columns, RISE, first, n)
+    for o in range(n):
+        times = max(0.0, max(x_low - middle_x[o], middle_x[o] - x_high) * per_half_x[o])
+        times = max(times, max(y_low - middle_y[o], middle_y[o] - y_high) * per_half_y[o])
+        times = max(times, max(z_low - middle_z[o], middle_z[o] - z_high) * per_half_z[o])
+        far_m = near_m[o] + rise_m[o] * (times - 1.0) - SURE_M
+        bound_m[o] = far_m if times > 1.0 else -math.inf
+
+
+@inlined_kernel
+def write_meetings(columns, first, n, x0, y0, z0, x1, y1, z1, meets):
+    """Which obstacles' boxes, outside of which every point is near_m away, a segment may meet.
+
+    Arguments as for `write_lower_bounds`; `meets` is 1 where the boxes meet, 0 elsewhere.
+    """
+    x_low, x_high = min(x0, x1), max(x0, x1)
+    y_low, y_high = min(y0, y1), max(y0, y1)
+    z_low, z_high = min(z0, z1), max(z0, z1)
+    lower_x = column(columns, LOWER, first, n)
+    lower_y = column(columns, LOWER + 1, first, n)
+    lower_z = column(columns, LOWER + 2, first, n)
+    upper_x = column(columns, UPPER, first, n)
+    upper_y = column(columns, UPPER + 1, first, n)
+    upper_z = column(columns, UPPER + 2, first, n)
+    for o in range(n):
+        beyond = max(lower_x[o] - x_high, x_low - upper_x[o])
+        beyond = max(beyond, max(lower_y[o] - y_high, y_low - upper_y[o]))
+        beyond = max(beyond, max(lower_z[o] - z_high, z_low - upper_z[o]))
+        meets[o] = 0.0 if beyond > 0.0 else 1.0
