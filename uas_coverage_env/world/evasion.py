@@ -28,7 +28,8 @@ from uas_coverage_env.world.lookahead import (
 _TURNS = 12
 _HELD_S = (8.0, 3.0)
 _ENOUGH_M = 3.0  # more room than this is not looked for
-_LINGERING = 0.05  # weight of the mean shortfall beside the largest: who is inside leaves early
+LINGERING = 0.05
+"""Weight of the mean shortfall of room beside the largest: who is inside leaves early."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,7 +63,7 @@ def _room_m(arena, step, i, path_m):
             room_m = clearance_m - required_m
             least_m = min(least_m, room_m)
             shortfall_m += min(room_m, 0.0)
-    return least_m + _LINGERING * shortfall_m / n_steps
+    return least_m + LINGERING * shortfall_m / n_steps
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,6 +7,9 @@ what they chose, the later ones to braking. So every UAS always has a safe choic
 where a moving obstacle comes at it; then it gets out of the way as best it can (`evasion`), but
 never at the cost of what can be proved: one step of the evasive flight, and braking after it, is
 clear of all that stands still and of the other UAS.
+
+Whom return mode brings home decides first, and the others leave its way (`right_of_way`): among
+the safe commands they fly the nearest that keeps clear of it.
 """
 
 import math
@@ -25,13 +28,19 @@ from uas_coverage_env.world.lookahead import (
     moving_slack,
     peer_slack,
 )
-from uas_coverage_env.world.state import FLYING
+from uas_coverage_env.world.right_of_way import claim_way, decision_order, room_beside
 
 _LEAST_SPEED_MPS = 3.0
+_CREEPING = 0.1
+_NOTICEABLE_M = 1e-3
 
 
 def _deflections() -> np.ndarray:
-    """(D, 3) turn [rad], share of the speed, whether to climb (1) or sink (-1): nearest first."""
+    """(D, 3) turn [rad], share of the speed, whether to climb (1) or sink (-1): nearest first.
+
+    What hardly moves comes last, instead of braking: straight up or down, and creeping. Who is
+    wedged in between others has no room for more.
+    """
     turns_deg = (0, 25, -25, 50, -50, 80, -80, 110, -110, 150, -150, 180)
     ranked = [
         (abs(turn_deg) / 60 + (1 - share) * 1.2 + abs(climb) * 0.45, turn_deg, share, climb)
@@ -40,7 +49,10 @@ def _deflections() -> np.ndarray:
         for climb in (0, 1, -1)
     ]
     ranked.sort(key=lambda entry: entry[0])
-    return np.array([(np.deg2rad(turn), share, climb) for _, turn, share, climb in ranked])
+    rows = [(turn_deg, share, climb) for _, turn_deg, share, climb in ranked]
+    rows += [(0, 0.0, climb) for climb in (1, -1)]
+    rows += [(turn_deg, _CREEPING, climb) for turn_deg in turns_deg for climb in (0, 1, -1)]
+    return np.array([(np.deg2rad(turn_deg), share, climb) for turn_deg, share, climb in rows])
 
 
 _DEFLECTIONS = _deflections()
@@ -135,6 +147,49 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
 
 
 @njit(cache=True, error_model="numpy")
+def _make_way(
+    arena, state, i, command, nonlinear, path_m, committed_m, order, n_claims, claims_m
+):  # fmt: skip
+    """Write the nearest safe command that keeps clear of the claimed ways.
+
+    Where none does, the safe one that leaves them most room: the command itself, a deflection, or
+    braking. `path_m` is left as in `_replace`.
+
+    Returns:
+        Whether there is a safe command; if not, `command` is what it was.
+    """
+    n_deflections = _DEFLECTIONS.shape[0]
+    own_kind = command.kind
+    own = command.values.copy()
+    wish_mps = _wish(arena, state, i, command)
+    n_options = n_deflections + 2
+    best, best_m = n_options, -math.inf
+    for option in range(n_options):
+        enough_m = 0.0
+        if 0 < option <= n_deflections:
+            _deflect(arena, i, wish_mps, option - 1, command)
+        elif option > n_deflections:
+            write_brake(command)
+            enough_m = -TOLERANCE_M
+        if _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m) < enough_m:
+            continue
+        room_m = room_beside(arena, i, path_m, order, n_claims, claims_m)
+        if room_m > best_m + _NOTICEABLE_M:
+            best, best_m = option, room_m
+        if room_m >= 0.0:
+            break
+    if 0 < best <= n_deflections:
+        _deflect(arena, i, wish_mps, best - 1, command)
+    elif best == n_deflections + 1:
+        write_brake(command)
+    else:
+        write_command(command, own_kind, own[0], own[1], own[2])
+        command.values[3] = own[3]
+    _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+    return best < n_options
+
+
+@njit(cache=True, error_model="numpy")
 def filter_commands(arena, state, nonlinear, outcome):
     """Replace the unsafe ones among the commands in `outcome` and mark them as filtered.
 
@@ -147,19 +202,30 @@ def filter_commands(arena, state, nonlinear, outcome):
     n_uas = state.status.shape[0]
     n_steps = arena.rules[0].lookahead_steps
     committed_m = np.empty((n_uas, n_steps + 1, 3))
+    claims_m = np.empty((n_uas, n_steps + 1, 3))
+    order = np.empty(n_uas, np.int64)
+    n_flying, n_returning = decision_order(state, order)
     brake = arena.rules[0].brake
     # the first UAS decides before anybody asks where it would brake
-    for i in range(1, n_uas):
-        if state.status[i] == FLYING:
-            x = state.x[i]
-            reference = state.reference[i]
-            fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i])
-    for i in range(n_uas):
-        if state.status[i] != FLYING:
-            continue
+    for rank in range(1, n_flying):
+        i = order[rank]
+        x = state.x[i]
+        reference = state.reference[i]
+        fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i])
+    for rank in range(n_flying):
+        i = order[rank]
         command = outcome[i].applied_command
         path_m = committed_m[i]
+        n_claims = min(rank, n_returning)
+        if rank < n_returning:
+            claim_way(arena, state, i, command, nonlinear, claims_m[rank])
         slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
-        if slack_m < 0.0:
-            outcome[i].filtered = True
+        room_m = room_beside(arena, i, path_m, order, n_claims, claims_m)
+        if slack_m >= 0.0 and room_m >= 0.0:
+            continue
+        if n_claims == 0 or not _make_way(
+            arena, state, i, command, nonlinear, path_m, committed_m, order, n_claims, claims_m
+        ):
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)
+        # nobody but the filter gives this kind of command
+        outcome[i].filtered = command.kind == CLIMB

@@ -1,0 +1,94 @@
+"""Right of way: those whom return mode brings home go first, and the others leave their way.
+
+A UAS that only waits until the others let it pass may wait until its battery is empty. So the UAS
+decide in a fixed order, those on their way home first, by index; and each of these claims the way
+that it would fly if no other UAS were there: its command held for some seconds, then braking. Those
+who decide later keep out of the claimed ways as well as they safely can (`safety`). A claim is a
+wish and not a wall: nobody gives up the room to brake for it.
+"""
+
+from numba import njit
+
+from uas_coverage_env.geometry import cylinder_clearance
+from uas_coverage_env.world.evasion import LINGERING
+from uas_coverage_env.world.lookahead import fly_hold_and_brake
+from uas_coverage_env.world.state import FLYING
+
+CLAIMED_S = 5.0
+"""For how long a UAS on its way home claims to go on as it wishes now [s]; then it brakes."""
+
+ELBOW_ROOM_M = 1.0
+"""What claimed ways are kept clear of, beyond the distance that counts as a breach [m]: the next
+command home is not quite the one that was claimed."""
+
+
+@njit(cache=True, error_model="numpy")
+def decision_order(state, order):
+    """Who decides when.
+
+    Args:
+        state: The state.
+        order: (U,) written: the indices of the flying UAS, those whom return mode brings home
+            first.
+
+    Returns:
+        (flying, returning): how many they are.
+    """
+    n_flying = 0
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING and state.returning[i]:
+            order[n_flying] = i
+            n_flying += 1
+    n_returning = n_flying
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING and not state.returning[i]:
+            order[n_flying] = i
+            n_flying += 1
+    return n_flying, n_returning
+
+
+@njit(cache=True, error_model="numpy")
+def claim_way(arena, state, i, command, nonlinear, claim_m):
+    """Write the way (N+1, 3) [m] that UAS i would fly now if no other UAS were there."""
+    n_held = max(1, round(CLAIMED_S / arena.rules[0].dt_s))
+    x = state.x[i]
+    fly_hold_and_brake(arena, i, x, state.reference[i], command, n_held, nonlinear, claim_m)
+
+
+@njit(cache=True, error_model="numpy")
+def room_beside(arena, i, path_m, order, n_claims, claims_m):
+    """How well a path keeps clear of the claimed ways, flown at the same time [m].
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        path_m: (N+1, 3) [m] its path.
+        order: (U,) indices of the UAS in the order in which they decide.
+        n_claims: How many of the first of these have claimed a way.
+        claims_m: (U, N+1, 3) [m] these ways, in the same order.
+
+    Returns:
+        The least room to spare along the path, at most ELBOW_ROOM_M; where it is negative, less a
+        little for every step with too little room, so that leaving early is better than late.
+    """
+    n_steps = path_m.shape[0] - 1
+    least_m, shortfall_m = ELBOW_ROOM_M, 0.0
+    for c in range(n_claims):
+        way_m = claims_m[c]
+        radii_m = arena.uas[i].radius_m + arena.uas[order[c]].radius_m
+        required_m = radii_m + arena.rules[0].uas_safe_distance_m + ELBOW_ROOM_M
+        for k in range(n_steps):
+            clearance_m = cylinder_clearance(
+                0.0,
+                0.0,
+                path_m[k, 0] - way_m[k, 0],
+                path_m[k, 1] - way_m[k, 1],
+                path_m[k, 2] - way_m[k, 2],
+                path_m[k + 1, 0] - way_m[k + 1, 0],
+                path_m[k + 1, 1] - way_m[k + 1, 1],
+                path_m[k + 1, 2] - way_m[k + 1, 2],
+            )
+            room_m = clearance_m - required_m
+            least_m = min(least_m, room_m)
+            shortfall_m += min(room_m, 0.0)
+    return least_m + LINGERING * shortfall_m / n_steps
