@@ -56,16 +56,16 @@ def claim_way(arena, state, i, command, nonlinear, claim_m):
 
 
 @njit(cache=True, error_model="numpy")
-def room_beside(arena, i, path_m, order, n_claims, claims_m):
+def room_beside(arena, i, path_m, claimants, n_claims, claims_m):
     """How well a path keeps clear of the claimed ways, flown at the same time [m].
 
     Args:
         arena: The arena.
         i: Index of the UAS.
         path_m: (N+1, 3) [m] its path.
-        order: (U,) indices of the UAS in the order in which they decide.
-        n_claims: How many of the first of these have claimed a way.
-        claims_m: (U, N+1, 3) [m] these ways, in the same order.
+        claimants: (U,) indices of UAS.
+        n_claims: For how many of the first of these room is to be made.
+        claims_m: (U, N+1, 3) [m] the claimed ways, by the index of the UAS.
 
     Returns:
         The least room to spare along the path, at most ELBOW_ROOM_M; where it is negative, less a
@@ -74,8 +74,9 @@ def room_beside(arena, i, path_m, order, n_claims, claims_m):
     n_steps = path_m.shape[0] - 1
     least_m, shortfall_m = ELBOW_ROOM_M, 0.0
     for c in range(n_claims):
-        way_m = claims_m[c]
-        radii_m = arena.uas[i].radius_m + arena.uas[order[c]].radius_m
+        other = claimants[c]
+        way_m = claims_m[other]
+        radii_m = arena.uas[i].radius_m + arena.uas[other].radius_m
         required_m = radii_m + arena.rules[0].uas_safe_distance_m + ELBOW_ROOM_M
         for k in range(n_steps):
             clearance_m = cylinder_clearance(

@@ -148,7 +148,7 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
 
 @njit(cache=True, error_model="numpy")
 def _make_way(
-    arena, state, i, command, nonlinear, path_m, committed_m, order, n_claims, claims_m
+    arena, state, i, command, nonlinear, path_m, committed_m, claimants, n_claims, claims_m
 ):  # fmt: skip
     """Write the nearest safe command that keeps clear of the claimed ways.
 
@@ -173,7 +173,7 @@ def _make_way(
             enough_m = -TOLERANCE_M
         if _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m) < enough_m:
             continue
-        room_m = room_beside(arena, i, path_m, order, n_claims, claims_m)
+        room_m = room_beside(arena, i, path_m, claimants, n_claims, claims_m)
         if room_m > best_m + _NOTICEABLE_M:
             best, best_m = option, room_m
         if room_m >= 0.0:
@@ -205,6 +205,8 @@ def filter_commands(arena, state, nonlinear, outcome):
     claims_m = np.empty((n_uas, n_steps + 1, 3))
     order = np.empty(n_uas, np.int64)
     n_flying, n_returning = decision_order(state, order)
+    held_up = np.empty(n_uas, np.int64)
+    n_held_up = 0
     brake = arena.rules[0].brake
     # the first UAS decides before anybody asks where it would brake
     for rank in range(1, n_flying):
@@ -216,15 +218,19 @@ def filter_commands(arena, state, nonlinear, outcome):
         i = order[rank]
         command = outcome[i].applied_command
         path_m = committed_m[i]
-        n_claims = min(rank, n_returning)
-        if rank < n_returning:
-            claim_way(arena, state, i, command, nonlinear, claims_m[rank])
+        claimants, n_claims = order, n_returning
         slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
-        room_m = room_beside(arena, i, path_m, order, n_claims, claims_m)
+        if rank < n_returning:
+            claimants, n_claims = held_up, n_held_up
+            claim_way(arena, state, i, command, nonlinear, claims_m[i])
+            if slack_m < 0.0:
+                held_up[n_held_up] = i
+                n_held_up += 1
+        room_m = room_beside(arena, i, path_m, claimants, n_claims, claims_m)
         if slack_m >= 0.0 and room_m >= 0.0:
             continue
         if n_claims == 0 or not _make_way(
-            arena, state, i, command, nonlinear, path_m, committed_m, order, n_claims, claims_m
+            arena, state, i, command, nonlinear, path_m, committed_m, claimants, n_claims, claims_m
         ):
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)
         # nobody but the filter gives this kind of command
