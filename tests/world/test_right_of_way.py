@@ -19,8 +19,8 @@ CANYON = [
     box("east", (105.2, 90.0, -49.0), (130.0, 150.0, 0.0)),
 ]
 """Two walls as high as the ceiling, 10.4 m apart: nobody passes beside another."""
-HIGH = [waypoint((190.0, 190.0, -40.0), 5.0)] * 3
-"""Corners of walls are turned at where most of a mission is flown: not next to the ground."""
+OUT_OF_THE_WAY = [waypoint((5.0, 195.0, -40.0), 3.0)] * 3
+"""Nobody covers them, which would call all home. Most are high: so high are routes planned."""
 KEPT_M = 5.72
 RESIDUE_M = 0.01
 """Braking is simulated until what is left of the motion is centimetres."""
@@ -78,7 +78,7 @@ def see_home(world, wishes, n_waiting=0, max_steps=150):
 def swarm(n_uas):
     """A meadow with so many UAS, both assistants on."""
     starts_m = [HOME_M, *((20.0 * k, 20.0, -1.0) for k in range(1, n_uas))]
-    return World(meadow(starts_m), **BOTH)
+    return World(meadow(starts_m, waypoints=OUT_OF_THE_WAY), **BOTH)
 
 
 def goalkeeper(first, _, x):
@@ -147,7 +147,9 @@ def test_nor_does_any_mixture_of_them_from_anywhere_around_a_corner(seed, n_uas,
 
 
 def test_a_mate_that_hovers_in_a_canyon_leaves_it_before_who_comes_home():
-    world = World(meadow([HOME_M, (20.0, 20.0, -1.0)], obstacles=CANYON, waypoints=HIGH), **BOTH)
+    world = World(
+        meadow([HOME_M, (20.0, 20.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY), **BOTH
+    )
     put(world, [(100.0, 160.0, -3.0), (100.0, 120.0, -3.0)])
     contacts, apart_m, changed = see_home(world, lambda *_: (0.0, 0.0, 3.0, 0.0))
     assert world.state.status[0] == LANDED
@@ -157,7 +159,9 @@ def test_a_mate_that_hovers_in_a_canyon_leaves_it_before_who_comes_home():
 
 
 def test_two_on_their_way_home_through_a_canyon_pass_each_other():
-    world = World(meadow([HOME_M, (100.0, 180.0, -1.0)], obstacles=CANYON, waypoints=HIGH), **BOTH)
+    world = World(
+        meadow([HOME_M, (100.0, 180.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY), **BOTH
+    )
     put(world, [(100.0, 170.0, -10.0), (100.0, 70.0, -10.0)])
     world.state.returning[:] = True
     contacts = 0
