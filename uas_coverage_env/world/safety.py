@@ -31,28 +31,32 @@ from uas_coverage_env.world.lookahead import (
 from uas_coverage_env.world.right_of_way import claim_way, decision_order, room_beside
 
 _LEAST_SPEED_MPS = 3.0
-_CREEPING = 0.1
+_AS_WISHED, _CLIMBING, _SINKING, _LEVEL = range(4)
 _NOTICEABLE_M = 1e-3
 
 
 def _deflections() -> np.ndarray:
-    """(D, 3) turn [rad], share of the speed, whether to climb (1) or sink (-1): nearest first.
+    """(D, 3) turn [rad], share of the speed, and one of the four heights: nearest first.
 
-    What hardly moves comes last, instead of braking: straight up or down, and creeping. Who is
-    wedged in between others has no room for more.
+    Instead of braking, last, come level flight, straight up or down, and creeping: who is wedged in
+    between others may have room for no more.
     """
     turns_deg = (0, 25, -25, 50, -50, 80, -80, 110, -110, 150, -150, 180)
-    ranked = [
-        (abs(turn_deg) / 60 + (1 - share) * 1.2 + abs(climb) * 0.45, turn_deg, share, climb)
+    rows = [
+        (turn_deg, share, height)
         for share in (1.0, 0.6, 0.3)
         for turn_deg in turns_deg
-        for climb in (0, 1, -1)
+        for height in (_AS_WISHED, _CLIMBING, _SINKING)
     ]
-    ranked.sort(key=lambda entry: entry[0])
-    rows = [(turn_deg, share, climb) for _, turn_deg, share, climb in ranked]
-    rows += [(0, 0.0, climb) for climb in (1, -1)]
-    rows += [(turn_deg, _CREEPING, climb) for turn_deg in turns_deg for climb in (0, 1, -1)]
-    return np.array([(np.deg2rad(turn_deg), share, climb) for turn_deg, share, climb in rows])
+    rows.sort(key=lambda r: abs(r[0]) / 60 + (1 - r[1]) * 1.2 + (r[2] != _AS_WISHED) * 0.45)
+    rows += [(turn_deg, share, _LEVEL) for share in (1.0, 0.3) for turn_deg in turns_deg]
+    rows += [(0, 0.0, _CLIMBING), (0, 0.0, _SINKING)]
+    rows += [
+        (turn_deg, 0.1, height)
+        for turn_deg in turns_deg
+        for height in (_LEVEL, _CLIMBING, _SINKING)
+    ]
+    return np.array([(np.deg2rad(turn_deg), share, height) for turn_deg, share, height in rows])
 
 
 _DEFLECTIONS = _deflections()
@@ -100,11 +104,14 @@ def _deflect(arena, i, wish_mps, d, command):
     speed_mps = math.hypot(wish_mps[0], wish_mps[1])
     heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, 0]
     share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, 1]
+    height = _DEFLECTIONS[d, 2]
     down_mps = wish_mps[2]
-    if _DEFLECTIONS[d, 2] > 0.0:
+    if height == _CLIMBING:
         down_mps = -uas.climb_mps
-    elif _DEFLECTIONS[d, 2] < 0.0:
+    elif height == _SINKING:
         down_mps = uas.descent_mps
+    elif height == _LEVEL:
+        down_mps = 0.0
     write_command(
         command, CLIMB, share_mps * math.cos(heading), share_mps * math.sin(heading), down_mps
     )
