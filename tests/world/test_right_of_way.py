@@ -13,7 +13,6 @@ from uas_coverage_env.world.right_of_way import decision_order
 VELOCITY = KIND_NAMES.index("velocity")
 HOME_M = (100.0, 60.0, -1.0)
 CORNER_M = np.array([198.0, 198.0, -30.0])
-BOTH = {"return_mode": True, "safety_filter": True}
 CANYON = [
     box("west", (70.0, 90.0, -49.0), (94.8, 150.0, 0.0)),
     box("east", (105.2, 90.0, -49.0), (130.0, 150.0, 0.0)),
@@ -74,11 +73,15 @@ def see_home(world, wishes, n_waiting=0, max_steps=150):
     return contacts, apart_m, changed
 
 
+def assisted(scenario):
+    return World(scenario, return_mode=True, safety_filter=True)
+
+
 @cache
 def swarm(n_uas):
     """A meadow with so many UAS, both assistants on."""
     starts_m = [HOME_M, *((20.0 * k, 20.0, -1.0) for k in range(1, n_uas))]
-    return World(meadow(starts_m, waypoints=OUT_OF_THE_WAY), **BOTH)
+    return assisted(meadow(starts_m, waypoints=OUT_OF_THE_WAY))
 
 
 def goalkeeper(first, _, x):
@@ -147,8 +150,8 @@ def test_nor_does_any_mixture_of_them_from_anywhere_around_a_corner(seed, n_uas,
 
 
 def test_a_mate_that_hovers_in_a_canyon_leaves_it_before_who_comes_home():
-    world = World(
-        meadow([HOME_M, (20.0, 20.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY), **BOTH
+    world = assisted(
+        meadow([HOME_M, (20.0, 20.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY)
     )
     put(world, [(100.0, 160.0, -3.0), (100.0, 120.0, -3.0)])
     contacts, apart_m, changed = see_home(world, lambda *_: (0.0, 0.0, 3.0, 0.0))
@@ -159,8 +162,8 @@ def test_a_mate_that_hovers_in_a_canyon_leaves_it_before_who_comes_home():
 
 
 def test_two_on_their_way_home_through_a_canyon_pass_each_other():
-    world = World(
-        meadow([HOME_M, (100.0, 180.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY), **BOTH
+    world = assisted(
+        meadow([HOME_M, (100.0, 180.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY)
     )
     put(world, [(100.0, 170.0, -10.0), (100.0, 70.0, -10.0)])
     world.state.returning[:] = True
