@@ -3,8 +3,9 @@
 A UAS that only waits until the others let it pass may wait until its battery is empty. So the UAS
 decide in a fixed order, those on their way home first, by index; and each of these claims the way
 that it would fly if no other UAS were there: its command held for some seconds, then braking. Those
-who decide later keep out of the claimed ways as well as they safely can (`safety`). A claim is a
-wish and not a wall: nobody gives up the room to brake for it.
+who decide later keep out of the claimed ways as well as they safely can (`safety`); those who are
+on their way home themselves only out of that of one who is held up. A claim is a wish and not a
+wall: nobody gives up the room to brake for it.
 """
 
 from numba import njit
