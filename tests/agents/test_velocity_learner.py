@@ -9,7 +9,7 @@ from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly
 from uas_coverage_agents.training.trainee import Order, Trainee
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
-from uas_coverage_agents.training.velocity import VelocityLanes
+from uas_coverage_agents.training.velocity import DecidingMemory, VelocityLanes
 
 from uas_coverage_env.env import observation_columns
 
@@ -108,6 +108,45 @@ def test_only_decisions_are_learned_from():
     assert abs(sum(len(batch.observations) for batch in batches) - decided) <= 8
 
 
+def test_sac_remembers_decisions_alone_and_what_came_of_them(towns):
+    env, _ = lanes(towns)
+    spaces = env.observation_space, env.action_space
+    all_of_it = DecidingMemory(5000, *spaces, device="cpu", n_envs=env.num_envs)
+    latest = DecidingMemory(100, *spaces, device="cpu", n_envs=env.num_envs)
+    view = env.reset()
+    happened = []
+    for _, actions in zip(range(300), actions_of(env), strict=False):
+        now, rewards, ended, infos = env.step(actions)
+        for memory in (all_of_it, latest):
+            memory.add(view, now, actions, rewards, ended, infos)
+        step = zip(view, now, actions, rewards, ended, strict=True)
+        happened.extend(sample for sample in step if sample[0][FLYING] > 0)
+        view = now
+    assert 100 < len(happened) < 300 * env.num_envs, "in some lanes, nobody should have decided"
+    names = ("observations", "next_observations", "actions", "rewards", "dones")
+    for name, column in zip(names, map(np.array, zip(*happened, strict=True)), strict=True):
+        assert np.array_equal(getattr(all_of_it, name)[: len(happened), 0], column)
+        kept = np.roll(getattr(latest, name)[:, 0], -latest.pos, axis=0)
+        assert np.array_equal(kept, column[-100:])
+    assert all_of_it.dones.sum() > 0
+    assert (latest.sample(500).observations[:, FLYING] == 1.0).all()
+
+
+def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays():
+    config = load_config("sac", changes=["scenarios.pool=4", "lanes=4"])
+    trainee = Trainee.untrained(Order("sac", config, seed=0))
+    weight = float(trainee.model.log_ent_coef.detach().exp())
+    assert weight == pytest.approx(config.learning.first_entropy)
+    env = trainee.lanes
+    view = env.reset()
+    paid = []
+    for _, actions in zip(range(100), actions_of(env), strict=False):
+        decided = view[:, FLYING] > 0
+        view, rewards, _, _ = env.step(actions)
+        paid.extend(np.abs(rewards[decided]))
+    assert 0.2 < weight / np.mean(paid) < 5.0
+
+
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])
 def test_what_is_exported_decides_as_the_model_does(algorithm):
     changes = ["player.hidden=[8, 8]"]
@@ -140,6 +179,30 @@ def test_half_a_minute_of_training_covers_far_more_than_none():
     before = trainee.flights(unseen)[:, MEASURES.index("coverage")].mean()
     trainee.model.learn(300_000)
     results = fly(trainee.policy(), unseen)
+    assert before < 0.3
+    assert results[:, MEASURES.index("coverage")].mean() > 0.8
+    assert results[:, MEASURES.index("all_home")].all()
+    assert not results[:, MEASURES.index("violations")].any()
+
+
+@pytest.mark.slow
+def test_half_a_minute_of_sac_covers_most_of_what_it_has_never_seen():
+    changes = [
+        "steps=30_000",
+        "lanes=8",
+        "player.hidden=[64, 64]",
+        "scenarios.pool=16",
+        "scenarios.family.towns.n_uas=[1, 2]",
+        "scenarios.family.towns.n_waypoints=[8, 12]",
+        "learning.first_samples=2_000",
+        "learning.updates_per_step=2",
+        "learning.batch_size=256",
+    ]
+    trainee = Trainee.untrained(Order("sac", load_config("sac", changes=changes), seed=0))
+    unseen = training_scenarios(load_config(TINY).scenarios, seed=77)
+    before = trainee.flights(unseen)[:, MEASURES.index("coverage")].mean()
+    trainee.model.learn(30_000)
+    results = trainee.flights(unseen)
     assert before < 0.3
     assert results[:, MEASURES.index("coverage")].mean() > 0.8
     assert results[:, MEASURES.index("all_home")].all()

@@ -74,6 +74,10 @@ class SacSettings(StrictModel):
         learning_rate: At the start.
         final_share: See `PpoSettings`.
         gamma: Discount of a decision.
+        first_entropy: What a unit of entropy is worth at the start, in units of the reward; it is
+            learned from there on. To be of the size of the reward of a step: where it is much
+            larger, random actions pay best, and unlearning that takes 1/learning_rate updates for
+            each factor of e.
     """
 
     algorithm: Literal["sac"]
@@ -84,6 +88,7 @@ class SacSettings(StrictModel):
     learning_rate: Positive = 5e-4
     final_share: Share = 0.1
     gamma: Share = 0.99
+    first_entropy: Positive = 0.02
 
 
 class TrainingScenarios(StrictModel):
