@@ -65,7 +65,7 @@ class Study:
 STUDIES = (
     Study("maskable-ppo", "learned-waypoint"),
     Study("ppo", "learned-velocity"),
-    Study("sac", seeds=1),
+    Study("sac"),
     Study("ppo-end-to-end", seeds=1, assisted=False),
 )
 
