@@ -30,6 +30,17 @@ def borrow(array: NDArray, row: int, shape: tuple[int, ...]) -> Any:
     return array[row:].reshape(-1)[: math.prod(shape)].reshape(shape)
 
 
+def part(array: NDArray, first: int, n: int) -> Any:
+    """Some elements of a C-contiguous array one after the other, however many axes it has.
+
+    Args:
+        array: Any number of axes.
+        first: Index of the first element, counted through all axes.
+        n: How many.
+    """
+    return array.reshape(-1)[first : first + n]
+
+
 def lend(address: int, dtype: np.dtype, shape: tuple[int, ...]) -> Any:
     """The C-contiguous array that lies at an address, for as long as its owner keeps it.
 
@@ -90,6 +101,26 @@ def _borrowed(context, builder, signature, arguments):
     sizes = _sizes(builder, context, arguments[2], shape_type)
     start = builder.bitcast(start, whole.data.type)
     return _view(builder, context, signature.return_type, start, sizes, whole.itemsize)
+
+
+@type_callable(part)
+def _type_of_part(context):
+    def typer(array, first, n):
+        if not isinstance(array, types.Array) or array.layout != "C":
+            return None
+        return types.Array(array.dtype, 1, "C", readonly=not array.mutable, aligned=array.aligned)
+
+    return typer
+
+
+@lower_builtin(part, types.Array, types.Integer, types.Integer)
+def _parted(context, builder, signature, arguments):
+    array_type, first_type, n_type = signature.args
+    whole = make_array(array_type)(context, builder, arguments[0])
+    first = context.cast(builder, arguments[1], first_type, types.intp)
+    size = context.cast(builder, arguments[2], n_type, types.intp)
+    start = builder.gep(whole.data, [first])
+    return _view(builder, context, signature.return_type, start, [size], whole.itemsize)
 
 
 @type_callable(lend)

@@ -7,7 +7,7 @@ from column k on and returns the column after its last.
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.borrow import borrow
+from uas_coverage_env.borrow import part
 from uas_coverage_env.env.layout import FAR_M, HEIGHT_M, MARGIN, OBSERVATION_LAYOUT
 from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
 from uas_coverage_env.env.relative import charge_left, close, direction, within
@@ -226,14 +226,14 @@ def _remaining(arena, state, i, row, k):
     x = state.x[i, X]
     y = state.x[i, Y]
     n = state.uncovered.shape[0]
-    columns = borrow(arena.waypoint_columns, 0, (arena.waypoint_columns.size,))
+    columns = arena.waypoint_columns
     sums = room(_N_SUMS)
     _add_open(
-        borrow(columns, 0, (n,)),
-        borrow(columns, n, (n,)),
-        borrow(columns, 5 * n, (n,)),
-        borrow(columns, 6 * n, (n,)),
-        borrow(columns, 7 * n, (n,)),
+        part(columns, 0, n),
+        part(columns, n, n),
+        part(columns, 5 * n, n),
+        part(columns, 6 * n, n),
+        part(columns, 7 * n, n),
         state.uncovered, x, y, sums,
     )  # fmt: skip
     left = 0.0

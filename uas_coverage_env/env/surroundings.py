@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.borrow import borrow
+from uas_coverage_env.borrow import borrow, part
 from uas_coverage_env.env.layout import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.env.relative import within
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
@@ -13,7 +13,6 @@ from uas_coverage_env.world.boxes import (
     HULL_MIDDLE,
     MIDDLE,
     PER_HALF,
-    column,
 )
 
 _BEYOND_M = RAY_M + 1e-6
@@ -176,18 +175,19 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
             box as its walls.
         in_reach: (n or more,) written: 1 where a ray may meet its hull's box, 0 elsewhere.
     """
-    middle_x = column(columns, MIDDLE, first, n)
-    middle_y = column(columns, MIDDLE + 1, first, n)
-    middle_z = column(columns, MIDDLE + 2, first, n)
-    per_half_x = column(columns, PER_HALF, first, n)
-    per_half_y = column(columns, PER_HALF + 1, first, n)
-    per_half_z = column(columns, PER_HALF + 2, first, n)
-    hull_x = column(columns, HULL_MIDDLE, first, n)
-    hull_y = column(columns, HULL_MIDDLE + 1, first, n)
-    hull_z = column(columns, HULL_MIDDLE + 2, first, n)
-    half_x = column(columns, HULL_HALF, first, n)
-    half_y = column(columns, HULL_HALF + 1, first, n)
-    half_z = column(columns, HULL_HALF + 2, first, n)
+    stride = columns.shape[1]
+    middle_x = part(columns, MIDDLE * stride + first, n)
+    middle_y = part(columns, (MIDDLE + 1) * stride + first, n)
+    middle_z = part(columns, (MIDDLE + 2) * stride + first, n)
+    per_half_x = part(columns, PER_HALF * stride + first, n)
+    per_half_y = part(columns, (PER_HALF + 1) * stride + first, n)
+    per_half_z = part(columns, (PER_HALF + 2) * stride + first, n)
+    hull_x = part(columns, HULL_MIDDLE * stride + first, n)
+    hull_y = part(columns, (HULL_MIDDLE + 1) * stride + first, n)
+    hull_z = part(columns, (HULL_MIDDLE + 2) * stride + first, n)
+    half_x = part(columns, HULL_HALF * stride + first, n)
+    half_y = part(columns, (HULL_HALF + 1) * stride + first, n)
+    half_z = part(columns, (HULL_HALF + 2) * stride + first, n)
     for o in range(n):
         beyond[o] = max(
             abs(x - middle_x[o]) * per_half_x[o],

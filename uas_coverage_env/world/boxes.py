@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.borrow import borrow
-from uas_coverage_env.kernels import inlined_kernel, lending_kernel
+from uas_coverage_env.borrow import part
+from uas_coverage_env.kernels import inlined_kernel
 
 BLOCK = 64
 """So many obstacles are looked at at once; kernels take more in several turns."""
@@ -62,20 +62,6 @@ def obstacle_columns(obstacles: NDArray[np.void]) -> NDArray[np.float64]:
     return columns
 
 
-@lending_kernel
-def column(columns, row, first, n):
-    """Some numbers of a row of `obstacle_columns`, a borrowed view (n,).
-
-    Args:
-        columns: (N_COLUMNS, C).
-        row: Which.
-        first: Index of the first obstacle.
-        n: Number of columns.
-    """
-    flat = borrow(columns, 0, (columns.size,))
-    return borrow(flat, row * columns.shape[1] + first, (n,))
-
-
 @inlined_kernel
 def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     """Lower bounds of the clearance of a segment from some obstacles, by the boxes around both.
@@ -98,14 +84,15 @@ def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
-    middle_x = column(columns, MIDDLE, first, n)
-    middle_y = column(columns, MIDDLE + 1, first, n)
-    middle_z = column(columns, MIDDLE + 2, first, n)
-    per_half_x = column(columns, PER_HALF, first, n)
-    per_half_y = column(columns, PER_HALF + 1, first, n)
-    per_half_z = column(columns, PER_HALF + 2, first, n)
-    near_m = column(columns, NEAR, first, n)
-    rise_m = column(columns, RISE, first, n)
+    stride = columns.shape[1]
+    middle_x = part(columns, MIDDLE * stride + first, n)
+    middle_y = part(columns, (MIDDLE + 1) * stride + first, n)
+    middle_z = part(columns, (MIDDLE + 2) * stride + first, n)
+    per_half_x = part(columns, PER_HALF * stride + first, n)
+    per_half_y = part(columns, (PER_HALF + 1) * stride + first, n)
+    per_half_z = part(columns, (PER_HALF + 2) * stride + first, n)
+    near_m = part(columns, NEAR * stride + first, n)
+    rise_m = part(columns, RISE * stride + first, n)
     for o in range(n):
         times = max(0.0, max(x_low - middle_x[o], middle_x[o] - x_high) * per_half_x[o])
         times = max(times, max(y_low - middle_y[o], middle_y[o] - y_high) * per_half_y[o])
@@ -123,12 +110,13 @@ def write_meetings(columns, first, n, x0, y0, z0, x1, y1, z1, meets):
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
-    lower_x = column(columns, LOWER, first, n)
-    lower_y = column(columns, LOWER + 1, first, n)
-    lower_z = column(columns, LOWER + 2, first, n)
-    upper_x = column(columns, UPPER, first, n)
-    upper_y = column(columns, UPPER + 1, first, n)
-    upper_z = column(columns, UPPER + 2, first, n)
+    stride = columns.shape[1]
+    lower_x = part(columns, LOWER * stride + first, n)
+    lower_y = part(columns, (LOWER + 1) * stride + first, n)
+    lower_z = part(columns, (LOWER + 2) * stride + first, n)
+    upper_x = part(columns, UPPER * stride + first, n)
+    upper_y = part(columns, (UPPER + 1) * stride + first, n)
+    upper_z = part(columns, (UPPER + 2) * stride + first, n)
     for o in range(n):
         beyond = max(lower_x[o] - x_high, x_low - upper_x[o])
         beyond = max(beyond, max(lower_y[o] - y_high, y_low - upper_y[o]))
