@@ -20,7 +20,7 @@ from uas_coverage_env.env.actions import write_commands
 from uas_coverage_env.env.kernel import REPORT_SIZE, step_learners
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
-from uas_coverage_env.env.observation import observe
+from uas_coverage_env.env.observation import look
 from uas_coverage_env.env.pool import tables_of
 from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.env.surroundings import surroundings
@@ -73,10 +73,12 @@ def _world(arena, state, tables, view, weights, spare, row):
 
 @compiled
 def _observation(arena, state, tables, view, weights, spare, row):
-    observe(
-        arena, state, tables[1], view.company, state.status == FLYING, view.targets,
-        arena.rules[0].max_steps, view.candidates, row,
-    )  # fmt: skip
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING:
+            look(
+                arena, state, tables[1][i], view.company, i, view.targets,
+                arena.rules[0].max_steps, view.candidates[i], row[i],
+            )  # fmt: skip
 
 
 @compiled

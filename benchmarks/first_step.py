@@ -1,0 +1,73 @@
+"""How long a newcomer waits for the first step, and how much memory that takes.
+
+    python benchmarks/first_step.py
+
+Numba compiles what is flown when it is first flown, and keeps it beside the sources. Each row is a
+process of its own: first with an empty cache, then again with what the first has kept. What is not
+asked for (return mode, safety filter, the waypoint action's guidance) is not compiled.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+from rich.console import Console
+from rich.table import Table
+
+PROGRAM = """
+import json, resource, sys, time
+start = time.perf_counter(), time.process_time()
+settings = json.loads(sys.argv[2])
+if sys.argv[1] == "one mission":
+    from uas_coverage_env import uas_coverage_v0
+    env = uas_coverage_v0.parallel_env(**settings)
+    env.reset(seed=0)
+    env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+else:
+    import gymnasium, uas_coverage_env
+    env = gymnasium.make_vec(
+        "UASCoverage-v0", num_envs=64, vectorization_mode="vector_entry_point", **settings
+    )
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+print(json.dumps([time.perf_counter() - start[0], time.process_time() - start[1], peak]))
+"""
+
+SETTINGS: dict[str, dict[str, object]] = {
+    "velocity": {},
+    "waypoint": {"action": "waypoint"},
+    "velocity, return mode and filter": {"return_mode": True, "safety_filter": True},
+}
+
+
+def measured(kind: str, settings: dict[str, object], cache: str) -> list[float]:
+    """Wall clock and processor time to the first step [s], and peak memory [MB]."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, kind, json.dumps(settings)],
+        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        stdout=subprocess.PIPE,
+        check=True,
+        text=True,
+    )
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def main() -> None:
+    """Print the table."""
+    table = Table("environment", "settings", "first, s", "processor, s", "peak MB", "again, s")
+    for kind in ("one mission", "64 missions"):
+        for name, settings in SETTINGS.items():
+            with tempfile.TemporaryDirectory() as cache:
+                wall_s, cpu_s, peak_mb = measured(kind, settings, cache)
+                again_s = measured(kind, settings, cache)[0]
+            table.add_row(
+                kind, name, f"{wall_s:.0f}", f"{cpu_s:.0f}", f"{peak_mb:.0f}", f"{again_s:.1f}"
+            )
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()
