@@ -108,7 +108,7 @@ class CoverageBatch:
             self.actions.kind,
             weights_of(reward_weights),
             dynamics == "nonlinear",
-            *assistants(bool(return_mode), bool(safety_filter), goes_to=self.chooses),
+            *assistants(return_mode, safety_filter, goes_to=self.chooses),
             self.autoreset,
         )
         shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)

@@ -120,7 +120,7 @@ class Episode:
         self._settings = (
             self.actions.kind,
             dynamics == "nonlinear",
-            *assistants(bool(return_mode), bool(safety_filter), goes_to=self.chooses),
+            *assistants(return_mode, safety_filter, goes_to=self.chooses),
         )
         self._prepare()
 

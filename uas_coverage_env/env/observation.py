@@ -178,6 +178,7 @@ def _home(arena, state, i, row, k):
 
 @inlined_kernel
 def _way(here_m, there_m):
+    # not in `_add_open` itself: this is no whole number, and its order of operations has to stay
     return there_m - here_m
 
 

@@ -5,6 +5,7 @@ import math
 from uas_coverage_env.borrow import borrow, part
 from uas_coverage_env.env.layout import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.env.relative import within
+from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world.boxes import (
@@ -37,18 +38,6 @@ _WITHIN_BOX = 1.000001
 """So many times as far from the middle of a box as its walls: inside, whatever is rounded."""
 
 _N, _NE, _E, _SE, _S, _SW, _W, _NW, _UP, _DOWN = range(N_RAYS)
-
-
-@inlined_kernel
-def _farthest_out_m(normals, offsets_m, first, last, x, y, z):
-    """How far a point is out of the face plane that it is farthest out of [m]."""
-    faces = borrow(normals, first, (last - first, 3))
-    away_m = borrow(offsets_m, first, (last - first,))
-    largest = -math.inf
-    for h in range(away_m.shape[0]):
-        d = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
-        largest = max(largest, d)
-    return largest
 
 
 @kernel
@@ -276,7 +265,7 @@ def surroundings(arena, state, i, row, k):
         for o in range(min(n, n_obstacles - first)):
             obstacle = arena.obstacles[first + o]
             if beyond[o] < _WITHIN_BOX:
-                out_m = _farthest_out_m(
+                out_m = signed_distance(
                     normals, offsets_m, obstacle.first_face, obstacle.last_face, x, y, z
                 )
                 clearance_m = min(clearance_m, out_m)

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle import (
     PHI,
     THETA,
@@ -275,6 +276,21 @@ def _paths_apart(path_m, other_m, k, keep_m):
     return False
 
 
+@kernel
+def separation_at(path_m, other_m, k):
+    """Smallest separation [m] of two UAS on paths (S + 1, 3) between samples k and k + 1."""
+    return cylinder_clearance(
+        0.0,
+        0.0,
+        path_m[k, 0] - other_m[k, 0],
+        path_m[k, 1] - other_m[k, 1],
+        path_m[k, 2] - other_m[k, 2],
+        path_m[k + 1, 0] - other_m[k + 1, 0],
+        path_m[k + 1, 1] - other_m[k + 1, 1],
+        path_m[k + 1, 2] - other_m[k + 1, 2],
+    )
+
+
 @njit(cache=True, error_model="numpy")
 def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
     """Least distance to spare from the paths to which the other UAS are committed.
@@ -306,16 +322,7 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
         for k in range(path_m.shape[0] - 1):
             if _paths_apart(path_m, other_m, k, required_m + max(slack_m, 0.0)):
                 continue
-            apart_m = cylinder_clearance(
-                0.0,
-                0.0,
-                path_m[k, 0] - other_m[k, 0],
-                path_m[k, 1] - other_m[k, 1],
-                path_m[k, 2] - other_m[k, 2],
-                path_m[k + 1, 0] - other_m[k + 1, 0],
-                path_m[k + 1, 1] - other_m[k + 1, 1],
-                path_m[k + 1, 2] - other_m[k + 1, 2],
-            )
+            apart_m = separation_at(path_m, other_m, k)
             slack_m = min(slack_m, apart_m - required_m)
             if slack_m < enough_m:
                 return slack_m

@@ -10,9 +10,8 @@ wall: nobody gives up the room to brake for it.
 
 from numba import njit
 
-from uas_coverage_env.geometry import cylinder_clearance
 from uas_coverage_env.world.evasion import LINGERING
-from uas_coverage_env.world.lookahead import fly_hold_and_brake
+from uas_coverage_env.world.lookahead import fly_hold_and_brake, separation_at
 from uas_coverage_env.world.state import FLYING
 
 CLAIMED_S = 5.0
@@ -80,17 +79,7 @@ def room_beside(arena, i, path_m, claimants, n_claims, claims_m):
         radii_m = arena.uas[i].radius_m + arena.uas[other].radius_m
         required_m = radii_m + arena.rules[0].uas_safe_distance_m + ELBOW_ROOM_M
         for k in range(n_steps):
-            clearance_m = cylinder_clearance(
-                0.0,
-                0.0,
-                path_m[k, 0] - way_m[k, 0],
-                path_m[k, 1] - way_m[k, 1],
-                path_m[k, 2] - way_m[k, 2],
-                path_m[k + 1, 0] - way_m[k + 1, 0],
-                path_m[k + 1, 1] - way_m[k + 1, 1],
-                path_m[k + 1, 2] - way_m[k + 1, 2],
-            )
-            room_m = clearance_m - required_m
+            room_m = separation_at(path_m, way_m, k) - required_m
             least_m = min(least_m, room_m)
             shortfall_m += min(room_m, 0.0)
     return least_m + LINGERING * shortfall_m / n_steps
