@@ -50,28 +50,36 @@ def room(size: int) -> NDArray[np.float64]:
     return np.empty(size)
 
 
-def _on_the_stack(typing_context, size):
-    if not isinstance(size, types.IntegerLiteral):
-        return None
+def single_room(size: int) -> NDArray[np.float32]:
+    """`room` for single precision."""
+    return np.empty(size, np.float32)
 
-    def generate(context, builder, signature, arguments):
-        double = ir.DoubleType()
-        data = cgutils.alloca_once(builder, ir.ArrayType(double, size.literal_value))
-        array = make_array(signature.return_type)(context, builder)
-        width = context.get_constant(types.intp, 8)
-        populate_array(
-            array,
-            data=builder.bitcast(data, double.as_pointer()),
-            shape=[context.get_constant(types.intp, size.literal_value)],
-            strides=[width],
-            itemsize=width,
-            meminfo=None,
-            parent=None,
-        )
-        return array._getvalue()
 
-    return types.Array(types.float64, 1, "C")(size), generate
+def _on_the_stack(number: types.Float, element: ir.Type) -> Any:
+    def make(typing_context, size):
+        if not isinstance(size, types.IntegerLiteral):
+            return None
+
+        def generate(context, builder, signature, arguments):
+            data = cgutils.alloca_once(builder, ir.ArrayType(element, size.literal_value))
+            array = make_array(signature.return_type)(context, builder)
+            width = context.get_constant(types.intp, number.bitwidth // 8)
+            populate_array(
+                array,
+                data=builder.bitcast(data, element.as_pointer()),
+                shape=[context.get_constant(types.intp, size.literal_value)],
+                strides=[width],
+                itemsize=width,
+                meminfo=None,
+                parent=None,
+            )
+            return array._getvalue()
+
+        return types.Array(number, 1, "C")(size), generate
+
+    return intrinsic(prefer_literal=True)(make)
 
 
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
-    room = intrinsic(prefer_literal=True)(_on_the_stack)  # pyright: ignore[reportAssignmentType]
+    room = _on_the_stack(types.float64, ir.DoubleType())
+    single_room = _on_the_stack(types.float32, ir.FloatType())

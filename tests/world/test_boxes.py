@@ -11,8 +11,8 @@ from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import WorldState, advance, assistants, build_arena
 from uas_coverage_env.world.boxes import (
     BLOCK,
+    BOX,
     N_COLUMNS,
-    UPPER,
     obstacle_columns,
     padded,
     write_lower_bounds,
@@ -31,7 +31,7 @@ N_SEGMENTS = 300
 def bounds(columns, n, segment, bound_m, meets):
     x0, y0, z0, x1, y1, z1 = segment
     write_lower_bounds(columns, 0, n, x0, y0, z0, x1, y1, z1, bound_m)
-    write_meetings(columns, 0, n, x0, y0, z0, x1, y1, z1, meets)
+    write_meetings(columns, BOX, 0, n, x0, y0, z0, x1, y1, z1, meets)
 
 
 @inlined_kernel
@@ -118,7 +118,7 @@ def test_an_obstacle_of_the_last_block_is_not_overlooked(arena, segments):
     far = np.concatenate([arena.obstacles] * 4).view(arena.obstacles.dtype)[: BLOCK + 1]
     columns = obstacle_columns(far)
     columns[:, :BLOCK] = 1e9
-    columns[UPPER : UPPER + 3, :BLOCK] = -1e9
+    columns[BOX + 3 : BOX + 6, :BLOCK] = -1e9
     alone = arena._replace(obstacles=far[BLOCK:], obstacle_columns=obstacle_columns(far[BLOCK:]))
     among = arena._replace(obstacles=far, obstacle_columns=columns)
     for segment in segments:

@@ -368,7 +368,7 @@ def _empty_lanes(pool: ScenarioPool, n: int, threads: int) -> Lanes:
         asked=np.zeros((n, n_uas, pool.actions.size)),
         targets=np.zeros((n, n_uas), dtype=np.int64),
         candidates=np.zeros((n, n_uas, K_WAYPOINTS), dtype=np.int64),
-        company=np.zeros((n, n_waypoints, 2)),
+        company=np.zeros((n, n_waypoints, 2), np.float32),
         commands=np.zeros((threads, n_uas), dtype=COMMAND_DTYPE),
         outcome=np.zeros((threads, n_uas), dtype=OUTCOME_DTYPE),
         report=np.zeros((n, n_uas, REPORT_SIZE)),

@@ -68,7 +68,7 @@ class Lanes(NamedTuple):
     """(L, U) see `step_learners`, also the next two."""
     candidates: NDArray[np.int64]
     """(L, U, K_WAYPOINTS)."""
-    company: NDArray[np.float64]
+    company: NDArray[np.float32]
     """(L, W, 2)."""
     commands: NDArray[np.void]
     """(threads, U) of the lane that a thread flew last: all lanes share them, so they stay in its

@@ -42,7 +42,7 @@ class Missions(NamedTuple):
     """(N, U, size) see `step_learners`, also the next six."""
     targets: NDArray[np.int64]
     candidates: NDArray[np.int64]
-    company: NDArray[np.float64]
+    company: NDArray[np.float32]
     commands: NDArray[np.void]
     outcome: NDArray[np.void]
     report: NDArray[np.float64]
@@ -73,7 +73,7 @@ class Start(NamedTuple):
     x: NDArray[np.float64]
     uncovered: NDArray[np.bool_]
     candidates: NDArray[np.int64]
-    company: NDArray[np.float64]
+    company: NDArray[np.float32]
     observation: NDArray[np.float32]
 
 

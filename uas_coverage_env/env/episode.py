@@ -91,6 +91,7 @@ class Episode:
             dynamics=dynamics,  # pyright: ignore[reportArgumentType]  # the world checks it
             return_mode=bool(return_mode),
             safety_filter=bool(safety_filter),
+            measured_m=0.0,  # only what counts: nobody is told more
         )
         self.scenario = scenario
         self.names = self._world.names
@@ -109,7 +110,7 @@ class Episode:
         self.asked = np.zeros((n_uas, self.actions.size))
         self._targets = np.full(n_uas, NO_TARGET)
         self._candidates = np.full((n_uas, K_WAYPOINTS), -1)
-        self._company = np.zeros((len(scenario.waypoints), 2))
+        self._company = np.zeros((len(scenario.waypoints), 2), np.float32)
         self._commands = np.zeros(n_uas, dtype=COMMAND_DTYPE)
         self._outcome = np.zeros(n_uas, dtype=OUTCOME_DTYPE)
         self._report = np.zeros((n_uas, REPORT_SIZE))

@@ -45,7 +45,8 @@ REPORT_SIZE = REWARD + 1
 
 ACCEPTED = -1
 
-FLOAT, INT, BOOL = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.bool_)
+FLOAT, SINGLE = np.dtype(np.float64), np.dtype(np.float32)
+INT, BOOL = np.dtype(np.int64), np.dtype(np.bool_)
 
 
 @inlined_kernel
@@ -178,7 +179,7 @@ def step_episode(
         arena, state, kind, lend(at[21], RANGES_DTYPE, (u,)), lend(at[22], SCALES_DTYPE, (u,)),
         lend(at[23], NEIGHBOURS_DTYPE, (w,)), lend(at[24], FLOAT, (len(REWARD_TERMS),)),
         nonlinear, return_mode, safety_filter, lend(at[25], FLOAT, (u, sizes[7])),
-        lend(at[26], INT, (u,)), lend(at[27], INT, (u, K_WAYPOINTS)), lend(at[28], FLOAT, (w, 2)),
+        lend(at[26], INT, (u,)), lend(at[27], INT, (u, K_WAYPOINTS)), lend(at[28], SINGLE, (w, 2)),
         lend(at[29], COMMAND_DTYPE, (u,)), lend(at[30], OUTCOME_DTYPE, (u,)),
         lend(at[31], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,
     )  # fmt: skip

@@ -15,6 +15,7 @@ from uas_coverage_env.env.layout import (
     K_UAS,
     K_WAYPOINTS,
     MARGIN,
+    NEARBY_M,
 )
 from uas_coverage_env.env.relative import (
     STRAIGHT_M,
@@ -24,7 +25,7 @@ from uas_coverage_env.env.relative import (
     direction,
     within,
 )
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.kernels import inlined_kernel, kernel, room, single_room
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world import FLYING
@@ -35,6 +36,11 @@ NO_TARGET = -2
 N_NEIGHBOURS = 24
 
 _WAYPOINTS_SIZE = 12 * K_WAYPOINTS
+
+_ZERO, _ONE, _INFINITE = np.float32(0.0), np.float32(1.0), np.float32(math.inf)
+_NEARBY_M = np.float32(NEARBY_M)
+_PER_HEIGHT = np.float32(1.0 / HEIGHT_M)
+_STRAIGHT_M2 = np.float32(STRAIGHT_M * STRAIGHT_M)
 
 NEIGHBOURS_DTYPE = np.dtype(
     (
@@ -158,7 +164,8 @@ def count_company(uncovered, neighbours, company):
     Args:
         uncovered: (W,) still to be covered.
         neighbours: (W,) of NEIGHBOURS_DTYPE.
-        company: (W, 2) closeness of the next open waypoint, and how crowded it is; written.
+        company: (W, 2) of float32, closeness of the next open waypoint, and how crowded it is;
+            written.
     """
     for w in range(company.shape[0]):
         index = neighbours[w].index
@@ -179,7 +186,7 @@ def count_company(uncovered, neighbours, company):
 
 
 @inlined_kernel
-def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m, taken):
+def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m2, taken):
     """How near the nearest other flying UAS is to each waypoint, and whether one goes there.
 
     Args:
@@ -191,12 +198,9 @@ def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m, take
         north_m: (K_WAYPOINTS,) where they are [m]; likewise east_m and down_m.
         east_m: See north_m.
         down_m: See north_m.
-        rival_m: (K_WAYPOINTS,) [m] written.
-        taken: (K_WAYPOINTS,) written, 1 where one goes there.
+        rival_m2: (K_WAYPOINTS,) [m²] infinite; written.
+        taken: (K_WAYPOINTS,) zero; written, 1 where one goes there.
     """
-    for c in range(n):
-        rival_m[c] = math.inf
-        taken[c] = 0.0
     for j in range(state.status.shape[0]):
         if j == i or state.status[j] != FLYING:
             continue
@@ -204,12 +208,20 @@ def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m, take
         y = state.x[j, Y]
         z = state.x[j, Z]
         for c in range(n):
-            away_m = apart_m(north_m[c] - x, east_m[c] - y, down_m[c] - z)
-            rival_m[c] = away_m if away_m < rival_m[c] else rival_m[c]
+            dx = np.float32(north_m[c] - x)
+            dy = np.float32(east_m[c] - y)
+            dz = np.float32(down_m[c] - z)
+            rival_m2[c] = min(rival_m2[c], dx * dx + dy * dy + dz * dz)
         if targets[j] >= 0 and not state.returning[j]:
             target = float(targets[j])
             for c in range(n):
-                taken[c] = 1.0 if wanted[c] == target else taken[c]
+                taken[c] = _ONE if wanted[c] == target else taken[c]
+
+
+@inlined_kernel
+def _near(distance_m):
+    """`close` in single precision."""
+    return _NEARBY_M / (_NEARBY_M + distance_m)
 
 
 @inlined_kernel
@@ -217,8 +229,9 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     """Write the open waypoints nearest to UAS i; returns the next column.
 
     Feature by feature rather than waypoint by waypoint, always for as many as there may be: so
-    the processor does four at a time. Those that are not there are the first waypoint until they
-    become zeros.
+    the processor does several at a time. From the ways on in single precision, as they are told:
+    its roots and divisions take a third of the time. Waypoints that are not there are the first
+    waypoint until they become zeros.
     """
     uas = arena.uas[i]
     x = state.x[i, X]
@@ -227,20 +240,24 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     home_north_m = uas.home_m[0]
     home_east_m = uas.home_m[1]
     home_down_m = uas.home_m[2]
-    margin_per_m = uas.dod_per_s / (uas.speed_mps * MARGIN)
-    margin_left = (uas.dod_max - state.x[i, DOD]) * (1.0 / MARGIN)
+    margin_per_m = np.float32(uas.dod_per_s / (uas.speed_mps * MARGIN))
+    margin_left = np.float32((uas.dod_max - state.x[i, DOD]) * (1.0 / MARGIN))
     wanted = room(K_WAYPOINTS)
     north_m = room(K_WAYPOINTS)
     east_m = room(K_WAYPOINTS)
     down_m = room(K_WAYPOINTS)
-    rival_m = room(K_WAYPOINTS)
-    taken = room(K_WAYPOINTS)
-    north = room(K_WAYPOINTS)
-    east = room(K_WAYPOINTS)
-    there = room(K_WAYPOINTS)
-    below = room(K_WAYPOINTS)
-    from_home = room(K_WAYPOINTS)
-    margin = room(K_WAYPOINTS)
+    weight = single_room(K_WAYPOINTS)
+    next_one = single_room(K_WAYPOINTS)
+    crowd = single_room(K_WAYPOINTS)
+    rival_m2 = single_room(K_WAYPOINTS)
+    taken = single_room(K_WAYPOINTS)
+    north = single_room(K_WAYPOINTS)
+    east = single_room(K_WAYPOINTS)
+    there = single_room(K_WAYPOINTS)
+    below = single_room(K_WAYPOINTS)
+    rival = single_room(K_WAYPOINTS)
+    from_home = single_room(K_WAYPOINTS)
+    margin = single_room(K_WAYPOINTS)
     columns = arena.waypoint_columns
     n = 0
     for c in range(K_WAYPOINTS):
@@ -250,44 +267,50 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
         north_m[c] = columns[0, w]
         east_m[c] = columns[1, w]
         down_m[c] = columns[2, w]
+        weight[c] = np.float32(columns[4, w] * scale.per_heaviest)
+        # here already: of 1000 missions, most of this lies far from the processor
+        next_one[c] = company[w, 0]
+        crowd[c] = company[w, 1]
+        rival_m2[c] = _INFINITE
+        taken[c] = _ZERO
     # in fours, and not always twelve: a loop of known length is unrolled before it is vectorised
-    _rivals(state, i, targets, wanted, (n + 3) & -4, north_m, east_m, down_m, rival_m, taken)
+    _rivals(state, i, targets, wanted, (n + 3) & -4, north_m, east_m, down_m, rival_m2, taken)
     for c in range(K_WAYPOINTS):
-        dx = north_m[c] - x
-        dy = east_m[c] - y
-        dz = down_m[c] - z
+        dx = np.float32(north_m[c] - x)
+        dy = np.float32(east_m[c] - y)
+        dz = np.float32(down_m[c] - z)
+        home_dx = np.float32(north_m[c] - home_north_m)
+        home_dy = np.float32(east_m[c] - home_east_m)
+        home_dz = np.float32(down_m[c] - home_down_m)
         level_m2 = dx * dx + dy * dy
         there_m = math.sqrt(level_m2 + dz * dz)
-        home_m = apart_m(
-            north_m[c] - home_north_m, east_m[c] - home_east_m, down_m[c] - home_down_m
-        )
-        per_m = 1.0 / math.sqrt(level_m2) if level_m2 > STRAIGHT_M * STRAIGHT_M else 0.0
-        north[c] = within(dx * per_m, -1.0, 1.0)
-        east[c] = within(dy * per_m, -1.0, 1.0)
-        there[c] = close(there_m)
-        below[c] = within(dz * (1.0 / HEIGHT_M), -1.0, 1.0)
-        rival_m[c] = close(rival_m[c])
-        from_home[c] = close(home_m)
-        margin[c] = within(margin_left - (there_m + home_m) * margin_per_m, -1.0, 1.0)
+        home_m = math.sqrt(home_dx * home_dx + home_dy * home_dy + home_dz * home_dz)
+        per_m = _ONE / math.sqrt(level_m2) if level_m2 > _STRAIGHT_M2 else _ZERO
+        north[c] = within(dx * per_m, -_ONE, _ONE)
+        east[c] = within(dy * per_m, -_ONE, _ONE)
+        there[c] = _near(there_m)
+        below[c] = within(dz * _PER_HEIGHT, -_ONE, _ONE)
+        rival[c] = _near(math.sqrt(rival_m2[c]))
+        from_home[c] = _near(home_m)
+        margin[c] = within(margin_left - (there_m + home_m) * margin_per_m, -_ONE, _ONE)
     # a view of its own: the compiler knows that its indices are not negative
     told = borrow(row, k, (_WAYPOINTS_SIZE,))
     for c in range(K_WAYPOINTS):
-        w = max(candidates[c], 0)
-        told[12 * c] = 1.0
+        told[12 * c] = _ONE
         told[12 * c + 1] = north[c]
         told[12 * c + 2] = east[c]
         told[12 * c + 3] = there[c]
         told[12 * c + 4] = below[c]
-        told[12 * c + 5] = within(columns[4, w] * scale.per_heaviest, 0.0, 1.0)
-        told[12 * c + 6] = company[w, 0]
-        told[12 * c + 7] = company[w, 1]
-        told[12 * c + 8] = rival_m[c]
+        told[12 * c + 5] = within(weight[c], _ZERO, _ONE)
+        told[12 * c + 6] = next_one[c]
+        told[12 * c + 7] = crowd[c]
+        told[12 * c + 8] = rival[c]
         told[12 * c + 9] = taken[c]
         told[12 * c + 10] = from_home[c]
         told[12 * c + 11] = margin[c]
     if n < K_WAYPOINTS:
         for at in range(_WAYPOINTS_SIZE):
-            told[at] = told[at] if at < 12 * n else 0.0
+            told[at] = told[at] if at < 12 * n else _ZERO
     return k + _WAYPOINTS_SIZE
 
 

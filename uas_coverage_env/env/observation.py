@@ -182,41 +182,44 @@ def _way(here_m, there_m):
     return there_m - here_m
 
 
-@inlined_kernel
-def _sector(dx, dy):
-    """Which eighth of the horizon a place lies in: 0 from north to north-east, and on clockwise."""
-    # selections rather than branches, which waypoints in every direction would mispredict
-    forward = dx > 0.0 if dy >= 0.0 else dx < 0.0
-    flat = abs(dy) < abs(dx) if forward else abs(dx) < abs(dy)
-    return (0.0 if dy >= 0.0 else 4.0) + (0.0 if forward else 2.0) + (0.0 if flat else 1.0)
-
-
 @counting_kernel
 def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, y, sums):
-    """Add up the open waypoints: sectors of their shares, then shares times north and east."""
-    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
+    """Add up the open waypoints: shares in each eighth of the horizon, and times north and east.
+
+    Three questions say in which eighth a waypoint lies. Asking them takes the processor longer than
+    adding, so the sums are those over every combination of yes; the eighths follow from them.
+    """
+    total = easterly = forward = flat = 0.0
+    easterly_forward = easterly_flat = forward_flat = all_three = 0.0
     north = east = 0.0
     for w in range(uncovered.shape[0]):
         share = shares[w] if uncovered[w] else 0.0
-        sector = _sector(_way(x, north_m[w]), _way(y, east_m[w]))
-        s0 += share if sector == 0.0 else 0.0
-        s1 += share if sector == 1.0 else 0.0
-        s2 += share if sector == 2.0 else 0.0
-        s3 += share if sector == 3.0 else 0.0
-        s4 += share if sector == 4.0 else 0.0
-        s5 += share if sector == 5.0 else 0.0
-        s6 += share if sector == 6.0 else 0.0
-        s7 += share if sector == 7.0 else 0.0
+        dx = _way(x, north_m[w])
+        dy = _way(y, east_m[w])
+        # from north to south over east; then, in the direction of turning, the first of two
+        # quarters; then nearer to north or south in quarters that begin there, and so on
+        is_easterly = dy >= 0.0
+        is_forward = (dx > 0.0) & is_easterly | (dx < 0.0) & (dy < 0.0)
+        is_flat = (abs(dy) < abs(dx)) & is_forward | (abs(dx) < abs(dy)) & (not is_forward)
+        total += share
+        easterly += share if is_easterly else 0.0
+        forward += share if is_forward else 0.0
+        flat += share if is_flat else 0.0
+        easterly_forward += share if is_easterly & is_forward else 0.0
+        easterly_flat += share if is_easterly & is_flat else 0.0
+        forward_flat += share if is_forward & is_flat else 0.0
+        all_three += share if is_easterly & is_forward & is_flat else 0.0
         north += shares_north[w] if uncovered[w] else 0.0
         east += shares_east[w] if uncovered[w] else 0.0
-    sums[0] = s0
-    sums[1] = s1
-    sums[2] = s2
-    sums[3] = s3
-    sums[4] = s4
-    sums[5] = s5
-    sums[6] = s6
-    sums[7] = s7
+    sums[0] = all_three
+    sums[1] = easterly_forward - all_three
+    sums[2] = easterly_flat - all_three
+    sums[3] = easterly - easterly_forward - easterly_flat + all_three
+    sums[4] = forward_flat - all_three
+    sums[5] = forward - easterly_forward - forward_flat + all_three
+    sums[6] = flat - easterly_flat - forward_flat + all_three
+    sums[7] = total - easterly - forward - flat + (easterly_forward + easterly_flat + forward_flat)
+    sums[7] -= all_three
     sums[8] = north
     sums[9] = east
 

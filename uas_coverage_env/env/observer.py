@@ -31,7 +31,7 @@ class Observer:
         self._scales = scales_of(scenario)
         self._neighbours = neighbours_of(scenario)
         self._no_targets = np.full(len(scenario.uas), NO_TARGET)
-        self._company = np.zeros((len(scenario.waypoints), 2))
+        self._company = np.zeros((len(scenario.waypoints), 2), np.float32)
         self._max_steps = scenario.max_steps
         self._observation = np.zeros((len(scenario.uas), OBSERVATION_SIZE), np.float32)
         self.candidates = np.full((len(scenario.uas), K_WAYPOINTS), -1)

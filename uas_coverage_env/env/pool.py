@@ -43,7 +43,7 @@ class LearnerTables(NamedTuple):
     """(all waypoints,) of NEIGHBOURS_DTYPE."""
     first_candidates: NDArray[np.int64]
     """(all UAS, K_WAYPOINTS) what missions begin with, also the next two."""
-    first_company: NDArray[np.float64]
+    first_company: NDArray[np.float32]
     """(all waypoints, 2)."""
     first_observation: NDArray[np.float32]
     """(all UAS, OBSERVATION_SIZE)."""
@@ -120,7 +120,7 @@ class ScenarioPool:
     ) -> None:
         given = [scenario] if isinstance(scenario, str | Path | Scenario) else scenario
         self.scenarios = tuple(_loaded(entry, max_cycles) for entry in given)
-        self.arenas = pool_arenas(self.scenarios)
+        self.arenas = pool_arenas(self.scenarios, measured_m=0.0)  # only what counts
         self.n_uas = n_of(self.arenas, "uas")
         self.n_waypoints = n_of(self.arenas, "waypoints")
         actions = [actions_of(action, scenario) for scenario in self.scenarios]
@@ -146,7 +146,7 @@ class ScenarioPool:
         for s, (n_uas, n_waypoints) in enumerate(zip(self.n_uas, self.n_waypoints, strict=True)):
             first = (
                 np.full((n_uas, K_WAYPOINTS), -1),
-                np.zeros((n_waypoints, 2)),
+                np.zeros((n_waypoints, 2), np.float32),
                 np.zeros((n_uas, OBSERVATION_SIZE), np.float32),
             )
             _look_first(self.arenas, tables, worlds, s, np.full(n_uas, NO_TARGET), *first)

@@ -171,6 +171,14 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
     per_half_x = part(columns, PER_HALF * stride + first, n)
     per_half_y = part(columns, (PER_HALF + 1) * stride + first, n)
     per_half_z = part(columns, (PER_HALF + 2) * stride + first, n)
+    for o in range(n):
+        beyond[o] = max(
+            abs(x - middle_x[o]) * per_half_x[o],
+            abs(y - middle_y[o]) * per_half_y[o],
+            abs(z - middle_z[o]) * per_half_z[o],
+        )
+    # a loop of its own: of one that reads all twelve columns the compiler thinks, for less than
+    # twenty obstacles, that vector instructions would not pay
     hull_x = part(columns, HULL_MIDDLE * stride + first, n)
     hull_y = part(columns, (HULL_MIDDLE + 1) * stride + first, n)
     hull_z = part(columns, (HULL_MIDDLE + 2) * stride + first, n)
@@ -178,11 +186,6 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
     half_y = part(columns, (HULL_HALF + 1) * stride + first, n)
     half_z = part(columns, (HULL_HALF + 2) * stride + first, n)
     for o in range(n):
-        beyond[o] = max(
-            abs(x - middle_x[o]) * per_half_x[o],
-            abs(y - middle_y[o]) * per_half_y[o],
-            abs(z - middle_z[o]) * per_half_z[o],
-        )
         north_m = hull_x[o] - x
         east_m = hull_y[o] - y
         down_m = hull_z[o] - z

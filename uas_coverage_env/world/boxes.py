@@ -18,10 +18,11 @@ BLOCK = 64
 SURE_M = 1e-6
 """More than rounding can change in a distance [m]."""
 
-MIDDLE, PER_HALF, NEAR, RISE, HULL_MIDDLE, HULL_HALF, LOWER, UPPER = 0, 3, 6, 7, 8, 11, 14, 17
-"""First rows of `obstacle_columns`; all but NEAR and RISE have three."""
+MIDDLE, PER_HALF, NEAR, RISE, HULL_MIDDLE, HULL_HALF, BOX, MEASURED = 0, 3, 6, 7, 8, 11, 14, 20
+"""First rows of `obstacle_columns`; NEAR and RISE have one, BOX and MEASURED six (lower and upper
+corner), the others three."""
 
-N_COLUMNS = 20
+N_COLUMNS = 26
 
 _FAR_M = 1e9
 
@@ -43,9 +44,9 @@ def obstacle_columns(obstacles: NDArray[np.void]) -> NDArray[np.float64]:
     """
     n_obstacles = len(obstacles)
     columns = np.zeros((N_COLUMNS, padded(n_obstacles)))
-    for far in (MIDDLE, HULL_MIDDLE, LOWER):
+    for far in (MIDDLE, HULL_MIDDLE, BOX, MEASURED):
         columns[far : far + 3] = _FAR_M
-    columns[UPPER : UPPER + 3] = -_FAR_M
+    columns[BOX + 3 : BOX + 6] = columns[MEASURED + 3 : MEASURED + 6] = -_FAR_M
     columns[PER_HALF : PER_HALF + 3] = 1.0
     columns[NEAR] = math.inf
     columns[NEAR, :n_obstacles] = obstacles["near_m"]
@@ -55,8 +56,10 @@ def obstacle_columns(obstacles: NDArray[np.void]) -> NDArray[np.float64]:
         (PER_HALF, "per_half_m"),
         (HULL_MIDDLE, "hull_middle_m"),
         (HULL_HALF, "hull_half_m"),
-        (LOWER, "lower_m"),
-        (UPPER, "upper_m"),
+        (BOX, "lower_m"),
+        (BOX + 3, "upper_m"),
+        (MEASURED, "measured_lower_m"),
+        (MEASURED + 3, "measured_upper_m"),
     ):
         columns[first : first + 3, :n_obstacles] = obstacles[field].T
     return columns
@@ -102,21 +105,22 @@ def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
 
 
 @inlined_kernel
-def write_meetings(columns, first, n, x0, y0, z0, x1, y1, z1, meets):
-    """Which obstacles' boxes, outside of which every point is near_m away, a segment may meet.
+def write_meetings(columns, box, first, n, x0, y0, z0, x1, y1, z1, meets):
+    """Which obstacles' boxes a segment may meet.
 
-    Arguments as for `write_lower_bounds`; `meets` is 1 where the boxes meet, 0 elsewhere.
+    Arguments as for `write_lower_bounds`; `box` is BOX, outside of which every point is near_m
+    away, or MEASURED; `meets` is 1 where the boxes meet, 0 elsewhere.
     """
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
     stride = columns.shape[1]
-    lower_x = part(columns, LOWER * stride + first, n)
-    lower_y = part(columns, (LOWER + 1) * stride + first, n)
-    lower_z = part(columns, (LOWER + 2) * stride + first, n)
-    upper_x = part(columns, UPPER * stride + first, n)
-    upper_y = part(columns, (UPPER + 1) * stride + first, n)
-    upper_z = part(columns, (UPPER + 2) * stride + first, n)
+    lower_x = part(columns, box * stride + first, n)
+    lower_y = part(columns, (box + 1) * stride + first, n)
+    lower_z = part(columns, (box + 2) * stride + first, n)
+    upper_x = part(columns, (box + 3) * stride + first, n)
+    upper_y = part(columns, (box + 4) * stride + first, n)
+    upper_z = part(columns, (box + 5) * stride + first, n)
     for o in range(n):
         beyond = max(lower_x[o] - x_high, x_low - upper_x[o])
         beyond = max(beyond, max(lower_y[o] - y_high, y_low - upper_y[o]))

@@ -12,7 +12,13 @@ from uas_coverage_env.geometry import (
 )
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import DOD, X, Y, Z
-from uas_coverage_env.world.boxes import BLOCK, SURE_M, write_lower_bounds
+from uas_coverage_env.world.boxes import (
+    BLOCK,
+    MEASURED,
+    SURE_M,
+    write_lower_bounds,
+    write_meetings,
+)
 from uas_coverage_env.world.outcome import BATTERY, FENCE, MOVING_OBSTACLE, NONE, OBSTACLE, UAS
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
@@ -51,26 +57,41 @@ def _likely_nearest(columns, x0, y0, z0, x1, y1, z1):
 
 
 @inlined_kernel
+def _may_be_measured(columns, x0, y0, z0, x1, y1, z1):
+    """Whether a segment comes near enough to an obstacle for the distance to matter."""
+    meets = room(BLOCK)
+    n_met = 0
+    for first in range(0, columns.shape[1], BLOCK):
+        n = min(BLOCK, columns.shape[1] - first)
+        write_meetings(columns, MEASURED, first, n, x0, y0, z0, x1, y1, z1, meets)
+        for o in range(n):
+            n_met += meets[o] > 0.0
+    return n_met > 0
+
+
+@inlined_kernel
 def obstacle_clearance(arena, x0, y0, z0, x1, y1, z1):
-    """Smallest clearance of a segment from the fixed obstacles, exact.
+    """Smallest clearance of a segment from the fixed obstacles, exact up to `rules.measured_m`.
 
     The likely nearest comes first: most others cannot be as near as that.
 
     Returns:
-        (clearance [m], index of the obstacle); (inf, -1) where there is none.
+        (clearance [m], index of the obstacle); (inf, -1) where there is none so near.
     """
     obstacles = arena.obstacles
     columns = arena.obstacle_columns
     normals = arena.normals
     offsets_m = arena.offsets_m
     n_obstacles = obstacles.shape[0]
-    if n_obstacles == 0:
+    if not _may_be_measured(columns, x0, y0, z0, x1, y1, z1):
         return math.inf, -1
     nearest = _likely_nearest(columns, x0, y0, z0, x1, y1, z1)
     smallest = segment_clearance(
         normals, offsets_m, obstacles[nearest].first_face, obstacles[nearest].last_face,
         x0, y0, z0, x1, y1, z1,
     )  # fmt: skip
+    measured_m = arena.rules[0].measured_m
+    smallest = min(smallest, measured_m)
     likely = nearest
     bound_m = room(BLOCK)
     for begin in range(0, n_obstacles, BLOCK):
@@ -88,6 +109,8 @@ def obstacle_clearance(arena, x0, y0, z0, x1, y1, z1):
             if clearance < smallest or (clearance == smallest and o < nearest):
                 smallest = clearance
                 nearest = o
+    if smallest >= measured_m:
+        return math.inf, -1
     return smallest, nearest
 
 
@@ -107,18 +130,21 @@ def moving_clearance(moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1):
 
 
 @inlined_kernel
-def _separation(before_m, other_before_m, after, other_after):
-    """Smallest separation of two UAS, each going straight from before (3,) to after (14,)."""
-    return cylinder_clearance(
-        0.0,
-        0.0,
-        before_m[0] - other_before_m[0],
-        before_m[1] - other_before_m[1],
-        before_m[2] - other_before_m[2],
-        after[X] - other_after[X],
-        after[Y] - other_after[Y],
-        after[Z] - other_after[Z],
-    )
+def _separation(before_m, other_before_m, after, other_after, measured_m):
+    """Smallest separation of two UAS, each going straight from before (3,) to after (14,).
+
+    Infinite beyond measured_m.
+    """
+    x0 = before_m[0] - other_before_m[0]
+    y0 = before_m[1] - other_before_m[1]
+    z0 = before_m[2] - other_before_m[2]
+    x1 = after[X] - other_after[X]
+    y1 = after[Y] - other_after[Y]
+    z1 = after[Z] - other_after[Z]
+    if cylinder_gap(0.0, 0.0, x0, y0, z0, x1, y1, z1) > measured_m:
+        return math.inf
+    apart_m = cylinder_clearance(0.0, 0.0, x0, y0, z0, x1, y1, z1)
+    return apart_m if apart_m < measured_m else math.inf
 
 
 @inlined_kernel
@@ -135,6 +161,7 @@ def judge_obstacles(arena, state, outcome):
     step = min(state.step[0], arena.moving_path_m.shape[0] - 2)
     now_m = arena.moving_path_m[step]
     next_m = arena.moving_path_m[step + 1]
+    rules = arena.rules[0]
     for i in range(state.status.shape[0]):
         event = outcome[i]
         if state.status[i] != FLYING:
@@ -161,13 +188,14 @@ def judge_obstacles(arena, state, outcome):
                 y1 - next_m[m, 1],
                 z1 - next_m[m, 2],
             )
-            if gap_m > smallest:
+            if gap_m > smallest or gap_m > rules.measured_m:
                 # farther than something else; no contact either, or there is one already
                 continue
             clearance = moving_clearance(arena.moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1)
             if clearance < radius_m:
                 _blame(event, MOVING_OBSTACLE, m)
-            smallest = min(smallest, clearance)
+            if clearance < rules.measured_m:
+                smallest = min(smallest, clearance)
         event.obstacle_clearance_m = smallest
 
 
@@ -175,13 +203,16 @@ def judge_obstacles(arena, state, outcome):
 def judge_separation(arena, state, outcome):
     """Separations between flying UAS over the step, and contacts: both are lost."""
     n_uas = state.status.shape[0]
+    measured_m = arena.rules[0].measured_m
     for i in range(n_uas):
         if state.status[i] != FLYING:
             continue
         for j in range(i + 1, n_uas):
             if state.status[j] != FLYING:
                 continue
-            apart_m = _separation(outcome[i].before_m, outcome[j].before_m, state.x[i], state.x[j])
+            apart_m = _separation(
+                outcome[i].before_m, outcome[j].before_m, state.x[i], state.x[j], measured_m
+            )
             outcome[i].separation_m = min(outcome[i].separation_m, apart_m)
             outcome[j].separation_m = min(outcome[j].separation_m, apart_m)
             if apart_m < arena.uas[i].radius_m + arena.uas[j].radius_m:
@@ -208,6 +239,7 @@ def judge_limits(arena, state, outcome):
             state.x[i, Y],
             state.x[i, Z],
         )
+        outcome[i].fence_clearance_m = -outside_m
         if outside_m > 0.0:
             _blame(outcome[i], FENCE, -1)
         if state.x[i, DOD] > arena.uas[i].dod_max:
@@ -256,19 +288,18 @@ def count_breaches(arena, state, outcome):
         z = state.x[i, Z]
         radius_m = arena.uas[i].radius_m
         count = 0
-        # at the end of the segment nothing is nearer than it was somewhere on it
+        # at the end of the segment nothing is nearer than it was somewhere on it; the same below
         if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + SURE_M:
             count = _obstacle_breaches(arena, next_m, i, x, y, z)
         for j in range(state.status.shape[0]):
+            keep_m = radius_m + arena.uas[j].radius_m + rules.uas_safe_distance_m
+            if event.separation_m > keep_m + SURE_M:
+                continue
             if j != i and state.status[j] == FLYING and outcome[j].contact == NONE:
-                keep_m = radius_m + arena.uas[j].radius_m + rules.uas_safe_distance_m
                 other = state.x[j]
                 apart_m = outside_cylinder(0.0, 0.0, x - other[X], y - other[Y], z - other[Z])
                 if apart_m < keep_m:
                     count += 1
-        inside_m = -signed_distance(
-            arena.normals, arena.offsets_m, rules.fence_first, rules.fence_last, x, y, z
-        )
-        if inside_m < rules.fence_margin_m:
+        if event.fence_clearance_m < rules.fence_margin_m:
             count += 1
         event.breaches = count

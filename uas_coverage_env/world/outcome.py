@@ -31,9 +31,12 @@ OUTCOME_DTYPE = np.dtype(
                 ("contact_with", "i8"),
                 # how many obstacles and UAS are too near at the new sample; the fence counts too
                 ("breaches", "i8"),
-                # smallest over the segment flown; inf where there is nothing to be clear of
+                # smallest over the segment flown; inf where there is nothing to be clear of, or
+                # nothing as near as `rules.measured_m`
                 ("obstacle_clearance_m", "f8"),
                 ("separation_m", "f8"),
+                # how far inside the geofence it is at the new sample
+                ("fence_clearance_m", "f8"),
                 # what was flown, after guidance, return mode and filter
                 ("applied_command", COMMAND_DTYPE),
                 # the safety filter changed the command

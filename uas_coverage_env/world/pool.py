@@ -1,5 +1,6 @@
 """Many scenarios end to end in a few arrays, for kernels that fly another one in every lane."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -96,11 +97,12 @@ def end_to_end(blocks: Sequence[NDArray]) -> tuple[NDArray, NDArray[np.int64]]:
     return rows, spans
 
 
-def pool_arenas(scenarios: Sequence[Scenario]) -> ArenaPool:
+def pool_arenas(scenarios: Sequence[Scenario], *, measured_m: float = math.inf) -> ArenaPool:
     """The arenas of scenarios with any numbers of UAS, waypoints and obstacles.
 
     Args:
         scenarios: At least one.
+        measured_m: See `build_arena`.
 
     Raises:
         ValueError: There is no scenario.
@@ -110,7 +112,7 @@ def pool_arenas(scenarios: Sequence[Scenario]) -> ArenaPool:
     columns: dict[str, list[NDArray]] = {field: [] for field in _SPANNED}
     spans = np.zeros(len(scenarios), dtype=SPANS_DTYPE)
     for s, scenario in enumerate(scenarios):
-        arena = build_arena(scenario)
+        arena = build_arena(scenario, measured_m=measured_m)
         start = initial_state(scenario)
         begin_mission(arena, start, np.zeros(len(scenario.uas), dtype=OUTCOME_DTYPE))
         spans["n_samples"][s] = len(arena.moving_path_m)

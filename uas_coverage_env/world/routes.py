@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from uas_coverage_env.geometry import segment_meets, signed_distance
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
-from uas_coverage_env.world.boxes import BLOCK, write_meetings
+from uas_coverage_env.world.boxes import BLOCK, BOX, write_meetings
 
 _CREEP_M = 1e-3
 
@@ -128,7 +128,7 @@ def line_is_clear(arena, x0, y0, z0, x1, y1, z1):
     n_obstacles = arena.obstacles.shape[0]
     for first in range(0, n_obstacles, BLOCK):
         n = min(BLOCK, columns.shape[1] - first)
-        write_meetings(columns, first, n, x0, y0, z0, x1, y1, z1, meets)
+        write_meetings(columns, BOX, first, n, x0, y0, z0, x1, y1, z1, meets)
         for o in range(min(n, n_obstacles - first)):
             if meets[o] != 0.0 and _obstructs(
                 arena.obstacles[first + o], arena.normals, arena.offsets_m, x0, y0, z0, x1, y1, z1

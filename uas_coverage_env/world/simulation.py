@@ -1,5 +1,6 @@
 """The world as an object: one mission, step by step."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, get_args
 
@@ -46,6 +47,8 @@ class World:
         dynamics: The model that is flown.
         return_mode: Whether UAS are brought home in time.
         safety_filter: Whether commands are kept clear of harm.
+
+    The arena's `rules.measured_m` says up to where distances are measured, see `build_arena`.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class World:
         dynamics: Dynamics = "lpv",
         return_mode: bool = False,
         safety_filter: bool = False,
+        measured_m: float = math.inf,
     ) -> None:
         if dynamics not in get_args(Dynamics):
             raise ValueError(f"dynamics is {dynamics!r}; it is one of {get_args(Dynamics)}")
@@ -63,7 +67,7 @@ class World:
         self.return_mode = bool(return_mode)
         self.safety_filter = bool(safety_filter)
         self.names = tuple(uas.name for uas in scenario.uas)
-        self.arena = build_arena(scenario)
+        self.arena = build_arena(scenario, measured_m=measured_m)
         self._start = initial_state(scenario)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()

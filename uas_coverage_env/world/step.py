@@ -69,6 +69,7 @@ def begin_step(state, commands, outcome):
         event.landed = False
         event.obstacle_clearance_m = math.inf
         event.separation_m = math.inf
+        event.fence_clearance_m = math.inf
         event.filtered = False
         event.returning = False
         given = commands[i]

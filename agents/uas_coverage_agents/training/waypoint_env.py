@@ -58,7 +58,7 @@ class WaypointVecEnv(VecEnv):
     def __init__(
         self, scenarios: Sequence[Scenario], settings: WaypointSettings, n_lanes: int, seed: int
     ) -> None:
-        self._arenas = pool_arenas(scenarios)
+        self._arenas = pool_arenas(scenarios, measured_m=0.0)  # only what counts
         self._legs = pool_legs(scenarios)
         self._n_uas = n_of(self._arenas, "uas")
         self._n_waypoints = n_of(self._arenas, "waypoints")
