@@ -186,40 +186,39 @@ def _way(here_m, there_m):
 def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, y, sums):
     """Add up the open waypoints: shares in each eighth of the horizon, and times north and east.
 
-    Three questions say in which eighth a waypoint lies. Asking them takes the processor longer than
-    adding, so the sums are those over every combination of yes; the eighths follow from them.
+    The eighths go from north over east. Three questions tell in which one a waypoint lies: is it in
+    the first half, in the first quarter of its half, in the first eighth of its quarter? To compare
+    takes the processor longer than to add, so the sums are those over each combination of yes; the
+    eighths follow from them.
     """
-    total = easterly = forward = flat = 0.0
-    easterly_forward = easterly_flat = forward_flat = all_three = 0.0
+    every = half = quarter = eighth = half_quarter = half_eighth = quarter_eighth = all_three = 0.0
     north = east = 0.0
     for w in range(uncovered.shape[0]):
         share = shares[w] if uncovered[w] else 0.0
         dx = _way(x, north_m[w])
         dy = _way(y, east_m[w])
-        # from north to south over east; then, in the direction of turning, the first of two
-        # quarters; then nearer to north or south in quarters that begin there, and so on
-        is_easterly = dy >= 0.0
-        is_forward = (dx > 0.0) & is_easterly | (dx < 0.0) & (dy < 0.0)
-        is_flat = (abs(dy) < abs(dx)) & is_forward | (abs(dx) < abs(dy)) & (not is_forward)
-        total += share
-        easterly += share if is_easterly else 0.0
-        forward += share if is_forward else 0.0
-        flat += share if is_flat else 0.0
-        easterly_forward += share if is_easterly & is_forward else 0.0
-        easterly_flat += share if is_easterly & is_flat else 0.0
-        forward_flat += share if is_forward & is_flat else 0.0
-        all_three += share if is_easterly & is_forward & is_flat else 0.0
+        in_half = dy >= 0.0
+        in_quarter = (in_half & (dx > 0.0)) | ((dy < 0.0) & (dx < 0.0))
+        in_eighth = (in_quarter & (abs(dy) < abs(dx))) | ((not in_quarter) & (abs(dx) < abs(dy)))
+        every += share
+        half += share if in_half else 0.0
+        quarter += share if in_quarter else 0.0
+        eighth += share if in_eighth else 0.0
+        half_quarter += share if in_half & in_quarter else 0.0
+        half_eighth += share if in_half & in_eighth else 0.0
+        quarter_eighth += share if in_quarter & in_eighth else 0.0
+        all_three += share if in_half & in_quarter & in_eighth else 0.0
         north += shares_north[w] if uncovered[w] else 0.0
         east += shares_east[w] if uncovered[w] else 0.0
     sums[0] = all_three
-    sums[1] = easterly_forward - all_three
-    sums[2] = easterly_flat - all_three
-    sums[3] = easterly - easterly_forward - easterly_flat + all_three
-    sums[4] = forward_flat - all_three
-    sums[5] = forward - easterly_forward - forward_flat + all_three
-    sums[6] = flat - easterly_flat - forward_flat + all_three
-    sums[7] = total - easterly - forward - flat + (easterly_forward + easterly_flat + forward_flat)
-    sums[7] -= all_three
+    sums[1] = half_quarter - all_three
+    sums[2] = half_eighth - all_three
+    sums[3] = half - half_quarter - half_eighth + all_three
+    sums[4] = quarter_eighth - all_three
+    sums[5] = quarter - half_quarter - quarter_eighth + all_three
+    sums[6] = eighth - half_eighth - quarter_eighth + all_three
+    sums[7] = every - half - quarter - eighth
+    sums[7] += half_quarter + half_eighth + quarter_eighth - all_three
     sums[8] = north
     sums[9] = east
 
