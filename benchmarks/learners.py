@@ -66,7 +66,7 @@ STUDIES = (
     Study("maskable-ppo", "learned-waypoint"),
     Study("ppo", "learned-velocity"),
     Study("sac"),
-    Study("ppo-end-to-end", seeds=1, assisted=False),
+    Study("ppo-end-to-end", assisted=False),
 )
 
 
