@@ -42,6 +42,9 @@ WHOLE = "the whole step"
 
 compiled = njit(error_model="numpy")
 
+NOBODY = np.zeros(0, np.int64)
+"""No assistants."""
+
 
 class View(NamedTuple):
     """What `step_learners` needs of one lane."""
@@ -59,7 +62,7 @@ class View(NamedTuple):
 def _whole(arena, state, tables, view, weights, spare, row):
     ranges, scales, neighbours = tables
     step_learners(
-        arena, state, VELOCITY, ranges, scales, neighbours, weights, False, False, False,
+        arena, state, VELOCITY, ranges, scales, neighbours, weights, False, NOBODY,
         view.asked, view.targets, view.candidates, view.company,
         view.commands, view.outcome, view.report,
         arena.rules[0].max_steps, row,
@@ -68,7 +71,7 @@ def _whole(arena, state, tables, view, weights, spare, row):
 
 @compiled
 def _world(arena, state, tables, view, weights, spare, row):
-    advance(arena, state, view.commands, False, False, False, view.outcome)
+    advance(arena, state, view.commands, False, NOBODY, view.outcome)
 
 
 @compiled

@@ -31,6 +31,7 @@ from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.flight.metrics import decision_time_s
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.world import assistants
 from uas_coverage_env.world.pool import n_of, pool_arenas
 
 COLUMNS = ("coverage", "all home", "violations", "breaches", "Wh", "steps", "p95 s", "max s")
@@ -60,7 +61,9 @@ def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
     lanes, states = make_lanes(n, arenas)
     covered, discharged = np.zeros(states.uncovered.shape, bool), np.zeros(states.status.shape)
     each = np.arange(n)
-    begin_lanes(arenas, legs, lanes, states, each, each, covered, discharged, True, True)
+    begin_lanes(
+        arenas, legs, lanes, states, each, each, covered, discharged, True, assistants(True, True)
+    )
     candidate = [feature.name for feature in CANDIDATE.features]
     team = [feature.name for feature in TEAM.features]
     # back to seconds / unit_s, see the scales in the layout
@@ -75,7 +78,7 @@ def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
             scale * seen[:, team.index(f)] for f, scale in home_costs.items()
         )
         choices = np.where(lanes.legal, cost, np.inf).argmin(axis=1)
-        step_lanes(arenas, legs, lanes, states, choices, True, True)
+        step_lanes(arenas, legs, lanes, states, choices, True, assistants(True, True))
     account = lanes.account
     return np.column_stack(
         [

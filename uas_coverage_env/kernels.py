@@ -23,7 +23,8 @@ kernel = _compiler(cache=True, error_model="numpy", _nrt=False)
 
 inlined_kernel = _compiler(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 """A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
-to hand over their hundred machine words takes longer than most of these parts themselves."""
+to hand over their hundred machine words takes longer than most of these parts themselves. Numba
+hands this on: a `kernel` that is compiled first because such a part calls it is inlined, too."""
 
 counting_kernel = _compiler(
     cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"reassoc", "nsz"}

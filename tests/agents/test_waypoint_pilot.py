@@ -14,6 +14,7 @@ from waypoint_missions import PRIOR, tensors, town, with_something_parked
 
 from uas_coverage_env import rollout
 from uas_coverage_env.flight import Assistants, coverage, energy_Wh, home
+from uas_coverage_env.world import assistants
 from uas_coverage_env.world.pool import pool_arenas
 
 BOTH = Assistants(return_mode=True, safety_filter=True)
@@ -35,12 +36,13 @@ def in_training(scenario, weights):
     lanes, states = make_lanes(1, arenas)
     begin_lanes(
         arenas, legs, lanes, states, np.array([0]), np.array([0]),
-        np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape), True, True,
+        np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape),
+        True, assistants(True, True),
     )  # fmt: skip
     while lanes.decider[0] != NOBODY:
         scores = network(16, PRIOR).forward(weights, lanes.observation)
         choices = np.where(lanes.legal, scores, -np.inf).argmax(axis=1)
-        step_lanes(arenas, legs, lanes, states, choices, True, True)
+        step_lanes(arenas, legs, lanes, states, choices, True, assistants(True, True))
     return lanes.account[0]
 
 

@@ -28,7 +28,7 @@ from uas_coverage_agents.waypoint.team import (
 from waypoint_missions import town, with_something_parked
 
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import build_arena, initial_state
+from uas_coverage_env.world import assistants, build_arena, initial_state
 from uas_coverage_env.world.pool import pool_arenas
 
 SCENARIOS = [
@@ -52,11 +52,14 @@ class Teams:
         lots = np.random.default_rng(seed)
         begin_lanes(
             self.arenas, self.legs, self.lanes, self.states, np.arange(n), np.arange(n),
-            lots.random(shape) < covered, np.zeros(self.states.status.shape), True, True,
+            lots.random(shape) < covered, np.zeros(self.states.status.shape),
+            True, assistants(True, True),
         )  # fmt: skip
 
     def step(self, choices):
-        step_lanes(self.arenas, self.legs, self.lanes, self.states, choices, True, True)
+        step_lanes(
+            self.arenas, self.legs, self.lanes, self.states, choices, True, assistants(True, True)
+        )
 
     def fly(self, choose):
         while (self.lanes.decider != NOBODY).any():
@@ -137,11 +140,12 @@ def test_a_uas_without_charge_for_the_way_is_not_sent():
     discharged[0, 0] = scenario.uas[0].dod_max - (1 - scenario.uas[0].soc_0) - 0.03
     begin_lanes(
         arenas, legs, lanes, states, np.array([0]), np.array([0]),
-        np.zeros(states.uncovered.shape, dtype=bool), discharged, True, True,
+        np.zeros(states.uncovered.shape, dtype=bool), discharged, True,
+        assistants(True, True),
     )  # fmt: skip
     while lanes.decider[0] != NOBODY:
         assert lanes.decider[0] == 1
-        step_lanes(arenas, legs, lanes, states, nearest(lanes), True, True)
+        step_lanes(arenas, legs, lanes, states, nearest(lanes), True, assistants(True, True))
     assert lanes.account[0, LOST_UAS] == 0
 
 
@@ -190,7 +194,8 @@ def test_places_and_directions_do_not_matter():
         lanes, states = make_lanes(1, arenas)
         begin_lanes(
             arenas, legs, lanes, states, np.array([0]), np.array([0]),
-            np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape), True, True,
+            np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape),
+            True, assistants(True, True),
         )  # fmt: skip
         rows.append(lanes.observation[0].copy())
     assert initial_state(mirrored).x[0, 0] != initial_state(scenario).x[0, 0]

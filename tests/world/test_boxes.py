@@ -8,7 +8,7 @@ import pytest
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.geometry import segment_clearance
 from uas_coverage_env.kernels import inlined_kernel, kernel
-from uas_coverage_env.world import WorldState, advance, assistants, build_arena
+from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.boxes import (
     BLOCK,
     BOX,
@@ -18,11 +18,8 @@ from uas_coverage_env.world.boxes import (
     write_lower_bounds,
     write_meetings,
 )
-from uas_coverage_env.world.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.world.contacts import obstacle_clearance
-from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.routes import box_apart, line_is_clear
-from uas_coverage_env.world.simulation import initial_state
 
 N_SEGMENTS = 300
 
@@ -137,28 +134,3 @@ def test_without_obstacles_everything_is_clear(arena, segments):
 
 def test_columns_come_in_sixteens():
     assert [padded(n) for n in (0, 1, 16, 17)] == [0, 16, 16, 32]
-
-
-def test_what_nobody_asked_for_is_left_out():
-    assert assistants(False, False, goes_to=False) == (None, None)
-    assert assistants(False, False) == (False, None)
-    assert assistants(True, False, goes_to=False) == (True, None)
-    assert assistants(np.bool_(False), np.bool_(True), goes_to=False) == (None, True)
-
-
-def test_a_step_with_guidance_left_out_is_the_same_step():
-    scenario = generate_scenario(3, n_uas=3, n_waypoints=20, n_obstacles=10)
-    arena = build_arena(scenario)
-    rng = np.random.default_rng(1)
-    states: list[WorldState] = [initial_state(scenario) for _ in range(2)]
-    commands = np.zeros(3, COMMAND_DTYPE)
-    outcomes = [np.zeros(3, OUTCOME_DTYPE) for _ in range(2)]
-    for _ in range(40):
-        commands["kind"] = VELOCITY
-        commands["values"][:, :3] = rng.uniform([-9, -9, 5], [9, 9, 30], (3, 3))
-        for state, outcome, return_mode in zip(states, outcomes, (None, False), strict=True):
-            advance(arena, state, commands, False, return_mode, None, outcome)
-        assert outcomes[0].tobytes() == outcomes[1].tobytes()
-        for left, right in zip(*states, strict=True):
-            assert np.array_equal(left, right)
-    assert states[0].step[0] == 40

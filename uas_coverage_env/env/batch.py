@@ -28,7 +28,14 @@ from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.rewards import weights_of
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, SwarmState, assistants
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    FLYING,
+    OUTCOME_DTYPE,
+    AssistantCode,
+    SwarmState,
+    assistants,
+)
 from uas_coverage_env.world.pool import lanes_of
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
@@ -108,18 +115,18 @@ class CoverageBatch:
             self.actions.kind,
             weights_of(reward_weights),
             dynamics == "nonlinear",
-            *assistants(return_mode, safety_filter, goes_to=self.chooses),
-            self.autoreset,
         )
+        self._brings_home = bool(return_mode)
         shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
+        self._aboard: AssistantCode = ()
 
     def __getstate__(self) -> dict[str, Any]:
         # machine code does not travel
-        return {**self.__dict__, "_kernel": None}
+        return {**self.__dict__, "_kernel": None, "_aboard": ()}
 
     @property
     def observation(self) -> NDArray[np.float32]:
@@ -288,7 +295,10 @@ class CoverageBatch:
 
     def _run(self, orders: NDArray[np.int64]) -> int:
         arenas, tables = self.pool.arenas, self.pool.tables
-        given = (arenas, tables, self.worlds, self.lanes, orders, *self._settings)
+        if self._kernel is None:
+            self._aboard = assistants(self._brings_home, self.filters, goes_to=self.chooses)
+        settings = (*self._settings, self._aboard, self.autoreset)
+        given = (arenas, tables, self.worlds, self.lanes, orders, *settings)
         before, free = self._observations
         if self._kernel is None:
             kernel = step_batch if self._threads == 1 else step_batch_in_threads

@@ -210,8 +210,8 @@ def _keep_last_looks(worlds, lanes, lane, n_uas, before, observation):
 
 @inlined_kernel
 def step_lane(
-    pool, tables, worlds, lanes, lane, order, thread, kind, weights, nonlinear, return_mode,
-    safety_filter, autoreset, before, observation,
+    pool, tables, worlds, lanes, lane, order, thread, kind, weights, nonlinear, assistants,
+    autoreset, before, observation,
 ):  # fmt: skip
     """One lane of `step_batch`."""
     whole = (observation.shape[1], OBSERVATION_SIZE)
@@ -233,8 +233,8 @@ def step_lane(
         state = state_of(worlds, lane, n_uas, n_waypoints)
         _keep_last_looks(worlds, lanes, lane, n_uas, before, observation)
         step_learners(
-            arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode,
-            safety_filter, borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
+            arena, state, kind, ranges, scales, neighbours, weights, nonlinear, assistants,
+            borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
             borrow(lanes.targets, lane, (n_uas,)),
             borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
             borrow(lanes.company, lane, (n_waypoints, 2)),
@@ -284,8 +284,8 @@ def _first_refused(pool, lanes, orders):
 
 @kernel
 def step_batch(
-    pool, tables, worlds, lanes, orders, kind, weights, nonlinear, return_mode, safety_filter,
-    autoreset, before, observation,
+    pool, tables, worlds, lanes, orders, kind, weights, nonlinear, assistants, autoreset,
+    before, observation,
 ):  # fmt: skip
     """Fly all lanes for one step, or begin missions in them.
 
@@ -297,11 +297,10 @@ def step_batch(
         worlds: `WorldState` of all lanes; written.
         lanes: `Lanes` with `asked` filled in; written.
         orders: (L,) what each lane does; `lanes.orders`, or an array of its own.
-        kind: See `step_learners`, also the next four.
+        kind: See `step_learners`, also the next three.
         weights: (R,).
         nonlinear: Whether.
-        return_mode: Whether.
-        safety_filter: Whether.
+        assistants: Who helps to fly.
         autoreset: NEXT_STEP, SAME_STEP or DISABLED.
         before: (L, U, OBSERVATION_SIZE) float32, the observations of the step before.
         observation: (L, U, OBSERVATION_SIZE) float32, another array; written.
@@ -315,15 +314,15 @@ def step_batch(
         for lane in range(lanes.scenario.shape[0]):
             step_lane(
                 pool, tables, worlds, lanes, lane, orders[lane], 0, kind, weights, nonlinear,
-                return_mode, safety_filter, autoreset, before, observation,
+                assistants, autoreset, before, observation,
             )  # fmt: skip
     return refused
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def step_batch_in_threads(
-    pool, tables, worlds, lanes, orders, kind, weights, nonlinear, return_mode, safety_filter,
-    autoreset, before, observation,
+    pool, tables, worlds, lanes, orders, kind, weights, nonlinear, assistants, autoreset,
+    before, observation,
 ):  # fmt: skip
     """`step_batch`, the lanes shared among numba's threads.
 
@@ -335,6 +334,6 @@ def step_batch_in_threads(
         for lane in prange(lanes.scenario.shape[0]):
             step_lane(
                 pool, tables, worlds, lanes, lane, orders[lane], get_thread_id(), kind, weights,
-                nonlinear, return_mode, safety_filter, autoreset, before, observation,
+                nonlinear, assistants, autoreset, before, observation,
             )  # fmt: skip
     return refused

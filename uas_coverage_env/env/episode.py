@@ -118,11 +118,8 @@ class Episode:
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
         self._first_look: tuple[NDArray[Any], ...] | None = None
-        self._settings = (
-            self.actions.kind,
-            dynamics == "nonlinear",
-            *assistants(return_mode, safety_filter, goes_to=self.chooses),
-        )
+        self._nonlinear = dynamics == "nonlinear"
+        self._brings_home = bool(return_mode)
         self._prepare()
 
     @property
@@ -146,8 +143,9 @@ class Episode:
     def _prepare(self) -> None:
         arrays = (*self._fixed, *self._changing)
         addresses = addresses_of(self._world.arena, self._world.state, arrays)
+        aboard = assistants(self._brings_home, self._filters, goes_to=self.chooses)
         # what the kernel is given in every step: the arrays are written in place
-        self._given = (*addresses, *self._settings)
+        self._given = (*addresses, self.actions.kind, self._nonlinear, aboard)
         look = self.observation
         self._step = compiled_step((*self._given, self.max_cycles, look, look))
 

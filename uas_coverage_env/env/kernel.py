@@ -84,8 +84,8 @@ def settle(
 
 @inlined_kernel
 def step_learners(
-    arena, state, kind, ranges, scales, neighbours, weights, nonlinear, return_mode, safety_filter,
-    asked, targets, candidates, company, commands, outcome, report, max_cycles, observation,
+    arena, state, kind, ranges, scales, neighbours, weights, nonlinear, assistants, asked,
+    targets, candidates, company, commands, outcome, report, max_cycles, observation,
 ):  # fmt: skip
     """Fly one step, pay for it and look around.
 
@@ -98,8 +98,7 @@ def step_learners(
         neighbours: (W,) of NEIGHBOURS_DTYPE.
         weights: (R,) of the reward terms.
         nonlinear: See `world.advance`.
-        return_mode: See `world.advance`.
-        safety_filter: See `world.advance`.
+        assistants: See `world.advance`.
         asked: (U, size) the actions.
         targets: (U,) where each is flying to (waypoint action); written.
         candidates: (U, K_WAYPOINTS) as in the last observation; written.
@@ -117,7 +116,7 @@ def step_learners(
     if invalid != ACCEPTED:
         return invalid
     write_commands(state, kind, ranges, asked, candidates, targets, commands)
-    advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome)
+    advance(arena, state, commands, nonlinear, assistants, outcome)
     settle(
         arena, state, scales, neighbours, weights, targets, candidates, company, commands, outcome,
         report, max_cycles, observation,
@@ -131,9 +130,7 @@ routes, and numbers of an action."""
 
 
 @kernel
-def step_episode(
-    at, sizes, kind, nonlinear, return_mode, safety_filter, max_cycles, before, observation
-):
+def step_episode(at, sizes, kind, nonlinear, assistants, max_cycles, before, observation):
     """`step_learners` called from Python.
 
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
@@ -142,10 +139,9 @@ def step_episode(
         at: Addresses of the arrays, see `addresses_of`: to hand over every array would take longer
             than the flight of a UAS.
         sizes: (N_SIZES,) what their shapes are made of.
-        kind: See `step_learners`, also the next three.
+        kind: See `step_learners`, also the next two.
         nonlinear: Whether.
-        return_mode: Whether.
-        safety_filter: Whether.
+        assistants: Who helps to fly.
         max_cycles: Steps after which the episode is cut.
         before: (U, OBSERVATION_SIZE) float32, the observation of the step before.
         observation: (U, OBSERVATION_SIZE) float32, another array; written.
@@ -178,7 +174,7 @@ def step_episode(
     return step_learners(
         arena, state, kind, lend(at[21], RANGES_DTYPE, (u,)), lend(at[22], SCALES_DTYPE, (u,)),
         lend(at[23], NEIGHBOURS_DTYPE, (w,)), lend(at[24], FLOAT, (len(REWARD_TERMS),)),
-        nonlinear, return_mode, safety_filter, lend(at[25], FLOAT, (u, sizes[7])),
+        nonlinear, assistants, lend(at[25], FLOAT, (u, sizes[7])),
         lend(at[26], INT, (u,)), lend(at[27], INT, (u, K_WAYPOINTS)), lend(at[28], SINGLE, (w, 2)),
         lend(at[29], COMMAND_DTYPE, (u,)), lend(at[30], OUTCOME_DTYPE, (u,)),
         lend(at[31], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,

@@ -1,6 +1,7 @@
 """What happens: state, commands, and the one compiled step (CONTRACT, "What counts")."""
 
 from uas_coverage_env.world.arena import Arena, build_arena
+from uas_coverage_env.world.assist import AssistantCode, assistants
 from uas_coverage_env.world.commands import (
     ACCELERATION,
     CLIMB,
@@ -32,7 +33,7 @@ from uas_coverage_env.world.state import (
     SwarmState,
     WorldState,
 )
-from uas_coverage_env.world.step import advance, assistants, begin_mission, first_invalid
+from uas_coverage_env.world.step import advance, begin_mission, first_invalid
 
 __all__ = [
     "ACCELERATION",
@@ -53,6 +54,7 @@ __all__ = [
     "WRENCH",
     "Acceleration",
     "Arena",
+    "AssistantCode",
     "Command",
     "Dynamics",
     "GoTo",

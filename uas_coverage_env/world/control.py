@@ -1,6 +1,6 @@
 """From a command to the wrench that flies it."""
 
-from uas_coverage_env.kernels import kernel
+from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import (
     LIFT,
     TAU_X,
@@ -30,7 +30,7 @@ def write_brake(command):
     write_command(command, CLIMB, 0.0, 0.0, 0.0)
 
 
-@kernel
+@inlined_kernel
 def command_wrench(vehicle, x, reference, command, u):
     """Write into u the wrench for one step of a command, within the vehicle's limits.
 

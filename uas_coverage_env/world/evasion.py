@@ -10,9 +10,9 @@ that stands still and of the others, so that the proof about these goes on.
 import math
 
 import numpy as np
-from numba import njit
 
 from uas_coverage_env.geometry import cylinder_clearance
+from uas_coverage_env.kernels import allocating_kernel, kernel
 from uas_coverage_env.world.commands import CLIMB
 from uas_coverage_env.world.control import write_brake, write_command
 from uas_coverage_env.world.lookahead import (
@@ -32,7 +32,7 @@ LINGERING = 0.05
 """Weight of the mean shortfall of room beside the largest: who is inside leaves early."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _room_m(arena, step, i, path_m):
     """How well a path keeps clear of moving obstacles that go on as they go now [m].
 
@@ -66,7 +66,7 @@ def _room_m(arena, step, i, path_m):
     return least_m + LINGERING * shortfall_m / n_steps
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
     """Whether braking after one step of a command is clear of all that stands still or brakes."""
     n_flown, slack_m = fly_and_brake(
@@ -79,7 +79,7 @@ def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
     return slack_m >= enough_m
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
     """Whether an evasive flight meets nothing that stands still and no path of another UAS."""
     fly_hold_and_brake(arena, i, state.x[i], state.reference[i], command, n_held, nonlinear, path_m)
@@ -89,7 +89,7 @@ def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
     return slack_m >= 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m):
     """Write the command that gets a UAS best out of the way of what moves.
 

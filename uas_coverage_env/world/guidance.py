@@ -6,10 +6,11 @@ import numpy as np
 
 from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.commands import VELOCITY
+from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY
 from uas_coverage_env.world.control import write_brake, write_command
 from uas_coverage_env.world.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
+from uas_coverage_env.world.state import FLYING
 
 LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
@@ -103,7 +104,7 @@ def _altitude(arena, x, altitude1_m, way_m, needed_m):
     return min(max(altitude_m, rules.floor_m), max(rules.ceiling_m, altitude1_m))
 
 
-@allocating_kernel
+@kernel
 def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
     """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
     n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m)
@@ -167,3 +168,28 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
         if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
             return
     write_brake(command)
+
+
+@allocating_kernel
+def steer(arena, state, nonlinear, outcome):
+    """Resolve commands that name a place into velocities; who is called home gets such a command.
+
+    Args:
+        arena: The arena.
+        state: The state.
+        nonlinear: Whether the world flies the 6-DOF plant.
+        outcome: (U,) of OUTCOME_DTYPE; applied_command and returning are written.
+    """
+    for i in range(state.status.shape[0]):
+        if state.status[i] != FLYING:
+            continue
+        command = outcome[i].applied_command
+        if state.returning[i]:
+            command.kind = GO_TO
+            command.values[0] = HOME
+            command.returning = True
+        outcome[i].returning = command.returning
+        if command.kind == GO_TO:
+            target = int(command.values[0])
+            stop = target < 0 or not state.uncovered[target]
+            guide(arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command)

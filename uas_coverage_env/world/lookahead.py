@@ -2,12 +2,11 @@
 
 import math
 
-import numpy as np
-from numba import njit
-
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
-from uas_coverage_env.kernels import kernel
+from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import (
+    N_INPUTS,
+    N_STATES,
     PHI,
     THETA,
     VX,
@@ -40,7 +39,7 @@ SURPRISE_S = 1.0
 _STILL = 0.02
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_still(x):
     """Slow and level enough that what is left of the motion is centimetres."""
     return (
@@ -50,7 +49,7 @@ def _is_still(x):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _kept_m(required_m, now_m):
     """What has to be kept: the distance required, or the distance now where it is less already.
 
@@ -59,7 +58,7 @@ def _kept_m(required_m, now_m):
     return min(required_m, now_m - TOLERANCE_M)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
     """Simulate a command for one step, then braking until the UAS stands.
 
@@ -83,22 +82,27 @@ def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
     return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m):
     """Like `fly_and_brake`, with the command flown for n_held steps."""
     n_steps = path_m.shape[0] - 1
     vehicle = arena.vehicles[i]
-    x = start.copy()
-    governed = reference.copy()
-    u = np.zeros(5)
+    x = room(N_STATES)
+    governed = room(2)
+    u = room(N_INPUTS)
+    for k in range(N_STATES):
+        x[k] = start[k]
+    for k in range(2):
+        governed[k] = reference[k]
+    for k in range(N_INPUTS):
+        u[k] = 0.0
     path_m[0, 0] = x[X]
     path_m[0, 1] = x[Y]
     path_m[0, 2] = x[Z]
     for k in range(n_steps):
-        if k < n_held:
-            command_wrench(vehicle, x, governed, command, u)
-        else:
-            command_wrench(vehicle, x, governed, arena.rules[0].brake, u)
+        # one call: what is flown becomes part of this function
+        flown = command if k < n_held else arena.rules[0].brake
+        command_wrench(vehicle, x, governed, flown, u)
         if nonlinear:
             plant_step(vehicle, x, u, x)
         else:
@@ -118,7 +122,7 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
     return n_steps, min(PLENTY_M, 0.1 - speed_mps)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _box_of(path_m, n_flown, low, high):
     """Bounds of the first n_flown segments of a path."""
     for axis in range(3):
@@ -129,7 +133,7 @@ def _box_of(path_m, n_flown, low, high):
             high[axis] = max(high[axis], path_m[k, axis])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fence_slack(arena, path_m, n_flown, low, high, slack_m):
     """The smaller of slack_m and the distance to spare from the geofence along a path."""
     rules = arena.rules[0]
@@ -155,7 +159,7 @@ def _fence_slack(arena, path_m, n_flown, low, high, slack_m):
     return slack_m
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     """Least distance to spare from the geofence and fixed obstacles along a path.
 
@@ -170,8 +174,8 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     Returns:
         The smaller of slack_m and the distance to spare [m].
     """
-    low = np.empty(3)
-    high = np.empty(3)
+    low = room(3)
+    high = room(3)
     _box_of(path_m, n_flown, low, high)
     slack_m = _fence_slack(arena, path_m, n_flown, low, high, slack_m)
     normals = arena.normals
@@ -204,7 +208,7 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     return slack_m
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def required_from(arena, step, i, m):
     """The clearance that UAS i keeps from moving obstacle m [m]: more, the faster that moves."""
     velocity_mps = arena.moving_velocity_mps[step, m]
@@ -214,7 +218,7 @@ def required_from(arena, step, i, m):
     return required_m + SURPRISE_S * speed_mps
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     """Least distance to spare from moving obstacles that keep their present velocities.
 
@@ -263,7 +267,7 @@ def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     return slack_m
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _paths_apart(path_m, other_m, k, keep_m):
     """Whether two paths are farther apart than keep_m in step k by a look at north and east."""
     for axis in range(2):
@@ -291,7 +295,7 @@ def separation_at(path_m, other_m, k):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inlined_kernel
 def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
     """Least distance to spare from the paths to which the other UAS are committed.
 

@@ -3,6 +3,7 @@
 from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.world.guidance import path_length_home_m
+from uas_coverage_env.world.state import FLYING
 
 _SPEED_SHARE = 2.0 / 3.0
 _LANDING_S = 12.0
@@ -37,3 +38,18 @@ def has_to_return(arena, state, i):
     if home_s + _CLOCK_RESERVE_S - _LANDING_S > time_left_s:
         return True
     return x[DOD] + home_s * arena.uas[i].dod_per_s >= arena.uas[i].dod_max
+
+
+@kernel
+def call_home(arena, state, nonlinear, outcome):
+    """Call those home who have to return; they fly home from then on.
+
+    Args:
+        arena: The arena.
+        state: The state; returning is written.
+        nonlinear: Not asked for: all assistants are called with the same arguments.
+        outcome: Likewise.
+    """
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING and not state.returning[i]:
+            state.returning[i] = has_to_return(arena, state, i)

@@ -8,8 +8,7 @@ on their way home themselves only out of that of one who is held up. A claim is 
 wall: nobody gives up the room to brake for it.
 """
 
-from numba import njit
-
+from uas_coverage_env.kernels import kernel
 from uas_coverage_env.world.evasion import LINGERING
 from uas_coverage_env.world.lookahead import fly_hold_and_brake, separation_at
 from uas_coverage_env.world.state import FLYING
@@ -22,7 +21,7 @@ ELBOW_ROOM_M = 1.0
 command home is not quite the one that was claimed."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def decision_order(state, order):
     """Who decides when.
 
@@ -47,7 +46,7 @@ def decision_order(state, order):
     return n_flying, n_returning
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def claim_way(arena, state, i, command, nonlinear, claim_m):
     """Write the way (N+1, 3) [m] that UAS i would fly now if no other UAS were there."""
     n_held = max(1, round(CLAIMED_S / arena.rules[0].dt_s))
@@ -55,7 +54,7 @@ def claim_way(arena, state, i, command, nonlinear, claim_m):
     fly_hold_and_brake(arena, i, x, state.reference[i], command, n_held, nonlinear, claim_m)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def room_beside(arena, i, path_m, claimants, n_claims, claims_m):
     """How well a path keeps clear of the claimed ways, flown at the same time [m].
 

@@ -15,8 +15,8 @@ the safe commands they fly the nearest that keeps clear of it.
 import math
 
 import numpy as np
-from numba import njit
 
+from uas_coverage_env.kernels import allocating_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, Z
 from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.world.control import write_brake, write_command
@@ -62,7 +62,7 @@ def _deflections() -> np.ndarray:
 _DEFLECTIONS = _deflections()
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
     """Least distance to spare from everything when a command is flown and then braked [m]."""
     n_flown, slack_m = fly_and_brake(
@@ -77,7 +77,7 @@ def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
     return slack_m
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _wish(arena, state, i, command):
     """The velocity (north, east, down) [m/s] that a command is after."""
     uas = arena.uas[i]
@@ -97,7 +97,7 @@ def _wish(arena, state, i, command):
     return x[VX], x[VY], 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _deflect(arena, i, wish_mps, d, command):
     """Write the d-th nearest alternative to a velocity (north, east, down)."""
     uas = arena.uas[i]
@@ -117,7 +117,7 @@ def _deflect(arena, i, wish_mps, d, command):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     """Put the nearest safe command in the place of an unsafe one, or else the least harmful.
 
@@ -153,7 +153,7 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _make_way(
     arena, state, i, command, nonlinear, path_m, committed_m, claimants, n_claims, claims_m
 ):  # fmt: skip
@@ -167,7 +167,7 @@ def _make_way(
     """
     n_deflections = _DEFLECTIONS.shape[0]
     own_kind = command.kind
-    own = command.values.copy()
+    own = command.values[0], command.values[1], command.values[2], command.values[3]
     wish_mps = _wish(arena, state, i, command)
     n_options = n_deflections + 2
     best, best_m = n_options, -math.inf
@@ -196,7 +196,7 @@ def _make_way(
     return best < n_options
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def filter_commands(arena, state, nonlinear, outcome):
     """Replace the unsafe ones among the commands in `outcome` and mark them as filtered.
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, N_STATES
 from uas_coverage_env.world.arena import build_arena
+from uas_coverage_env.world.assist import AssistantCode, assistants
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, SwarmState, WorldState
-from uas_coverage_env.world.step import ACCEPTED, assistants, begin_mission, compiled_step
+from uas_coverage_env.world.step import ACCEPTED, begin_mission, compiled_step
 
 Dynamics = Literal["lpv", "nonlinear"]
 
@@ -72,20 +73,19 @@ class World:
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
         self._before_commands = (*self.arena, *self._state)
-        self._switches = (
-            dynamics == "nonlinear",
-            *assistants(self.return_mode, self.safety_filter),
-        )
+        self._nonlinear = dynamics == "nonlinear"
         self._prepare()
 
     def _prepare(self) -> None:
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
         self._step: Callable[..., int] | None = None
+        self._assistants: AssistantCode = ()
 
     def __getstate__(self) -> dict[str, Any]:
         # machine code does not travel: it is there, or compiled, wherever the copy goes
-        return {k: v for k, v in self.__dict__.items() if k not in ("_step", "_outcomes")}
+        stays = ("_step", "_assistants", "_outcomes")
+        return {k: v for k, v in self.__dict__.items() if k not in stays}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -123,14 +123,18 @@ class World:
             )
         elif not commands.flags.c_contiguous:
             commands = commands.copy()
-        arguments = (*self._before_commands, commands, *self._switches, self._fresh_outcome())
         if self._step is None:
             # not before: environments have a world, too, and a step of their own
+            self._assistants = assistants(self.return_mode, self.safety_filter)
+        outcome = self._fresh_outcome()
+        last = (commands, self._nonlinear, self._assistants, outcome)
+        arguments = (*self._before_commands, *last)
+        if self._step is None:
             self._step = compiled_step(arguments)
         invalid = self._step(*arguments)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
-        return arguments[-1]
+        return outcome
 
     def _fresh_outcome(self) -> NDArray[np.void]:
         """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""

@@ -6,9 +6,10 @@ from typing import Any
 
 from numba import typeof
 
-from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
 from uas_coverage_env.world.arena import Arena
+from uas_coverage_env.world.assist import assist
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
     count_breaches,
@@ -18,10 +19,7 @@ from uas_coverage_env.world.contacts import (
 )
 from uas_coverage_env.world.control import command_wrench
 from uas_coverage_env.world.coverage import cover, land
-from uas_coverage_env.world.guidance import guide
 from uas_coverage_env.world.outcome import NONE
-from uas_coverage_env.world.return_mode import has_to_return
-from uas_coverage_env.world.safety import filter_commands
 from uas_coverage_env.world.state import FLYING, LOST, WorldState
 
 ACCEPTED = -1
@@ -81,31 +79,6 @@ def begin_step(state, commands, outcome):
 
 
 @inlined_kernel
-def _steer(arena, state, nonlinear, return_mode, outcome):
-    """Turn home who has to, and resolve commands that name a place into velocities."""
-    for i in range(state.status.shape[0]):
-        if state.status[i] != FLYING:
-            continue
-        if return_mode and not state.returning[i]:
-            state.returning[i] = has_to_return(arena, state, i)
-        command = outcome[i].applied_command
-        if state.returning[i]:
-            command.kind = GO_TO
-            command.values[0] = HOME
-            command.returning = True
-        outcome[i].returning = command.returning
-        if command.kind == GO_TO:
-            target = int(command.values[0])
-            stop = target < 0 or not state.uncovered[target]
-            guide(arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command)
-
-
-@allocating_kernel
-def _filter(arena, state, nonlinear, outcome):
-    filter_commands(arena, state, nonlinear, outcome)
-
-
-@inlined_kernel
 def _fly(arena, state, nonlinear, outcome):
     """Fly the commands for one step."""
     dt_h = arena.rules[0].dt_s / 3600.0
@@ -154,7 +127,7 @@ def carry_out(arena, state, nonlinear, outcome):
 
 
 @kernel
-def advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome):
+def advance(arena, state, commands, nonlinear, assistants, outcome):
     """Fly all UAS for one step and judge what happened (CONTRACT, "What counts").
 
     All decide from the state at sample k; then all fly; then contacts are judged on the straight
@@ -165,34 +138,13 @@ def advance(arena, state, commands, nonlinear, return_mode, safety_filter, outco
         state: The state; written in place.
         commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
         nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
-        return_mode: Bring UAS home in time; None: neither that, nor is any command a GO_TO.
-        safety_filter: Keep commands clear of harm; None: no, see `assistants`.
+        assistants: Who helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     begin_step(state, commands, outcome)
-    if return_mode is not None:
-        _steer(arena, state, nonlinear, return_mode, outcome)
-    if safety_filter is not None and safety_filter:
-        _filter(arena, state, nonlinear, outcome)
+    for k in range(len(assistants)):
+        assist(assistants[k], arena, state, nonlinear, outcome)
     carry_out(arena, state, nonlinear, outcome)
-
-
-def assistants(
-    return_mode: bool, safety_filter: bool, *, goes_to: bool = True
-) -> tuple[bool | None, bool | None]:
-    """`return_mode` and `safety_filter` as the kernels take them.
-
-    What is None is not even compiled: most of the machine code of a step is guidance and filter.
-
-    Args:
-        return_mode: Whether UAS are brought home in time.
-        safety_filter: Whether commands are kept clear of harm.
-        goes_to: Whether commands of kind GO_TO may come.
-    """
-    return (
-        bool(return_mode) if goes_to or return_mode else None,
-        True if safety_filter else None,
-    )
 
 
 @kernel
@@ -206,7 +158,7 @@ def step_world(
     vehicles, uas, obstacles, obstacle_columns, normals, offsets_m, moving, moving_path_m,
     moving_velocity_mps, waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
     x, reference, status, departed, returning, uncovered, step,
-    commands, nonlinear, return_mode, safety_filter, outcome,
+    commands, nonlinear, assistants, outcome,
 ):  # fmt: skip
     """`advance` called from Python: arrays one by one cost half the time of two named tuples.
 
@@ -220,7 +172,7 @@ def step_world(
     state = WorldState(x, reference, status, departed, returning, uncovered, step)
     invalid = first_invalid(arena, state, commands)
     if invalid == ACCEPTED:
-        advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome)
+        advance(arena, state, commands, nonlinear, assistants, outcome)
     return invalid
 
 

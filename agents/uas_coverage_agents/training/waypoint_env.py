@@ -21,6 +21,7 @@ from uas_coverage_agents.waypoint.team import (
     TIME,
 )
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import assistants
 from uas_coverage_env.world.pool import n_of, pool_arenas
 
 _LARGEST_SHARE_COVERED = 0.7
@@ -65,7 +66,8 @@ class WaypointVecEnv(VecEnv):
         self._lanes, self._states = make_lanes(n_lanes, self._arenas)
         self._settings = settings
         self._prices = prices_of(settings)
-        self._assistants = (settings.return_mode, settings.safety_filter)
+        aboard = assistants(settings.return_mode, settings.safety_filter)
+        self._assistants = (settings.return_mode, aboard)
         self._seed = seed
         self._missions = np.zeros(n_lanes, dtype=np.int64)
         self._choices = np.zeros(n_lanes, dtype=np.int64)

@@ -104,7 +104,7 @@ def make_lanes(n_lanes: int, pool: ArenaPool) -> tuple[Lanes, WorldState]:
 
 
 @njit(cache=True, error_model="numpy")
-def _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, safety_filter):
+def _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, assistants):
     s = lanes.scenario[lane]
     arena = arena_of(arenas, s)
     n_uas = arena.uas.shape[0]
@@ -112,7 +112,7 @@ def _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, safety_filter)
     state = state_of(states, lane, n_uas, n_waypoints)
     legs = legs_at(all_legs, s, n_uas, n_waypoints)
     lanes.decider[lane] = fly_on(
-        arena, legs, state, False, return_mode, safety_filter, lanes.blocked[lane, :n_waypoints],
+        arena, legs, state, False, return_mode, assistants, lanes.blocked[lane, :n_waypoints],
         lanes.targets[lane, :n_uas], lanes.commands[lane, :n_uas], lanes.outcome[lane, :n_uas],
         lanes.candidates[lane], lanes.legal[lane], lanes.observation[lane], lanes.account[lane],
     )  # fmt: skip
@@ -120,7 +120,7 @@ def _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, safety_filter)
 
 @njit(cache=True, error_model="numpy")
 def begin_lane(
-    arenas, all_legs, lanes, states, lane, s, covered, discharged, return_mode, safety_filter
+    arenas, all_legs, lanes, states, lane, s, covered, discharged, return_mode, assistants
 ):
     """Begin a mission in a lane and fly to its first decision.
 
@@ -133,8 +133,8 @@ def begin_lane(
         s: Index of the scenario.
         covered: (most waypoints,) that are covered already.
         discharged: (most UAS,) depth of discharge in addition to the scenario's.
-        return_mode: See `world.advance`.
-        safety_filter: See `world.advance`.
+        return_mode: Whether the world brings UAS home in time.
+        assistants: See `world.advance`.
     """
     at = arenas.spans[s]
     n_uas = at.uas[1] - at.uas[0]
@@ -149,23 +149,23 @@ def begin_lane(
     lanes.targets[lane] = NO_TARGET
     lanes.blocked[lane] = False
     lanes.account[lane] = 0.0
-    _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, safety_filter)
+    _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, assistants)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def begin_lanes(
-    arenas, all_legs, lanes, states, which, s, covered, discharged, return_mode, safety_filter
+    arenas, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants
 ):
     """`begin_lane` in some lanes; `which`, `s`, `covered` and `discharged` have a row for each."""
     for k in prange(which.shape[0]):
         begin_lane(
             arenas, all_legs, lanes, states, which[k], s[k], covered[k], discharged[k],
-            return_mode, safety_filter,
+            return_mode, assistants,
         )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def step_lanes(arenas, all_legs, lanes, states, choices, return_mode, safety_filter):
+def step_lanes(arenas, all_legs, lanes, states, choices, return_mode, assistants):
     """Let the UAS whose turn it is decide, and fly on to the next decision, in every lane.
 
     Lanes whose missions are over stay as they are.
@@ -176,11 +176,11 @@ def step_lanes(arenas, all_legs, lanes, states, choices, return_mode, safety_fil
         lanes: `Lanes`; written.
         states: `lanes_of` the pool; written.
         choices: (L,) legal choices.
-        return_mode: See `world.advance`.
-        safety_filter: See `world.advance`.
+        return_mode: Whether the world brings UAS home in time.
+        assistants: See `world.advance`.
     """
     for lane in prange(choices.shape[0]):
         i = lanes.decider[lane]
         if i != NOBODY:
             choose(lanes.targets[lane], lanes.candidates[lane], i, choices[lane])
-            _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, safety_filter)
+            _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, assistants)

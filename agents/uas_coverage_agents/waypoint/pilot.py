@@ -35,6 +35,7 @@ from uas_coverage_env.world import (
     SwarmState,
     World,
     WorldState,
+    assistants,
     build_arena,
 )
 
@@ -156,9 +157,10 @@ class WaypointPilot:
     def _look_ahead(self, state: WorldState) -> None:
         """Make the plan better; the observation on the desk is lost."""
         kept = (self._desk.candidates.copy(), self._desk.legal.copy())
+        return_mode = self._assistants.return_mode
         improve(
             self._still, self._legs, self._weights, state, self._targets, self._blocked,
-            self._assistants.return_mode, self._assistants.safety_filter, self._plan,
+            return_mode, assistants(return_mode, self._assistants.safety_filter), self._plan,
             self._simulations, self._desk, self._rng, self._trial, self._best,
         )  # fmt: skip
         self._plan, self._best = self._best, self._plan

@@ -113,7 +113,7 @@ def planned(uncovered, plan, at, i, candidates, legal):
 
 @njit(cache=True, error_model="numpy")
 def simulate(
-    arena, legs, weights, start, start_targets, start_blocked, return_mode, safety_filter,
+    arena, legs, weights, start, start_targets, start_blocked, return_mode, assistants,
     plan, change_at, keep_on, desk, rng, new,
 ):  # fmt: skip
     """Fly one mission to its end.
@@ -125,8 +125,8 @@ def simulate(
         start: The state from which it goes on.
         start_targets: (U,) where each flies to then.
         start_blocked: (W,) what comes last.
-        return_mode: See `world.advance`.
-        safety_filter: See `world.advance`.
+        return_mode: Whether the world brings UAS home in time.
+        assistants: See `world.advance`.
         plan: What is followed.
         change_at: Number of the decision at which another choice is drawn; NEVER for none.
         keep_on: Whether the plan is followed after that, as far as it fits; else, and where the
@@ -148,7 +148,7 @@ def simulate(
     n = 0
     while True:
         i = fly_on(
-            arena, legs, state, False, return_mode, safety_filter, blocked, targets,
+            arena, legs, state, False, return_mode, assistants, blocked, targets,
             desk.commands, desk.outcome, desk.candidates, desk.legal, desk.observation, account,
         )  # fmt: skip
         if i == NOBODY:
@@ -174,7 +174,7 @@ def simulate(
 
 @njit(cache=True, error_model="numpy")
 def improve(
-    arena, legs, weights, state, targets, blocked, return_mode, safety_filter, plan, n_simulations,
+    arena, legs, weights, state, targets, blocked, return_mode, assistants, plan, n_simulations,
     desk, rng, trial, best,
 ):  # fmt: skip
     """The cheapest plan that some simulations find.
@@ -187,7 +187,7 @@ def improve(
         targets: (U,) where each flies to.
         blocked: See `simulate`.
         return_mode: See `simulate`.
-        safety_filter: See `simulate`.
+        assistants: See `simulate`.
         plan: The plan so far; may be empty.
         n_simulations: How many are tried.
         desk: Room.
@@ -199,7 +199,7 @@ def improve(
         Cost of the best plan [Wh].
     """
     best_Wh, n_decisions = simulate(
-        arena, legs, weights, state, targets, blocked, return_mode, safety_filter,
+        arena, legs, weights, state, targets, blocked, return_mode, assistants,
         plan, NEVER, True, desk, rng, best,
     )  # fmt: skip
     for n in range(n_simulations - 1):
@@ -207,7 +207,7 @@ def improve(
         change_at = NEVER if n == 0 else rng.integers(0, max(n_decisions, 1))
         keep_on = n > 0 and rng.random() < 0.5
         cost_Wh, n_new = simulate(
-            arena, legs, weights, state, targets, blocked, return_mode, safety_filter,
+            arena, legs, weights, state, targets, blocked, return_mode, assistants,
             best, change_at, keep_on, desk, rng, trial,
         )  # fmt: skip
         if cost_Wh < best_Wh:

@@ -139,7 +139,7 @@ def is_over(arena, state):
 
 @njit(cache=True, error_model="numpy")
 def fly_on(
-    arena, legs, state, nonlinear, return_mode, safety_filter, blocked, targets, commands,
+    arena, legs, state, nonlinear, return_mode, assistants, blocked, targets, commands,
     outcome, candidates, legal, observation, account,
 ):  # fmt: skip
     """Fly until somebody has a choice to make, or the mission is over.
@@ -149,8 +149,8 @@ def fly_on(
         legs: See `next_to_decide`.
         state: Written.
         nonlinear: See `world.advance`.
-        return_mode: See `world.advance`.
-        safety_filter: See `world.advance`.
+        return_mode: Whether the world brings UAS home in time.
+        assistants: See `world.advance`.
         blocked: See `next_to_decide`.
         targets: See `next_to_decide`.
         commands: (U,) of COMMAND_DTYPE; written.
@@ -170,7 +170,7 @@ def fly_on(
         if i != NOBODY:
             return i
         write_commands(state, targets, commands)
-        advance(arena, state, commands, nonlinear, return_mode, safety_filter, outcome)
+        advance(arena, state, commands, nonlinear, assistants, outcome)
         account[TIME] += arena.rules[0].dt_s
         for j in range(targets.shape[0]):
             account[ENERGY] += outcome[j].energy_Wh
