@@ -142,10 +142,10 @@ class Episode:
 
     def _prepare(self) -> None:
         arrays = (*self._fixed, *self._changing)
-        addresses = addresses_of(self._world.arena, self._world.state, arrays)
         aboard = assistants(self._brings_home, self._filters, goes_to=self.chooses)
+        addresses = addresses_of(self._world.arena, self._world.state, arrays, aboard)
         # what the kernel is given in every step: the arrays are written in place
-        self._given = (*addresses, self.actions.kind, self._nonlinear, aboard)
+        self._given = (*addresses, self.actions.kind, self._nonlinear)
         look = self.observation
         self._step = compiled_step((*self._given, self.max_cycles, look, look))
 

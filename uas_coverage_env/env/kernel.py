@@ -7,7 +7,7 @@ import numpy as np
 from numba import typeof
 from numpy.typing import NDArray
 
-from uas_coverage_env.borrow import lend
+from uas_coverage_env.borrow import lend, part
 from uas_coverage_env.env.actions import RANGES_DTYPE, first_not_finite, write_commands
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NEIGHBOURS_DTYPE, count_company
@@ -21,6 +21,7 @@ from uas_coverage_env.world import (
     FLYING,
     OUTCOME_DTYPE,
     Arena,
+    AssistantCode,
     WorldState,
     advance,
 )
@@ -124,24 +125,26 @@ def step_learners(
     return ACCEPTED
 
 
-N_SIZES = 8
+N_ARRAYS = 32
+"""Arrays whose addresses `step_episode` is given."""
+
+N_SIZES = 9
 """Numbers of UAS, obstacles, planes, moving obstacles, samples of their way, waypoints, corners of
-routes, and numbers of an action."""
+routes, numbers of an action, and assistants."""
 
 
 @kernel
-def step_episode(at, sizes, kind, nonlinear, assistants, max_cycles, before, observation):
+def step_episode(at, sizes, kind, nonlinear, max_cycles, before, observation):
     """`step_learners` called from Python.
 
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
 
     Args:
-        at: Addresses of the arrays, see `addresses_of`: to hand over every array would take longer
-            than the flight of a UAS.
+        at: Addresses of the arrays and assistants, see `addresses_of`: to hand over every array
+            would take longer than the flight of a UAS.
         sizes: (N_SIZES,) what their shapes are made of.
-        kind: See `step_learners`, also the next two.
-        nonlinear: Whether.
-        assistants: Who helps to fly.
+        kind: See `step_learners`.
+        nonlinear: See `step_learners`.
         max_cycles: Steps after which the episode is cut.
         before: (U, OBSERVATION_SIZE) float32, the observation of the step before.
         observation: (U, OBSERVATION_SIZE) float32, another array; written.
@@ -174,7 +177,7 @@ def step_episode(at, sizes, kind, nonlinear, assistants, max_cycles, before, obs
     return step_learners(
         arena, state, kind, lend(at[21], RANGES_DTYPE, (u,)), lend(at[22], SCALES_DTYPE, (u,)),
         lend(at[23], NEIGHBOURS_DTYPE, (w,)), lend(at[24], FLOAT, (len(REWARD_TERMS),)),
-        nonlinear, assistants, lend(at[25], FLOAT, (u, sizes[7])),
+        nonlinear, part(at, N_ARRAYS, sizes[8]), lend(at[25], FLOAT, (u, sizes[7])),
         lend(at[26], INT, (u,)), lend(at[27], INT, (u, K_WAYPOINTS)), lend(at[28], SINGLE, (w, 2)),
         lend(at[29], COMMAND_DTYPE, (u,)), lend(at[30], OUTCOME_DTYPE, (u,)),
         lend(at[31], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,
@@ -182,7 +185,10 @@ def step_episode(at, sizes, kind, nonlinear, assistants, max_cycles, before, obs
 
 
 def addresses_of(
-    arena: Arena, state: WorldState, learners: Sequence[NDArray[Any]]
+    arena: Arena,
+    state: WorldState,
+    learners: Sequence[NDArray[Any]],
+    assistants: AssistantCode,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Where the arrays of an episode lie; they have to stay there.
 
@@ -191,18 +197,20 @@ def addresses_of(
         state: The state of the world.
         learners: The arrays of `step_learners` in the order of its arguments: ranges, scales,
             neighbours, weights, asked, targets, candidates, company, commands, outcome, report.
+        assistants: Who helps to fly.
 
     Returns:
         Addresses and sizes, see `step_episode`.
     """
     arrays = (*arena, *state, *learners)
+    assert len(arrays) == N_ARRAYS
     assert all(array.flags.c_contiguous for array in arrays)
     asked = learners[4]
     sizes = (
         len(arena.uas), len(arena.obstacles), len(arena.normals), *arena.moving_path_m.shape[1::-1],
-        len(arena.waypoints), len(arena.nodes_m), asked.shape[1],
+        len(arena.waypoints), len(arena.nodes_m), asked.shape[1], len(assistants),
     )  # fmt: skip
-    return np.array([array.ctypes.data for array in arrays]), np.array(sizes)
+    return np.array([*(array.ctypes.data for array in arrays), *assistants]), np.array(sizes)
 
 
 def compiled_step(arguments: Sequence[Any]) -> Callable[..., int]:
