@@ -234,6 +234,7 @@ def test_a_header_that_promises_more_than_there_is_is_refused(directory):
 def test_missing_parts_are_named(directory, tmp_path):
     assert "no such directory" in refusal(tmp_path / "nowhere")
     assert "no such directory" in refusal(directory / "policy.json")
+    assert "too long" in refusal(tmp_path / ("n" * 300))
     (directory / "policy.safetensors").unlink()
     assert "policy.safetensors: is missing" in refusal(directory)
     (directory / "policy.json").unlink()

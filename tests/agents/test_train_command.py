@@ -131,6 +131,7 @@ def test_overwrite_starts_anew_and_removes_only_what_is_ours(tmp_path):
     [
         (["a3c"], "unknown algorithm 'a3c'"),
         ([TINY, "--steps", "3", "--minutes", "1"], "give one of them"),
+        ([TINY, "--minutes", "inf"], "--minutes inf"),
         ([TINY, "--set", "speed=9"], "no 'speed'"),
         ([TINY, "--scenario", "atlantis"], "atlantis"),
         ([TINY, "--steps", "0"], "--steps"),

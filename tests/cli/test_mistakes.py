@@ -1,5 +1,6 @@
 """Mistakes that people make, each answered by one line on stderr and exit code 2."""
 
+import io
 import subprocess
 import sys
 from importlib.resources import files
@@ -107,6 +108,60 @@ def test_a_mistake_on_the_command_line_is_named(arguments, word, elsewhere, caps
     assert word in refused(capsys, *arguments)
     assert (elsewhere / "taken" / "note").read_text() == "mine"
     assert [entry.name for entry in elsewhere.iterdir()] == ["taken"]
+
+
+LONG = "n" * 300
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "village", "--planner", "hover", "--out", LONG],
+        ["run", f"{LONG}.toml"],
+        ["run", "village", "--planner", f"policy:{LONG}"],
+        ["scenarios", "check", "village", "--picture", f"{LONG}.png"],
+        ["compare", "--scenarios", "village", "--planners", "hover", "--out", LONG],
+        ["compare", "--scenarios", f"{LONG}.toml", "--planners", "hover", "--out", "here"],
+        ["compare", "--scenarios", LONG, "--planners", "hover", "--out", "here"],
+        ["train", "ppo", "--out", LONG],
+        ["replay", LONG],
+        ["replay", "taken", "--gif", f"{LONG}.gif"],
+        ["figure", LONG, "--kind", "map"],
+        ["figure", "taken", "--kind", "map", "--out", f"{LONG}.pdf"],
+    ],
+)
+def test_a_path_that_no_file_can_have_is_named(arguments, elsewhere, capsys):
+    (elsewhere / "taken").mkdir()
+    assert "nnn" in refused(capsys, *arguments)
+    assert [entry.name for entry in elsewhere.iterdir()] == ["taken"]
+
+
+def test_a_folder_that_is_closed_to_us_is_named(elsewhere, capsys, monkeypatch):
+    def closed(path, *_, **__):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "is_dir", closed)
+    line = refused(capsys, "figure", "shut", "--kind", "map")
+    assert "shut: cannot be read or written (permission denied)" in line
+
+
+def test_a_terminal_that_is_full_or_gone_is_one_line(elsewhere, capsys, monkeypatch):
+    class Full(io.StringIO):
+        def write(self, text):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(sys, "stdout", Full())
+    assert main(["planners"]) == 2
+    monkeypatch.undo()
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_name_that_the_terminal_cannot_show_is_shown_as_it_can(elsewhere, monkeypatch):
+    terminal = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(terminal, encoding="ascii"))
+    assert main(["scenarios", "check", "village", "--picture", "dörfer.png"]) == 0
+    sys.stdout.flush()
+    assert b"drawn in d\\xf6rfer.png" in terminal.getvalue()
 
 
 def test_the_installed_command_answers_like_this_process(elsewhere):

@@ -120,6 +120,10 @@ def test_what_is_asked_for_twice_is_flown_once():
     assert list(scenarios_of(["village corridor,village", "corridor"])) == ["village", "corridor"]
 
 
+def test_a_list_may_be_longer_than_the_name_of_a_file():
+    assert list(scenarios_of([",".join(["corridor"] * 40)])) == ["corridor"]
+
+
 def test_two_different_scenarios_of_one_name_are_refused(tmp_path, village_text):
     mine = tmp_path / "mine.toml"
     mine.write_text(village_text.replace("max_steps = 500", "max_steps = 400"))

@@ -104,6 +104,11 @@ def test_a_missing_file_is_named(tmp_path):
             "uas[0].vehicle: unknown vehicle 's501'; take hexacopter, s500_v2 or the path of",
         ),
         ('vehicle = "s500_v2"', 'vehicle = "own.toml"', "uas[0].vehicle: no vehicle file at /"),
+        (
+            'vehicle = "s500_v2"',
+            f'vehicle = "{"v" * 300}.toml"',
+            f"uas[0].vehicle: vehicle file '{'v' * 80}' cannot be read (file name too long)",
+        ),
         ("[[146.0, 0.0], [154.0, 0.0], ", "[", "decorations[0].polygon_m: needs at least 3"),
     ],
 )

@@ -1,5 +1,6 @@
 """The commands of `uas-coverage` and what becomes of their mistakes."""
 
+import io
 import sys
 from collections.abc import Sequence
 
@@ -47,6 +48,7 @@ add_outside_commands(app)
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code is returned, every mistake of a person is one line."""
     command = typer.main.get_command(app)
+    _never_stop_at_a_letter()
     try:
         code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
@@ -55,9 +57,26 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refuse(str(error), 2)
     except PlannerError as error:
         return _refuse(str(error), FAILED)
+    except OSError as error:
+        # a folder that is closed to us, a name that is too long, a full disk: a hundred places
+        # may meet them, and nobody needs to hear which of ours it was
+        return _refuse(_of_a_file(error), 2)
     if code == _CTRL_C:
         return _refuse("stopped by hand before there was anything to keep", FAILED)
     return code
+
+
+def _never_stop_at_a_letter() -> None:
+    """Names of files may hold what the terminal cannot show: it is written as `\\xfc` then."""
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _of_a_file(error: OSError) -> str:
+    reason = (error.strerror or str(error)).lower()
+    if error.filename is None:
+        return f"a file or the terminal cannot be read or written ({reason})"
+    return f"{error.filename}: cannot be read or written ({reason}); check the path and its rights"
 
 
 def _refuse(message: str, code: int) -> int:

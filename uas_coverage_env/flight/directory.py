@@ -66,9 +66,9 @@ def check_directory(directory: Path, *, overwrite: bool) -> None:
     Raises:
         InputError: It is a file, is not empty and `overwrite` is not set, or cannot be written.
     """
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"{directory}: is a file; give a folder")
     try:
+        if directory.exists() and not directory.is_dir():
+            raise InputError(f"{directory}: is a file; give a folder")
         directory.mkdir(parents=True, exist_ok=True)
         empty = not any(directory.iterdir())
         with tempfile.TemporaryFile(dir=directory):

@@ -11,7 +11,9 @@ from uas_coverage_env.strict_toml import InputError
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
 _GENERATED = "generated"
-_MOST_GENERATED = 100_000
+_MOST_SEEDS = 100_000
+# digits that a column of a store can hold
+_LONGEST_SEED = 18
 
 
 def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
@@ -48,20 +50,34 @@ def seed_range(option: str, text: str) -> range:
     """FIRST:END as a range; END is not part of it.
 
     Raises:
-        InputError: It is not that, or empty.
+        InputError: It is not that, or empty, or of more seeds than anybody flies.
     """
     first, separator, end = text.partition(":")
-    if not (separator and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
-        raise InputError(f"{option} {text!r}: should be FIRST:END with FIRST < END, as in 0:20")
-    return range(int(first), int(end))
+    numbers = all(part.isdecimal() and len(part) <= _LONGEST_SEED for part in (first, end))
+    if not (separator and numbers and int(first) < int(end)):
+        raise InputError(
+            f"{option} {text[:80]!r}: should be FIRST:END with FIRST < END, as in 0:20, "
+            f"of at most {_LONGEST_SEED} digits"
+        )
+    seeds = range(int(first), int(end))
+    if len(seeds) > _MOST_SEEDS:
+        raise InputError(f"{option} {text!r}: are {len(seeds)} seeds; give at most {_MOST_SEEDS}")
+    return seeds
 
 
 def _items(texts: Iterable[str]) -> Iterator[str]:
     for text in texts:
-        if Path(text).is_file():  # its path may hold a space
+        if _is_file(text):  # its path may hold a space
             yield text
         else:
             yield from filter(None, re.split(r"[,\s]+", text))
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except OSError:  # a list of many is too long for a name
+        return False
 
 
 def _scenarios(item: str) -> Iterator[Scenario]:
@@ -70,10 +86,6 @@ def _scenarios(item: str) -> Iterator[Scenario]:
         seeds: Sequence[int] = SETS[item]
     elif separator and kind == _GENERATED:
         seeds = seed_range(f"--scenarios {_GENERATED}:", rest)
-        if len(seeds) > _MOST_GENERATED:
-            raise InputError(
-                f"--scenarios {item!r}: are {len(seeds)} scenarios; at most {_MOST_GENERATED}"
-            )
     else:
         yield load_scenario(item)
         return

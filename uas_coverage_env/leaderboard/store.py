@@ -144,9 +144,9 @@ def _make_sure_it_is(store: Store, directory: Path, description: Mapping[str, An
 
 
 def _make_folder(directory: Path, *, overwrite: bool) -> None:
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"{directory}: is a file; give a folder")
     try:
+        if directory.exists() and not directory.is_dir():
+            raise InputError(f"{directory}: is a file; give a folder")
         directory.mkdir(parents=True, exist_ok=True)
         foreign = [path.name for path in directory.iterdir() if path.name != _LOCK]
     except OSError as error:

@@ -202,8 +202,15 @@ class Uas(StrictModel):
                 f"unknown vehicle {vehicle[:80]!r}; take {shipped} or the path of a .toml file"
             )
         folder = Path((info.context or {}).get("folder", "."))
-        path = (folder / path).resolve()
-        if not path.is_file():
+        try:
+            path = (folder / path).resolve()
+            found = path.is_file()
+        except (OSError, RuntimeError) as error:  # too long, closed to us, a loop of links
+            reason = (getattr(error, "strerror", None) or str(error)).lower()
+            raise ValueError(
+                f"vehicle file {vehicle[:80]!r} cannot be read ({reason}); correct the path"
+            ) from None
+        if not found:
             raise ValueError(f"no vehicle file at {path}; correct the path")
         return str(path)
 

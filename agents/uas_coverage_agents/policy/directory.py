@@ -83,7 +83,12 @@ def load_policy(directory: str | Path) -> Policy:
         InputError: Anything is missing or wrong: one line that names file and field.
     """
     directory = Path(directory)
-    if not directory.is_dir():
+    try:
+        found = directory.is_dir()
+    except OSError as error:  # a name that is too long, a folder above that is closed to us
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"{directory}: cannot be read ({reason}); check the path") from None
+    if not found:
         raise InputError(f"{directory}: no such directory; give one with {DESCRIPTION}")
     source = str(directory / DESCRIPTION)
     description = parse(_object(_bytes(directory, DESCRIPTION), source), PolicyDescription, source)

@@ -1,6 +1,7 @@
 """`uas-coverage train`: train a policy, or go on with its training."""
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -78,6 +79,8 @@ def train(
     """
     if steps is not None and minutes is not None:
         raise InputError("--steps and --minutes: give one of them")
+    if minutes is not None and math.isinf(minutes):
+        raise InputError("--minutes inf: would never end; give a number")
     changes = [*(change or ()), *([f"steps={steps}"] if steps is not None else ())]
     config = load_config(algorithm, scenario=scenario, changes=changes)
     if zip_file is not None and not trust_pickle:
@@ -137,9 +140,9 @@ def _record(order: "Order") -> dict[str, Any]:
 
 def _check_directory(directory: Path, order: "Order", *, overwrite: bool) -> None:
     """Refuse to mix a training with something else."""
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"{directory}: is a file; give a folder")
     try:
+        if directory.exists() and not directory.is_dir():
+            raise InputError(f"{directory}: is a file; give a folder")
         directory.mkdir(parents=True, exist_ok=True)
         names = {path.name for path in directory.iterdir()} - {".lock"}
     except OSError as error:
