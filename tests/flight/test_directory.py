@@ -220,6 +220,8 @@ def test_a_write_that_fails_leaves_the_former_flight_whole(flight, yard, tmp_pat
     [
         ("flight.csv", "t_s,uas\n"),
         ("flight.csv", FLIGHT_HEADER + "\n"),
+        ("flight.csv", FLIGHT_HEADER + "\n0.0,left\n"),
+        ("summary.json", "[]"),
         ("summary.json", "{}"),
         ("run.json", "not json"),
         ("plan.csv", "t_s,uas,n,x_m,y_m,z_m\n0.0,nobody,0,0,0,0\n"),
@@ -232,6 +234,86 @@ def test_a_damaged_file_is_named_in_one_line(saved, name, text):
         Flight.load(saved)
     assert name in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def refusal(folder: Path) -> str:
+    with pytest.raises(InputError) as error:
+        Flight.load(folder)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "value", "words"),
+    [
+        ("flight.csv", "t_s", "inf", "line 4: 'inf' is not finite"),
+        ("flight.csv", "t_s", "1e308", "is not within the"),
+        ("flight.csv", "t_s", "noon", "line 4: 'noon' is no number"),
+        ("flight.csv", "uas", "middle", "uas is 'middle'; there are left, right"),
+        ("flight.csv", "x_m", "nan", "'nan' is not finite"),
+        ("flight.csv", "soc", "full", "'full' is no number"),
+        ("flight.csv", "mode", "resting", "mode is 'resting'; there are covering, transit"),
+        ("flight.csv", "covered", "-1", "covered is '-1', not a whole number from 0 to 3"),
+        ("flight.csv", "covered", "9" * 30, "covered is"),
+        ("plan.csv", "t_s", "1e999", "line 4: '1e999' is not finite"),
+        ("plan.csv", "n", "9" * 30, "n is"),
+        ("plan.csv", "n", "-1", "n is '-1', not a whole number"),
+        ("plan.csv", "z_m", "deep", "'deep' is no number"),
+        ("moving_obstacles.csv", "t_s", "7.0", "line 4: is of 'kite' at '7.0' s; 'kite' at 2 s"),
+        ("moving_obstacles.csv", "name", "gull", "is of 'gull'"),
+        ("moving_obstacles.csv", "x_m", "inf", "line 4: 'inf' is not finite"),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_line(yard, tmp_path, name, column, value, words):
+    folder = rollout(yard, _Predicting(), max_steps=2).save(tmp_path / "flight")
+    lines = [line.split(",") for line in (folder / name).read_text().splitlines()]
+    lines[3][lines[0].index(column)] = value
+    (folder / name).write_text("".join(f"{','.join(line)}\n" for line in lines))
+    assert words in refusal(folder).removeprefix(f"{folder / name}: was damaged: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "value", "words"),
+    [
+        ("summary.json", ("breaches",), -1, "breaches: should be greater than or equal to 0"),
+        ("summary.json", ("breaches",), True, "breaches: should be a whole number, not true"),
+        ("summary.json", ("wall_time_s",), "1", 'wall_time_s: should be a number, not "1"'),
+        ("summary.json", ("energy_Wh",), float("nan"), "energy_Wh: should be a finite number"),
+        ("summary.json", ("planner",), "Listed", "planner: should be a table"),
+        ("summary.json", ("violations",), [{}], "violations[0].t_s: is missing"),
+        (
+            "summary.json",
+            ("violations",),
+            [{"t_s": 1.0, "uas": "middle", "kind": "geofence", "with": None}],
+            "violations[0]: uas is 'middle'; there are left, right",
+        ),
+        (
+            "summary.json",
+            ("violations",),
+            [{"t_s": 1e300, "uas": "left", "kind": "geofence", "with": None}],
+            "violations[0]: 1e+300 s is not within the",
+        ),
+        ("run.json", ("dynamics",), "magic", "dynamics: should be 'lpv' or 'nonlinear'"),
+        ("run.json", ("ended",), "well", "ended: should be 'complete'"),
+        ("run.json", ("return_mode",), 1, "return_mode: should be true or false, not 1"),
+        ("run.json", ("decisions", 0, "duration_s"), -1.0, "decisions[0].duration_s: should be"),
+        ("run.json", ("decisions",), [], "0 decisions for"),
+    ],
+)
+def test_a_wrong_field_is_named(saved, name, path, value, words):
+    data = json.loads((saved / name).read_text())
+    table = data
+    for key in path[:-1]:
+        table = table[key]
+    table[path[-1]] = value
+    (saved / name).write_text(json.dumps(data))
+    assert words in refusal(saved)
+    del table[path[-1]]
+    (saved / name).write_text(json.dumps(data))
+    if path == ("energy_Wh",):  # it follows from the rows
+        assert Flight.load(saved)
+    else:
+        assert "is missing" in refusal(saved)
 
 
 def test_a_folder_without_a_flight_is_named(tmp_path):

@@ -148,7 +148,7 @@ def test_a_mistake_is_answered_by_one_line(arguments, word, directory, capsys):
         ("run.json", lambda text: re.sub(r"\{[^{}]*\},", "", text, count=1), "59 decisions"),
         ("summary.json", lambda text: text.replace('"t_s": 30.0', '"t_s": -3'), "summary.json"),
         ("summary.json", lambda text: text.replace('"t_s": 30.0', '"t_s": []'), "summary.json"),
-        ("summary.json", lambda text: text.replace('"uas": "uas_1"', '"uas": "x"'), "no UAS"),
+        ("summary.json", lambda text: text.replace('"uas": "uas_1"', '"uas": "x"'), "uas is 'x'"),
         ("summary.json", lambda text: text.replace('"seed": 0', '"seed": "x"'), "summary.json"),
         ("summary.json", lambda text: "[]", "summary.json"),
         ("scenario.json", lambda text: text.replace('"village"', '"</script>"', 1), "name"),

@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _never_stop_at_a_letter() -> None:
-    """Names of files may hold what the terminal cannot show: it is written as `\\xfc` then."""
+    r"""Names of files may hold what the terminal cannot show: it is written as `\xfc` then."""
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
 

@@ -153,7 +153,7 @@ class Flight:
         Raises:
             InputError: A file is missing or was damaged.
         """
-        from uas_coverage_env.flight.directory import read_flight  # it imports Flight
+        from uas_coverage_env.flight.reading import read_flight  # it imports Flight
 
         return cls(**read_flight(Path(directory)))
 

@@ -1,0 +1,274 @@
+"""A flight directory read back: whoever hands one over, nothing in it is believed unchecked."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, JsonValue
+
+from uas_coverage_env.flight.directory import (
+    FLIGHT_COLUMNS,
+    INPUT_COLUMNS,
+    MOVING_COLUMNS,
+    PLAN_COLUMNS,
+)
+from uas_coverage_env.flight.record import MODES, PLAN_DTYPE, DecisionRecord, Violation
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.strict_toml import InputError, StrictModel, parse
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES
+from uas_coverage_env.world import Dynamics
+
+T = TypeVar("T")
+
+Count = Annotated[int, Field(ge=0)]
+Seconds = Annotated[float, Field(ge=0.0)]
+
+_LONGEST_PLAN = 1_000_000
+_LONGEST_SHOWN = 40
+
+
+class _Contact(StrictModel):
+    t_s: Seconds
+    uas: str
+    kind: str
+    partner: Annotated[str | None, Field(alias="with")]
+
+
+class _Planner(StrictModel):
+    name: str
+    options: dict[str, JsonValue]
+
+
+class _Summary(StrictModel):
+    """What the summary alone holds; the rest of it follows from the other files."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    violations: tuple[_Contact, ...]
+    breaches: Count
+    min_separation_m: float | None
+    min_obstacle_clearance_m: float | None
+    wall_time_s: Seconds
+    versions: dict[str, str]
+    seed: int
+    planner: _Planner
+
+
+class _Decision(StrictModel):
+    duration_s: Seconds
+    fallback: bool = False
+    mip_gap: float | None = None
+    filtered: Count = 0
+
+
+class _Run(StrictModel):
+    dynamics: Dynamics
+    return_mode: bool
+    safety_filter: bool
+    ended: Literal["complete", "steps", "stopped"]
+    decisions: tuple[_Decision, ...]
+
+
+def read_flight(directory: Path) -> dict[str, Any]:
+    """Read the fields of a `Flight` from its directory.
+
+    Raises:
+        InputError: A file is missing or was damaged.
+    """
+    path = directory / "scenario.json"
+    scenario = parse(_read(directory, path.name, _object), Scenario, str(path))
+    samples = _read(directory, "flight.csv", lambda text: _flight_arrays(text, scenario))
+    steps = len(samples["x"]) - 1
+    return {
+        "scenario": scenario,
+        **_summary_fields(directory, scenario),
+        **_run_fields(directory, steps),
+        **samples,
+        "moving_position_m": _read(
+            directory, "moving_obstacles.csv", lambda text: _moving_array(text, scenario, steps)
+        ),
+        "plan": _read(directory, "plan.csv", lambda text: _plan_array(text, scenario)),
+    }
+
+
+def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
+    rows = _rows(text, FLIGHT_COLUMNS)
+    if not rows:
+        raise ValueError("it holds no sample")
+    index = {uas.name: i for i, uas in enumerate(scenario.uas)}
+    modes = {name: number for number, name in enumerate(MODES)}
+    shape = (1 + max(_each(rows, lambda row: _step(row[0], scenario))), len(index))
+    x, u = np.zeros((*shape, N_STATES)), np.zeros((*shape, N_INPUTS))
+    voltage_V, current_A = np.zeros(shape), np.zeros(shape)
+    mode, covered = np.zeros(shape, np.int8), np.zeros(shape[0], np.int64)
+    first_input = FLIGHT_COLUMNS.index(INPUT_COLUMNS[0])
+    last = np.zeros(len(index), np.int64)
+    found = np.zeros(shape, np.bool_)
+
+    def put(row: list[str]) -> None:
+        k, i = _step(row[0], scenario), _chosen("uas", row[1], index)
+        x[k, i] = [_number(value) for value in row[2 : 2 + N_STATES]]
+        _number(row[-10])  # the charge follows from the depth of discharge
+        voltage_V[k, i], current_A[k, i] = _number(row[-9]), _number(row[-8])
+        mode[k, i] = _chosen("mode", row[-7], modes)
+        u[k, i] = [_number(value) for value in row[first_input : first_input + N_INPUTS]]
+        covered[k] = _whole("covered", row[-1], len(scenario.waypoints))
+        last[i] = k
+        found[k, i] = True
+
+    _each(rows, put)
+    for i, name in enumerate(index):
+        if not found[: last[i] + 1, i].all():
+            raise ValueError(f"sample {found[:, i].argmin()} of {name} is missing")
+    for i, k in enumerate(last):  # after the end of a UAS its last sample is repeated
+        for series in (x, u, voltage_V, current_A, mode):
+            series[k + 1 :, i] = series[k, i]
+    return {
+        **{"x": x, "u": u, "voltage_V": voltage_V, "current_A": current_A},
+        **{"mode": mode, "covered": covered},
+    }
+
+
+def _moving_array(text: str, scenario: Scenario, steps: int) -> NDArray[np.float64]:
+    names = [obstacle.name for obstacle in scenario.moving_obstacles]
+    rows = _rows(text, MOVING_COLUMNS)
+    if len(rows) != (steps + 1) * len(names):
+        raise ValueError(
+            f"it holds {len(rows)} rows; {steps + 1} samples of {len(names)} moving obstacles "
+            f"are {(steps + 1) * len(names)}"
+        )
+    for number, row in enumerate(rows):
+        k, i = divmod(number, len(names))
+        if row[1] != names[i] or _step(row[0], scenario) != k:
+            raise ValueError(
+                f"line {number + 2}: is of {_short(row[1])} at {_short(row[0])} s; {names[i]!r} "
+                f"at {k * scenario.dt_s:g} s comes there"
+            )
+    positions_m = _each(rows, lambda row: [_number(value) for value in row[2:]])
+    return np.array(positions_m, dtype=np.float64).reshape(steps + 1, len(names), 3)
+
+
+def _plan_array(text: str, scenario: Scenario) -> NDArray[np.void]:
+    index = {uas.name: i for i, uas in enumerate(scenario.uas)}
+
+    def point(row: list[str]) -> tuple[Any, ...]:
+        return (
+            _step(row[0], scenario),
+            _chosen("uas", row[1], index),
+            _whole("n", row[2], _LONGEST_PLAN),
+            tuple(_number(value) for value in row[3:]),
+        )
+
+    return np.array(_each(_rows(text, PLAN_COLUMNS), point), dtype=PLAN_DTYPE)
+
+
+def _run_fields(directory: Path, steps: int) -> dict[str, Any]:
+    path = directory / "run.json"
+    run = parse(_read(directory, path.name, _object), _Run, str(path))
+    if len(run.decisions) != steps:
+        raise InputError(
+            f"{path}: was damaged: it holds {len(run.decisions)} decisions for {steps} steps"
+        )
+    decisions = tuple(DecisionRecord(**decision.model_dump()) for decision in run.decisions)
+    return {**dict(run), "decisions": decisions}
+
+
+def _summary_fields(directory: Path, scenario: Scenario) -> dict[str, Any]:
+    path = directory / "summary.json"
+    summary = parse(_read(directory, path.name, _object), _Summary, str(path))
+    names = {uas.name: i for i, uas in enumerate(scenario.uas)}
+    for number, contact in enumerate(summary.violations):
+        try:
+            _chosen("uas", contact.uas, names)
+            _step(contact.t_s, scenario)
+        except ValueError as error:
+            raise InputError(f"{path}: was damaged: violations[{number}]: {error}") from error
+    return {
+        **dict(summary),
+        "violations": tuple(
+            Violation(contact.t_s, contact.uas, contact.kind, contact.partner)
+            for contact in summary.violations
+        ),
+        "planner": summary.planner.name,
+        "planner_options": dict(summary.planner.options),
+    }
+
+
+def _object(text: str) -> dict[str, Any]:
+    data = json.loads(text)
+    if not isinstance(data, dict):
+        raise ValueError("it should hold one object, { ... }")
+    return data
+
+
+def _rows(text: str, header: Sequence[str]) -> list[list[str]]:
+    rows = list(csv.reader(io.StringIO(text)))
+    if not rows or tuple(rows[0]) != tuple(header):
+        raise ValueError(f"its first line should be {','.join(header)}")
+    for line, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            raise ValueError(f"line {line}: holds {len(row)} values, not {len(header)}")
+    return rows[1:]
+
+
+def _each(rows: Sequence[list[str]], reader: Callable[[list[str]], T]) -> list[T]:
+    """What a reader makes of each row; a mistake names the line."""
+    made: list[T] = []
+    for line, row in enumerate(rows, start=2):
+        try:
+            made.append(reader(row))
+        except ValueError as error:
+            raise ValueError(f"line {line}: {error}") from error
+    return made
+
+
+def _step(time_s: str | float, scenario: Scenario) -> int:
+    number = _number(time_s)
+    if not 0.0 <= number <= scenario.dt_s * (scenario.max_steps + 0.5):
+        raise ValueError(
+            f"{_short(time_s)} s is not within the {scenario.max_steps} steps of the mission"
+        )
+    return round(number / scenario.dt_s)
+
+
+def _number(text: str | float) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise ValueError(f"{_short(text)} is no number") from None
+    if not math.isfinite(number):
+        raise ValueError(f"{_short(text)} is not finite")
+    return number
+
+
+def _whole(column: str, text: str, most: int) -> int:
+    number = _number(text)
+    if not (number.is_integer() and 0 <= number <= most):
+        raise ValueError(f"{column} is {_short(text)}, not a whole number from 0 to {most}")
+    return int(number)
+
+
+def _chosen(column: str, text: str, known: Mapping[str, int]) -> int:
+    if text not in known:
+        raise ValueError(f"{column} is {_short(text)}; there are {', '.join(known)}")
+    return known[text]
+
+
+def _short(value: object) -> str:
+    return repr(value)[:_LONGEST_SHOWN]
+
+
+def _read(directory: Path, name: str, reader: Callable[[str], T]) -> T:
+    path = directory / name
+    try:
+        return reader(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); is it a flight?") from error
+    except (ValueError, RecursionError, csv.Error) as error:
+        raise InputError(f"{path}: was damaged: {' '.join(str(error).split())}") from error
