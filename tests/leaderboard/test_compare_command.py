@@ -1,6 +1,7 @@
 """`uas-coverage compare` in this process: what it says, writes, keeps and returns."""
 
 import json
+import sqlite3
 
 import numpy as np
 import polars
@@ -97,6 +98,30 @@ def test_another_sweep_in_the_same_directory_is_refused(yard, capsys):
     assert flights().equals(before)
     assert compare(yard, "--filter", "--overwrite") == 0
     assert flights()["safety_filter"].to_list() == [True] * 4
+
+
+def test_flights_of_another_sweep_are_not_mixed_in(yard, capsys):
+    assert compare(yard) == 0
+    with sqlite3.connect("sweep/flights.sqlite") as connection:
+        connection.execute("UPDATE flights SET key = 'another' WHERE player = 'hover' AND seed = 1")
+    connection.close()
+    capsys.readouterr()
+    assert compare(yard) == 2
+    assert "holds flights of no sweep, or of another" in capsys.readouterr().err
+
+
+def test_the_figure_of_damaged_files_is_refused_in_a_line(yard, elsewhere, capsys):
+    assert compare(yard) == 0
+    table, flown = elsewhere / "sweep" / "table.json", elsewhere / "sweep" / "flights.parquet"
+    frame = polars.read_parquet(flown)
+    frame.with_columns(coverage=polars.lit(float("nan"))).write_parquet(flown)
+    capsys.readouterr()
+    assert main(["figure", "sweep", "--kind", "leaderboard"]) == 2
+    assert "coverage of a flight is nan" in capsys.readouterr().err
+    frame.write_parquet(flown)
+    table.write_text('{"reference": ["hover"]}')
+    assert main(["figure", "sweep", "--kind", "leaderboard"]) == 2
+    assert "the reference ['hover'] has no flight" in capsys.readouterr().err
 
 
 def test_processes_side_by_side_give_what_one_gives(two_yards):

@@ -6,7 +6,7 @@ import sqlite3
 import pytest
 from leaderboard_rows import failed_row, row
 
-from uas_coverage_env.leaderboard import STORE, Row, opened
+from uas_coverage_env.leaderboard import STORE, Row, flights_in, opened
 from uas_coverage_env.strict_toml import InputError
 
 SWEEP = {"version": "1", "seeds": "0:2"}
@@ -121,6 +121,40 @@ def test_a_damaged_store_is_refused_in_one_line_or_begun_anew(tmp_path, damage):
     assert "\n" not in str(caught.value)
     with opened(tmp_path, SWEEP, overwrite=True) as store:
         assert store.rows() == []
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        *(("player", b"\xff"), ("seed", "many"), ("seed", -1), ("status", "landed")),
+        *(("accomplished", "yes"), ("coverage", "all"), ("coverage", float("inf"))),
+        *(("violations", 1e300), ("steps", -3), ("energy_Wh", "none"), ("decision_p50_s", b"")),
+    ],
+)
+def test_a_value_that_we_do_not_write_is_named_by_its_column(tmp_path, column, value):
+    with opened(tmp_path, SWEEP) as store:
+        store.add(row())
+    with sqlite3.connect(tmp_path / STORE) as connection:
+        connection.execute(f"UPDATE flights SET {column} = ?", (value,))
+    connection.close()
+    with pytest.raises(InputError, match="was damaged") as caught:  # noqa: SIM117
+        with opened(tmp_path, SWEEP) as store:
+            store.rows()
+    assert column.partition("_")[0] in str(caught.value)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="holds no sweep that can be read"):
+        flights_in(tmp_path)
+
+
+@pytest.mark.parametrize("description", ["3", "[1]", "null", "sweep", b"\xff", "[" * 100_000])
+def test_a_store_that_does_not_say_what_it_is_for_is_damaged(tmp_path, description):
+    with opened(tmp_path, SWEEP):
+        pass
+    with sqlite3.connect(tmp_path / STORE) as connection:
+        connection.execute("UPDATE sweep SET description = ?", (description,))
+    connection.close()
+    with pytest.raises(InputError, match="was damaged"), opened(tmp_path, SWEEP):
+        pass
 
 
 def test_every_column_of_a_row_is_a_column_of_the_store(tmp_path):

@@ -172,6 +172,11 @@ def _fly(
 ) -> str:
     """Fly what the store lacks; returns why it did not come to the end, empty where it did."""
     kept = store.keys()
+    if kept - {entry.key for entry in entries}:
+        raise InputError(
+            f"{store.path}: was damaged (it holds flights of no sweep, or of another); "
+            "give another --out, or add --overwrite to begin anew"
+        )
     todo = [entry for entry in entries if entry.key not in kept]
     try:
         with _shown(screen, len(entries), len(entries) - len(todo)) as told:

@@ -121,10 +121,13 @@ def published(directory: Path) -> tuple[list[Row], str]:
         reference = json.loads(table.read_bytes())["reference"]
     except (OSError, ValueError, RecursionError, KeyError, TypeError) as error:
         raise InputError(f"{table}: cannot be read, or names no reference ({error})") from error
-    rows = [Row(**row) for row in frame.iter_rows(named=True)]
+    try:
+        rows = [Row.checked(row) for row in frame.iter_rows(named=True)]
+    except ValueError as error:
+        raise InputError(f"{flights}: was damaged ({error}); compare again") from error
     if not rows:
         raise InputError(f"{flights}: holds no flight")
-    if reference not in {row.player for row in rows}:
+    if not isinstance(reference, str) or reference not in {row.player for row in rows}:
         raise InputError(f"{table}: the reference {reference!r} has no flight in {flights.name}")
     return rows, reference
 

@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 from uas_coverage_env.flight import Flight, accomplished, filtered_share, summary
 from uas_coverage_env.leaderboard.sweep import Entry
@@ -135,6 +137,29 @@ class Row:
             source_sha256=source_sha256,
             finished_at=_now(),
         )
+
+    @classmethod
+    def checked(cls, values: Mapping[str, Any]) -> Self:
+        """The row that a file holds.
+
+        Raises:
+            ValueError: A value is none that we write; names the column.
+        """
+        found = dict(values)
+        for field in fields(cls):
+            kinds, value = get_args(field.type) or (field.type,), found[field.name]
+            if bool in kinds and value in (0, 1):  # SQLite knows no others
+                value = bool(value)
+            elif float in kinds and type(value) is int:
+                value = float(value)
+            finite = not isinstance(value, float) or math.isfinite(value)
+            if type(value) not in kinds or not finite or (type(value) is int and value < 0):
+                raise ValueError(f"{field.name} of a flight is {repr(value)[:40]}")
+            found[field.name] = value
+        row = cls(**found)
+        if row.status not in (FLOWN, FAILED):
+            raise ValueError(f"status of a flight is {row.status[:40]!r}")
+        return row
 
     @property
     def ranked(self) -> bool:

@@ -21,7 +21,6 @@ STORE = "flights.sqlite"
 _LOCK = ".lock"
 _SCHEMA_VERSION = 2
 _SQL_TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
-_BOOLEANS = tuple(field.name for field in dataclasses.fields(Row) if field.type is bool)
 
 
 class Store:
@@ -59,12 +58,21 @@ class Store:
         found = self._connection.execute(
             f"SELECT {', '.join(COLUMNS)} FROM flights ORDER BY scenario, player, seed, key"
         )
-        return [_row(values) for values in found]
+        try:
+            return [Row.checked(dict(zip(COLUMNS, values, strict=True))) for values in found]
+        except ValueError as error:
+            raise sqlite3.DatabaseError(str(error)) from error
 
     def description(self) -> dict[str, Any]:
         """The sweep that it was made for; empty where it is new."""
         found = self._connection.execute("SELECT description FROM sweep").fetchone()
-        return json.loads(found[0]) if found else {}
+        try:
+            description = json.loads(found[0]) if found else {}
+        except (ValueError, TypeError, RecursionError):
+            description = None
+        if not isinstance(description, dict):
+            raise sqlite3.DatabaseError("what it says of its sweep cannot be read")
+        return description
 
     def begin(self, description: Mapping[str, Any]) -> None:
         """Say for which sweep the store is."""
@@ -109,7 +117,7 @@ def opened(
             with Store(path, _connection(path)) as store:
                 _make_sure_it_is(store, directory, description)
                 yield store
-        except (sqlite3.DatabaseError, json.JSONDecodeError) as error:
+        except sqlite3.DatabaseError as error:
             raise InputError(
                 f"{path}: was damaged ({error}); "
                 "give another --out, or add --overwrite to begin anew"
@@ -203,11 +211,6 @@ def _schema() -> str:
         key = " PRIMARY KEY" if field.name == "key" else ""
         columns.append(f"{field.name} {sql}{'' if optional else ' NOT NULL'}{key}")
     return ", ".join(columns)
-
-
-def _row(values: tuple[Any, ...]) -> Row:
-    named = dict(zip(COLUMNS, values, strict=True))
-    return Row(**{**named, **{name: bool(named[name]) for name in _BOOLEANS}})
 
 
 def _remove(path: Path) -> None:
