@@ -45,6 +45,8 @@ def test_a_scenario_can_be_a_name_a_path_or_an_object(tmp_path):
         ({"max_cycles": 0}, "max_cycles is 0"),
         ({"max_cycles": 2.5}, "max_cycles is 2.5"),
         ({"max_cycles": True}, "max_cycles is True"),
+        ({"reward_weights": {"home": 10**400}}, "home is 1000.*give a finite number"),
+        ({"reward_weights": {"home": 1e300}}, "home is 1e[+]300.*at most 1e[+]09"),
         ({"return_mode": "yes"}, "return_mode is 'yes'"),
         ({"safety_filter": None}, "safety_filter is None"),
     ],
@@ -261,6 +263,14 @@ def test_a_shorter_limit_of_steps_is_exact():
         env.step(still(env))
         steps += 1
     assert steps == env.max_cycles == env.scenario.max_steps == 7
+
+
+@pytest.mark.parametrize("steps", [0, -3, 2.5, "7", True])
+def test_a_limit_that_is_none_cannot_be_set_either(steps):
+    env = uas_coverage_v0.parallel_env(practice_ground(), max_cycles=7)
+    with pytest.raises(ValueError, match="max_cycles is"):
+        env.max_cycles = steps
+    assert env.max_cycles == 7
 
 
 def test_in_turns_an_invalid_action_is_refused_at_once():

@@ -288,7 +288,25 @@ def test_wrong_options_are_refused(options, message):
         env.reset(options=options)
 
 
-@pytest.mark.parametrize("seed", [-1, [1, 2], [0, 1, 2.5], 2**64])
+def test_wrong_modes_are_refused_with_what_is_allowed():
+    with pytest.raises(ValueError, match="it is one of NextStep, SameStep, Disabled"):
+        make(autoreset_mode="sometimes")
+
+
+def test_actions_that_are_no_array_are_refused_in_a_line():
+    env = make()
+    env.reset()
+
+    class Learned:
+        def __array__(self, dtype=None, copy=None):
+            raise RuntimeError("call detach first")
+
+    for wrong in (Learned(), [[0.0], [0.0, 1.0], []]):
+        with pytest.raises(ValueError, match=r"action of the swarms is .* give an array"):
+            env.step(wrong)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "3", [1, 2], [0, 1, 2.5], 2**64])
 def test_wrong_seeds_are_refused(seed):
     with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed"):
         make().reset(seed=seed)

@@ -116,7 +116,7 @@ class Continuous:
     def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
         """Write the numbers; any real numbers in the right shape will do."""
         if type(action) is not np.ndarray:
-            action = _as_array(name, action)
+            action = as_array(name, action)
         if action.dtype in _REAL and action.shape == (self.size,):
             # what learners give; all others are looked at more closely
             asked[i] = action
@@ -134,7 +134,7 @@ class Continuous:
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One row of numbers for each UAS."""
-        action = _as_array("the swarm", action)
+        action = as_array("the swarm", action)
         if action.shape != (n_uas * self.size,):
             raise ValueError(
                 f"action of the swarm has shape {action.shape}: {_shown(action)}; "
@@ -173,7 +173,7 @@ class Choice:
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One choice for each UAS."""
-        action = _as_array("the swarm", action)
+        action = as_array("the swarm", action)
         if action.shape != (n_uas,):
             raise ValueError(
                 f"action of the swarm has shape {action.shape}: {_shown(action)}; "
@@ -295,7 +295,12 @@ def write_commands(state, kind, ranges, asked, candidates, targets, commands):
             command.values[2] = -state.x[i, Z]
 
 
-def _as_array(name: str, action: Any) -> NDArray[Any]:
+def as_array(name: str, action: Any) -> NDArray[Any]:
+    """What somebody gives as an action, as an array of whatever it holds.
+
+    Raises:
+        ValueError: It cannot be one; names the value.
+    """
     try:
         return np.asarray(action)
     except (TypeError, ValueError, RuntimeError) as error:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import HOME_CHOICE
+from uas_coverage_env.env.actions import HOME_CHOICE, as_array
 from uas_coverage_env.env.batch_kernel import (
     ACCEPTED,
     DISABLED,
@@ -154,8 +154,10 @@ class CoverageBatch:
         """
         if isinstance(seed, int | np.integer):
             seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_lanes)]
-        else:
+        elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
             seeds = list(seed)
+        else:
+            raise ValueError(f"seed is {seed!r}; give a whole number, or one for each lane")
         if len(seeds) != self.num_lanes:
             raise ValueError(f"{len(seeds)} seeds for {self.num_lanes} lanes; give one for each")
         for lane, value in enumerate(seeds):
@@ -163,7 +165,9 @@ class CoverageBatch:
                 continue
             whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
             if not whole or not 0 <= value < _SEEDS:
-                raise ValueError(f"seed of lane {lane} is {value!r}; give a whole number from 0 on")
+                raise ValueError(
+                    f"seed of lane {lane} is {value!r}; give a whole number from 0 to 2**64 - 1"
+                )
             self.lanes.seed[lane] = value
             self.lanes.mission[lane] = -1
 
@@ -330,7 +334,7 @@ class CoverageBatch:
         return chosen.astype(np.int64)
 
     def _ask(self, actions: Any) -> None:
-        actions = np.asarray(actions)
+        actions = as_array("the swarms", actions)
         asked = self.lanes.asked
         if len(actions.shape) < 2 or len(actions) != len(asked) or actions.size != asked.size:
             raise ValueError(

@@ -1,6 +1,5 @@
 """The multi-agent environment: one agent per UAS, all act at once (PettingZoo)."""
 
-import operator
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
-from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.episode import Episode, with_max_steps
 from uas_coverage_env.env.kernel import REWARD, STATUS
 from uas_coverage_env.env.layout import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
@@ -149,7 +148,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     @max_cycles.setter
     def max_cycles(self, steps: int) -> None:
-        self._episode.max_cycles = operator.index(steps)
+        self._episode.max_cycles = with_max_steps(self.scenario, steps).max_steps
 
     @property
     def scenario(self) -> Scenario:

@@ -48,6 +48,9 @@ what it corrects in return mode has none."""
 REWARD_TERMS = tuple(term.name for term in TERMS)
 """Names of the terms, in their order."""
 
+LARGEST_WEIGHT = 1e9
+"""No reward weight is larger: the sum of a mission stays far from the end of the numbers."""
+
 
 def rewards_table() -> str:
     """The terms as a Markdown table."""
@@ -63,7 +66,7 @@ def weights_of(given: Mapping[str, float] | None) -> NDArray[np.float64]:
         (R,) in the order of REWARD_TERMS.
 
     Raises:
-        ValueError: A name is no term, or a weight is no finite number.
+        ValueError: A name is no term, or a weight is no number, or beyond ±LARGEST_WEIGHT.
     """
     weights: dict[str, Any] = {term.name: term.weight for term in TERMS}
     if given is not None and not isinstance(given, Mapping):
@@ -72,8 +75,13 @@ def weights_of(given: Mapping[str, float] | None) -> NDArray[np.float64]:
         if name not in weights:
             raise ValueError(f"there is no reward term {name!r}; there are {', '.join(weights)}")
         number = isinstance(weight, Real) and not isinstance(weight, bool)
-        if not number or not math.isfinite(weight):
-            raise ValueError(f"reward_weights: {name} is {weight!r}; give a finite number")
+        # NaN is not below any bound
+        if not number or not abs(weight) <= LARGEST_WEIGHT:
+            shown = repr(weight)[:80]
+            raise ValueError(
+                f"reward_weights: {name} is {shown}; give a finite number, at most "
+                f"{LARGEST_WEIGHT:g} in size"
+            )
         weights[name] = weight
     return np.array(list(weights.values()), dtype=np.float64)
 

@@ -105,7 +105,13 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         copy: bool = True,
         render_mode: str | None = None,
     ) -> None:
-        mode = AutoresetMode(autoreset_mode)
+        try:
+            mode = AutoresetMode(autoreset_mode)
+        except ValueError as error:
+            allowed = ", ".join(mode.value for mode in AutoresetMode)
+            raise ValueError(
+                f"autoreset_mode is {autoreset_mode!r}; it is one of {allowed}"
+            ) from error
         self._batch = CoverageBatch(
             num_envs,
             scenario,
