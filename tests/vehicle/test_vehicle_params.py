@@ -108,6 +108,24 @@ MISTAKES = {
     "voltage_min beyond full": ("voltage_min_V", "voltage_min_V = 17", r"voltage_min_V 17"),
     "weight taken away": ("delta_thrust_min_N", "delta_thrust_min_N = -16", r"-16.*weight"),
     "battery too weak": ("resistance_0_ohm", "resistance_0_ohm = 0.3", r"resistance_0_ohm 0\.3"),
+    # beyond any multicopter: these made NaN of a flight, or a traceback of a load
+    "inertia of an atom": (
+        "inertia_kgm2",
+        "inertia_kgm2 = [1e-300, 0.0165, 0.0275]",
+        r"airframe\.inertia_kgm2\[0\].*greater than or equal to",
+    ),
+    "air like rock": (
+        "drag_vertical_kgps",
+        "drag_vertical_kgps = 1e9",
+        r"airframe\.drag_vertical_kgps.*less than or equal to 1000",
+    ),
+    "rotors like light": ("speed_max_radps", "speed_max_radps = 1e300", r"rotor\.speed_max_radps"),
+    "a battery of no memory": (
+        "time_constant_th_s",
+        "time_constant_th_s = 1e-300",
+        r"battery\.time_constant_th_s",
+    ),
+    "lightning": ("ocv_V", "ocv_V = [1e300, 15.0, 14.0, 13.2]", r"battery\.ocv_V\[0\]"),
     "not TOML": ("mass_kg", "mass_kg 1.58", r"not valid TOML"),
 }
 

@@ -5,7 +5,7 @@ from functools import cached_property
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -13,9 +13,22 @@ from uas_coverage_env.strict_toml import InputError, StrictModel, read_toml
 
 _FILES = resources.files("uas_coverage_env.vehicle")
 
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Negative = Annotated[float, Field(lt=0.0)]
+
+def _within(low: float, high: float) -> Any:
+    """Bounds that no multicopter goes beyond; within them nothing that is computed overflows."""
+    return Field(ge=low, le=high)
+
+
+Force_N = Annotated[float, _within(1e-6, 1e6)]
+Inertia_kgm2 = Annotated[float, _within(1e-8, 1e5)]
+Length_m = Annotated[float, _within(1e-3, 100.0)]
+Speed_mps = Annotated[float, _within(0.01, 1000.0)]
+Rate = Annotated[float, _within(1e-3, 1000.0)]
+Resistance_ohm = Annotated[float, _within(1e-6, 100.0)]
+Voltage_V = Annotated[float, _within(0.1, 10_000.0)]
+Current_A = Annotated[float, _within(1e-3, 100_000.0)]
+Slope = Annotated[float, _within(0.0, 1000.0)]
+DodPoint = Annotated[float, _within(0.0, 1.0)]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
@@ -27,64 +40,64 @@ class Airframe(StrictModel):
     """
 
     n_motors: Annotated[int, Field(ge=3, le=32)]
-    mass_kg: Positive
-    gravity_mps2: Positive
-    arm_m: Positive
-    first_arm_angle_rad: float
-    inertia_kgm2: tuple[Positive, Positive, Positive]
-    drag_kgps: NonNegative
-    drag_vertical_kgps: NonNegative
+    mass_kg: Annotated[float, _within(1e-3, 10_000.0)]
+    gravity_mps2: Annotated[float, _within(0.1, 100.0)]
+    arm_m: Length_m
+    first_arm_angle_rad: Annotated[float, _within(-10.0, 10.0)]
+    inertia_kgm2: tuple[Inertia_kgm2, Inertia_kgm2, Inertia_kgm2]
+    drag_kgps: Slope
+    drag_vertical_kgps: Slope
 
 
 class Rotor(StrictModel):
     """One rotor with its propeller."""
 
-    thrust_N_per_radps2: Positive
-    torque_Nm_per_radps2: Positive
-    propeller_radius_m: Positive
-    induced_power_factor: Annotated[float, Field(ge=1.0)]
-    profile_power_advance_factor: NonNegative
-    air_density_kgpm3: Positive
-    speed_max_radps: Positive
+    thrust_N_per_radps2: Annotated[float, _within(1e-12, 1.0)]
+    torque_Nm_per_radps2: Annotated[float, _within(1e-14, 1.0)]
+    propeller_radius_m: Length_m
+    induced_power_factor: Annotated[float, _within(1.0, 10.0)]
+    profile_power_advance_factor: Slope
+    air_density_kgpm3: Annotated[float, _within(1e-3, 100.0)]
+    speed_max_radps: Annotated[float, _within(1.0, 100_000.0)]
 
 
 class Motor(StrictModel):
     """One brushless motor, its speed controller's resistance included."""
 
-    back_emf_Vs_per_rad: Positive
-    resistance_ohm: Positive
-    no_load_current_A: NonNegative
+    back_emf_Vs_per_rad: Annotated[float, _within(1e-6, 10.0)]
+    resistance_ohm: Resistance_ohm
+    no_load_current_A: Annotated[float, _within(0.0, 1000.0)]
 
 
 class Esc(StrictModel):
     """One electronic speed controller."""
 
-    constant_loss_W: NonNegative
+    constant_loss_W: Annotated[float, _within(0.0, 1e5)]
     efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class Power(StrictModel):
     """Battery power around hover."""
 
-    auxiliary_W: NonNegative
-    hover_W: Positive
-    slope_W_per_N: Positive
+    auxiliary_W: Annotated[float, _within(0.0, 1e5)]
+    hover_W: Annotated[float, _within(1e-3, 1e6)]
+    slope_W_per_N: Annotated[float, _within(1e-3, 1e4)]
 
 
 class Battery(StrictModel):
     """Thevenin battery with a piecewise-linear discharge curve."""
 
-    capacity_Ah: Positive
-    resistance_0_ohm: Positive
-    resistance_th_ohm: Positive
-    time_constant_th_s: Positive
-    polarisation_linearised_V: NonNegative
-    ocv_dod: tuple[NonNegative, ...]
-    ocv_V: tuple[Positive, ...]
-    ocv_dod_linearised: tuple[NonNegative, ...]
-    voltage_nominal_V: Positive
-    voltage_min_V: Positive
-    current_max_A: Positive
+    capacity_Ah: Annotated[float, _within(1e-3, 10_000.0)]
+    resistance_0_ohm: Resistance_ohm
+    resistance_th_ohm: Resistance_ohm
+    time_constant_th_s: Annotated[float, _within(0.01, 1e5)]
+    polarisation_linearised_V: Annotated[float, _within(0.0, 1000.0)]
+    ocv_dod: tuple[DodPoint, ...]
+    ocv_V: tuple[Voltage_V, ...]
+    ocv_dod_linearised: tuple[DodPoint, ...]
+    voltage_nominal_V: Voltage_V
+    voltage_min_V: Voltage_V
+    current_max_A: Current_A
     dod_max: Fraction
     dod_cutoff: Fraction
 
@@ -105,10 +118,6 @@ class Battery(StrictModel):
             raise ValueError(
                 f"ocv_dod_linearised has {len(self.ocv_dod_linearised)} values; "
                 f"give one for each of the {len(dod) - 1} segments"
-            )
-        if any(point > 1.0 for point in self.ocv_dod_linearised):
-            raise ValueError(
-                f"ocv_dod_linearised is {list(self.ocv_dod_linearised)}; give values from 0 to 1"
             )
         if self.dod_max > self.dod_cutoff:
             raise ValueError(
@@ -141,20 +150,20 @@ class Battery(StrictModel):
 class Limits(StrictModel):
     """Bounds of states and inputs (the paper's sets X and U)."""
 
-    v_xy_max_mps: Positive
-    v_cruise_mps: Positive
-    v_up_max_mps: Positive
-    v_down_max_mps: Positive
+    v_xy_max_mps: Speed_mps
+    v_cruise_mps: Speed_mps
+    v_up_max_mps: Speed_mps
+    v_down_max_mps: Speed_mps
     tilt_max_rad: Annotated[float, Field(gt=0.0, lt=1.2)]
-    yaw_max_rad: Positive
-    rate_max_radps: Positive
-    yaw_rate_max_radps: Positive
-    angular_acceleration_xy_max_radps2: Positive
-    angular_acceleration_z_max_radps2: Positive
-    delta_thrust_min_N: Negative
-    delta_thrust_max_N: Positive
-    lift_min_N: Negative
-    lift_max_N: Positive
+    yaw_max_rad: Annotated[float, _within(1e-3, 10.0)]
+    rate_max_radps: Rate
+    yaw_rate_max_radps: Rate
+    angular_acceleration_xy_max_radps2: Rate
+    angular_acceleration_z_max_radps2: Rate
+    delta_thrust_min_N: Annotated[float, _within(-1e6, -1e-6)]
+    delta_thrust_max_N: Force_N
+    lift_min_N: Annotated[float, _within(-1e6, -1e-6)]
+    lift_max_N: Force_N
 
     @model_validator(mode="after")
     def _cruise_below_maximum(self) -> Self:
@@ -169,16 +178,16 @@ class Limits(StrictModel):
 class ThrustCorrection(StrictModel):
     """Slopes of the piecewise-linear thrust correction f_T, see `thrust_correction`."""
 
-    speed_N_per_mps: NonNegative
-    climb_N_per_mps: NonNegative
-    descent_N_per_mps: NonNegative
-    tilt_N_per_rad: NonNegative
+    speed_N_per_mps: Slope
+    climb_N_per_mps: Slope
+    descent_N_per_mps: Slope
+    tilt_N_per_rad: Annotated[float, _within(0.0, 1e5)]
 
 
 class ReturnRule(StrictModel):
     """The overestimated way home of the return threshold DoD_r."""
 
-    distance_over_speed_s: Positive
+    distance_over_speed_s: Annotated[float, _within(1e-3, 1e6)]
 
 
 class VehicleParams(StrictModel):
