@@ -208,6 +208,27 @@ def test_a_checkpoint_of_another_network_is_refused():
         thaw(frozen(first.model, first.lanes), second.model, second.lanes)
 
 
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("last/counters", np.zeros((3, 3), np.int64)),
+        ("last/counters", np.zeros(3, np.float16)),
+        ("last/observation", np.zeros((3, 3), np.float32)),
+        ("last/episode_starts", np.zeros(1, np.bool_)),
+        ("random/numpy", np.full(624, np.inf, np.float16)),
+        ("optimiser/policy/1/exp_avg", np.zeros((3, 3), np.float32)),
+    ],
+)
+def test_a_checkpoint_with_an_array_of_another_kind_is_refused(name, array):
+    order = Order("tiny", load_config(TINY), seed=0)
+    first, second = Trainee.untrained(order), Trainee.untrained(order)
+    first.model.learn(64)
+    arrays = frozen(first.model, first.lanes)
+    assert name in arrays
+    with pytest.raises(InputError, match=name):
+        thaw({**arrays, name: array}, second.model, second.lanes)
+
+
 class Payload:
     """Pickled, it runs code when it is read."""
 

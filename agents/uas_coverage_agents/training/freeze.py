@@ -56,7 +56,7 @@ def thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     """
     try:
         _thaw(arrays, model, lanes)
-    except (KeyError, ValueError, IndexError, RuntimeError, TypeError) as error:
+    except (KeyError, ValueError, IndexError, RuntimeError, TypeError, OverflowError) as error:
         reason = " ".join(str(error).split())[:200]
         raise InputError(
             f"the checkpoint does not fit this version ({reason}); start anew with --overwrite"
@@ -64,6 +64,16 @@ def thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
 
 
 def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+    seen = (lanes.num_envs, *cast(tuple[int, ...], model.observation_space.shape))
+    for name, shape, kind in (
+        ("last/observation", seen, "f"),
+        ("last/episode_starts", (lanes.num_envs,), "b"),
+        ("last/counters", (3,), "i"),
+        ("random/numpy", (624,), "u"),
+        ("random/numpy.place", (2,), "i"),
+    ):
+        if arrays[name].shape != shape or arrays[name].dtype.kind != kind:
+            raise ValueError(f"{name} has shape {arrays[name].shape} and {arrays[name].dtype}")
     with torch.no_grad():
         _make_optimiser_state(arrays, model)
         for name, tensor in _tensors(model):
@@ -126,8 +136,12 @@ def _make_optimiser_state(arrays: Arrays, model: BaseAlgorithm) -> None:
         parameters = [p for group in optimiser.param_groups for p in group["params"]]
         for number, parameter in enumerate(parameters):
             start = f"optimiser/{owner}/{number}/"
-            optimiser.state[parameter] = {
+            remembered = {
                 name[len(start) :]: torch.from_numpy(array.copy())
                 for name, array in arrays.items()
                 if name.startswith(start)
             }
+            for name, value in remembered.items():
+                if value.shape not in ((), parameter.shape):
+                    raise ValueError(f"{start}{name} has shape {tuple(value.shape)}")
+            optimiser.state[parameter] = remembered
