@@ -7,6 +7,7 @@ process of its own: first with an empty cache, then again with what the first ha
 asked for (return mode, safety filter, the waypoint action's guidance) is not compiled.
 """
 
+import argparse
 import json
 import os
 import subprocess
@@ -70,4 +71,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    # it takes no options, but who asks for --help does not want minutes of work
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     main()
