@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numba import config, typeof, types
-from numba.core import cgutils, errors, typing
+from numba.core import cgutils, errors
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -58,7 +58,7 @@ def assistants(return_mode: bool, safety_filter: bool, *, goes_to: bool = True) 
 
 
 def _address_of(assistant: Any) -> int:
-    compiled = assistant.get_compile_result(typing.signature(types.none, *_types()))
+    compiled = assistant.get_compile_result(types.none(*_types()))
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
