@@ -165,6 +165,32 @@ def test_a_state_of_another_environment_is_refused():
         CoverageVecEnv(2, TOWNS).load_state_dict({**saved, "secret": np.zeros(1)})
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("scenario", len(TOWNS)),
+        ("scenario", -1),
+        ("orders", 3),
+        ("targets", 10**9),
+        ("candidates", -2),
+        ("step", -(10**9)),
+        ("status", 77),
+        ("x", np.inf),
+        ("observation", np.nan),
+    ],
+)
+def test_missions_do_not_go_on_from_numbers_that_point_at_nothing(name, value):
+    env = CoverageVecEnv(3, TOWNS)
+    env.reset()
+    forged = env.state_dict()
+    forged[name].flat[-1] = value
+    before = env.state_dict()
+    with pytest.raises(ValueError, match=rf"^{name}\[.*\] is "):
+        env.load_state_dict(forged)
+    for kept, array in env.state_dict().items():
+        np.testing.assert_array_equal(array, before[kept])
+
+
 def test_choices_are_masked_for_maskable_ppo():
     env = CoverageVecEnv(2, TOWNS, action="waypoint", max_cycles=30)
     env.reset()

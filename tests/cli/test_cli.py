@@ -3,6 +3,9 @@
 import io
 import json
 import re
+import subprocess
+import sys
+from importlib.metadata import version
 from importlib.resources import files
 
 import numpy as np
@@ -291,3 +294,14 @@ def test_the_map_and_the_line_below_it_fit_into_the_terminal(name, columns, rows
     assert len(drawn) + 2 <= rows
     assert len({len(line) for line in drawn}) == 1
     assert len(drawn[0]) <= columns
+
+
+def test_the_version_is_told_also_to_python_dash_m(capsys):
+    assert main(["--version"]) == 0
+    told = capsys.readouterr().out
+    assert told == f"uas-coverage {version('uas-coverage-env')}\n"
+    command = [sys.executable, "-m", "uas_coverage_env", "--version"]
+    assert subprocess.run(command, capture_output=True, text=True).stdout == told
+    wrong = subprocess.run([*command[:-1], "fly"], capture_output=True, text=True)
+    assert wrong.returncode == 2
+    assert "fly" in wrong.stderr

@@ -3,6 +3,8 @@
 import io
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
@@ -27,11 +29,19 @@ app = typer.Typer(
 
 
 @app.callback()
-def describe(context: typer.Context) -> None:
+def describe(
+    context: typer.Context,
+    show_version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.")
+    ] = False,
+) -> None:
     """Fly a swarm of multicopters that covers an area, and see how well it went.
 
     Exits 0 on success, 1 where a mission failed, 2 where the input is bad.
     """
+    if show_version:
+        typer.echo(f"{PROGRAM} {version('uas-coverage-env')}")
+        raise typer.Exit()
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import HOME_CHOICE, as_array
 from uas_coverage_env.env.batch_kernel import (
+    ABSENT,
     ACCEPTED,
     DISABLED,
     DRAW,
@@ -25,13 +26,16 @@ from uas_coverage_env.env.batch_kernel import (
 )
 from uas_coverage_env.env.kernel import REPORT_SIZE
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
+from uas_coverage_env.env.nearest import NO_TARGET
 from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.put_aside import Limits, check_like, check_values
 from uas_coverage_env.env.rewards import weights_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     FLYING,
     OUTCOME_DTYPE,
+    STATUS_NAMES,
     AssistantCode,
     SwarmState,
     assistants,
@@ -249,24 +253,31 @@ class CoverageBatch:
         """Go on where a batch of the same arguments was when its `state_dict` was taken.
 
         Raises:
-            ValueError: An array is missing, surplus, or of another shape or dtype.
+            ValueError: An array is missing, surplus, of another shape or dtype, or holds what no
+                mission of this batch can have.
         """
         own = self._changing()
-        if set(state) != set(own):
-            wrong = ", ".join(sorted(set(state) ^ set(own)))
-            raise ValueError(f"the state of another kind of batch: {wrong} missing or surplus")
-        for name, array in own.items():
-            given = np.asarray(state[name])
-            if given.shape != array.shape or given.dtype != array.dtype:
-                raise ValueError(
-                    f"{name} has shape {given.shape} and dtype {given.dtype}; "
-                    f"this batch has {array.shape} and {array.dtype}"
-                )
+        check_like(state, own)
+        check_values(state, self._limits(np.asarray(state["scenario"])))
         for name, array in own.items():
             array[...] = state[name]
         # the other array of observations is not what it was
         self.lanes.settled[:] = False
         self._begun = bool((self.lanes.mission >= 0).all())
+
+    def _limits(self, scenario: NDArray[np.int64]) -> Limits:
+        """What the indices of a batch may be that flies these scenarios."""
+        last = len(self.pool) - 1
+        last_waypoint = self.pool.n_waypoints[scenario.clip(0, last)] - 1
+        return {
+            "scenario": (0, last),
+            "mission": (-1, np.iinfo(np.int64).max - 1),
+            "orders": (FLY, DRAW),
+            "step": (0, max(scenario.max_steps for scenario in self.pool.scenarios)),
+            "status": (ABSENT, len(STATUS_NAMES) - 1),
+            "targets": (NO_TARGET, last_waypoint[:, None]),
+            "candidates": (-1, last_waypoint[:, None, None]),
+        }
 
     def _changing(self) -> dict[str, NDArray[Any]]:
         # commands and outcomes are written anew in every step

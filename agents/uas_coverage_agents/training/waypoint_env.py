@@ -10,6 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
+from uas_coverage_agents.waypoint.look import NO_TARGET
 from uas_coverage_agents.waypoint.settings import WaypointSettings
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
@@ -20,8 +21,9 @@ from uas_coverage_agents.waypoint.team import (
     NOT_HOME,
     TIME,
 )
+from uas_coverage_env.env.put_aside import Limits, check_like, check_values
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import assistants
+from uas_coverage_env.world import STATUS_NAMES, assistants
 from uas_coverage_env.world.pool import n_of, pool_arenas
 
 _LARGEST_SHARE_COVERED = 0.7
@@ -125,18 +127,30 @@ class WaypointVecEnv(VecEnv):
         """Go on where `state_dict` was taken.
 
         Raises:
-            ValueError: It is of another environment.
+            ValueError: It is of another environment, or holds what no mission of this one can.
         """
-        mine = self.state_dict()
-        for name, array in mine.items():
-            if name not in state or state[name].shape != array.shape:
-                raise ValueError(f"{name} is missing or has another shape than {array.shape}")
+        check_like(state, self.state_dict())
+        check_values(state, self._limits(state["lanes.scenario"]))
         for name in self._states._fields:
             getattr(self._states, name)[:] = state[f"state.{name}"]
         for name in _KEPT:
             getattr(self._lanes, name)[:] = state[f"lanes.{name}"]
         self._lanes.account[:] = state["account"]
         self._missions[:] = state["missions"]
+
+    def _limits(self, scenario: NDArray[np.int64]) -> Limits:
+        """What the indices may be of lanes that fly these scenarios."""
+        s = scenario.clip(0, len(self._n_uas) - 1)
+        last_waypoint = self._n_waypoints[s] - 1
+        return {
+            "lanes.scenario": (0, len(self._n_uas) - 1),
+            "lanes.decider": (NOBODY, self._n_uas[s] - 1),
+            "lanes.targets": (NO_TARGET, last_waypoint[:, None]),
+            "lanes.candidates": (-1, last_waypoint[:, None]),
+            "state.step": (0, self._arenas.rules["max_steps"].max()),
+            "state.status": (0, len(STATUS_NAMES) - 1),
+            "missions": (0, np.iinfo(np.int64).max - 1),
+        }
 
     def _begin(self, which: NDArray[np.integer]) -> None:
         """Begin missions in these lanes, in which there is something to decide."""

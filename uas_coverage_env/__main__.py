@@ -1,0 +1,7 @@
+"""`python -m uas_coverage_env`: the command `uas-coverage`."""
+
+import sys
+
+from uas_coverage_env.cli import main
+
+sys.exit(main())

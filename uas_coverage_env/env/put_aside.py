@@ -1,0 +1,47 @@
+"""Arrays that were put aside and come back: checked, for kernels ask no index where it points."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Limits = Mapping[str, tuple[ArrayLike, ArrayLike]]
+"""Name of an array -> lowest and highest value of its elements, arrays that broadcast to it."""
+
+
+def check_like(state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]]) -> None:
+    """Refuse arrays that are not as our own are.
+
+    Raises:
+        ValueError: An array is missing, surplus, or of another shape or dtype.
+    """
+    if set(state) != set(own):
+        wrong = ", ".join(sorted(set(state) ^ set(own)))
+        raise ValueError(f"the state of another environment: {wrong} missing or surplus")
+    for name, array in own.items():
+        given = np.asarray(state[name])
+        if given.shape != array.shape or given.dtype != array.dtype:
+            raise ValueError(
+                f"{name} has shape {given.shape} and dtype {given.dtype}; "
+                f"here it has {array.shape} and {array.dtype}"
+            )
+
+
+def check_values(state: Mapping[str, NDArray[Any]], limits: Limits) -> None:
+    """Refuse numbers that are not finite, and indices that point at nothing.
+
+    Raises:
+        ValueError: An array holds such a value; names both.
+    """
+    for name, given in state.items():
+        wrong = np.zeros(np.shape(given), dtype=np.bool_)
+        if np.issubdtype(given.dtype, np.floating):
+            wrong = ~np.isfinite(given)
+        elif name in limits:
+            low, high = limits[name]
+            wrong = (given < low) | (given > high)
+        if wrong.any():
+            at = np.unravel_index(int(wrong.argmax()), wrong.shape)
+            place = ", ".join(str(int(k)) for k in at)
+            raise ValueError(f"{name}[{place}] is {given[at]}, which no mission here can have")
