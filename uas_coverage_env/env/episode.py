@@ -56,7 +56,7 @@ class Episode:
         scenario: The scenario flown, with `max_steps` as given by `max_cycles`.
         names: Of all UAS, in order.
         actions: The kind of action.
-        max_cycles: As given; may be changed.
+        max_cycles: Steps after which the episode is cut.
         chooses: Whether the action is a choice of waypoints.
         steps: Flown since t = 0.
         asked: (U, size) the actions of the coming step, to be written before it.

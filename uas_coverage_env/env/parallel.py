@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
-from uas_coverage_env.env.episode import Episode, with_max_steps
+from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.kernel import REWARD, STATUS
 from uas_coverage_env.env.layout import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
@@ -143,12 +143,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     @property
     def max_cycles(self) -> int:
-        """Steps after which the episode is cut."""
+        """Steps after which the episode is cut; return mode reckons with it from the start."""
         return self._episode.max_cycles
-
-    @max_cycles.setter
-    def max_cycles(self, steps: int) -> None:
-        self._episode.max_cycles = with_max_steps(self.scenario, steps).max_steps
 
     @property
     def scenario(self) -> Scenario:
