@@ -62,7 +62,8 @@ class World:
         measured_m: float = math.inf,
     ) -> None:
         if dynamics not in get_args(Dynamics):
-            raise ValueError(f"dynamics is {dynamics!r}; it is one of {get_args(Dynamics)}")
+            allowed = ", ".join(get_args(Dynamics))
+            raise ValueError(f"dynamics is {dynamics!r}; it is one of {allowed}")
         self.scenario = scenario
         self.dynamics = dynamics
         self.return_mode = bool(return_mode)
