@@ -1,10 +1,12 @@
 """Put the tables of a comparison where they are published.
 
-    python benchmarks/put_table.py sweep
+    python benchmarks/put_table.py sweep         the leaderboard
+    python benchmarks/put_table.py sweep test    the same players on the `test` set
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (all of
-`table.md`) and of `README.md` (a short table), and copies the picture to `docs/pictures`.
-Exits 2 where a file or a mark is missing.
+`table.md`) and of `README.md` (a short table), and copies the picture to `docs/pictures`; or the
+short table between the marks `<!-- test -->` of `baselines/README.md`.
+Exits 2 where a file or a mark is missing, or a file was damaged.
 """
 
 from __future__ import annotations
@@ -16,20 +18,26 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-BEGIN, END = "<!-- leaderboard -->\n", "<!-- end of leaderboard -->\n"
+MARKS = ("leaderboard", "test")
 PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
 
 
-def filled(text: str, content: str) -> str:
+def marks_of(mark: str) -> tuple[str, str]:
+    """The lines before and after what is filled in."""
+    return f"<!-- {mark} -->\n", f"<!-- end of {mark} -->\n"
+
+
+def filled(text: str, content: str, mark: str) -> str:
     """The text with something new between its marks.
 
     Raises:
         ValueError: It has no marks.
     """
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    first, last = marks_of(mark)
+    before, begin, rest = text.partition(first)
+    _, end, after = rest.partition(last)
     if not begin or not end:
-        raise ValueError(f"has no {BEGIN.strip()} ... {END.strip()}")
+        raise ValueError(f"has no {first.strip()} ... {last.strip()}")
     return f"{before}{begin}\n{content.strip()}\n\n{end}{after}"
 
 
@@ -63,30 +71,39 @@ def _estimate(found: dict[str, float | None]) -> str:
     return f"{found['value']:+.1f} [{found['low']:+.1f}, {found['high']:+.1f}]"
 
 
-def main(folder: str) -> int:
-    """Fill both files; the exit code."""
+def main(folder: str, mark: str = "leaderboard") -> int:
+    """Fill the files; the exit code."""
     sweep = Path(folder)
     try:
-        contents = {
-            ROOT / "baselines" / "README.md": (sweep / "table.md").read_text(encoding="utf-8"),
-            ROOT / "README.md": short_table(
-                json.loads((sweep / "table.json").read_text(encoding="utf-8"))
-            ),
-        }
+        contents = {ROOT / "baselines" / "README.md": _short(sweep)}
+        if mark == "leaderboard":
+            long = (sweep / "table.md").read_text(encoding="utf-8")
+            contents = {ROOT / "README.md": _short(sweep), ROOT / "baselines" / "README.md": long}
+        texts = {}
         for path, content in contents.items():
-            text = path.read_text(encoding="utf-8")
             try:
-                path.write_text(filled(text, content), encoding="utf-8", newline="")
+                texts[path] = filled(path.read_text(encoding="utf-8"), content, mark)
             except ValueError as error:
-                raise OSError(f"{path} {error}") from error
-        shutil.copyfile(sweep / "coverage-energy.png", PICTURE)
-    except OSError as error:
+                raise ValueError(f"{path} {error}") from error
+        for path, text in texts.items():
+            path.write_text(text, encoding="utf-8", newline="")
+        if mark == "leaderboard":
+            shutil.copyfile(sweep / "coverage-energy.png", PICTURE)
+    except (OSError, ValueError) as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
     return 0
 
 
+def _short(sweep: Path) -> str:
+    path = sweep / "table.json"
+    try:
+        return short_table(json.loads(path.read_text(encoding="utf-8")))
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise ValueError(f"{path}: was damaged ({error}); compare again") from error
+
+
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(f"usage: {sys.argv[0]} FOLDER_OF_A_COMPARISON")
-    sys.exit(main(sys.argv[1]))
+    if len(sys.argv) not in (2, 3) or sys.argv[2:] not in ([], *([mark] for mark in MARKS)):
+        sys.exit(f"usage: {sys.argv[0]} FOLDER_OF_A_COMPARISON [{'|'.join(MARKS)}]")
+    sys.exit(main(*sys.argv[1:]))

@@ -18,7 +18,8 @@ def put_table(tmp_path, monkeypatch):
     spec.loader.exec_module(module)
     for name in ("README.md", "baselines/README.md"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(f"before\n{module.BEGIN}old\n{module.END}after\n")
+        blocks = ["{}old\n{}".format(*module.marks_of(mark)) for mark in module.MARKS]
+        (tmp_path / name).write_text(f"before\n{''.join(blocks)}after\n")
     monkeypatch.setattr(module, "ROOT", tmp_path)
     monkeypatch.setattr(module, "PICTURE", tmp_path / "picture.png")
     return module
@@ -34,7 +35,7 @@ def test_tables_and_picture_go_between_the_marks_as_often_as_one_likes(put_table
     short = (tmp_path / "README.md").read_text()
     assert short.startswith("before\n")
     assert short.endswith("after\n")
-    assert "old" not in short
+    assert short.count("old") == 1  # between the other marks
     assert short.count("`a command`") == 1
     assert "| `p` | 2/2 | 0 | 1 | +0.0 [+0.0, +0.0] | -10.0 [-10.0, -10.0] |" in short
     assert "| `q` | 0/1 | 0 | – | – | – |" in short
@@ -53,3 +54,31 @@ def test_a_readme_without_marks_is_left_alone(put_table, tmp_path, capsys):
     assert "has no <!-- leaderboard -->" in capsys.readouterr().err
     assert (tmp_path / "baselines/README.md").read_text() == "mine"
     assert put_table.main(str(tmp_path / "nowhere")) == 2
+
+
+def test_the_test_set_has_marks_of_its_own(put_table, tmp_path):
+    rows = [row(s, "base") for s in "ab"] + [row(s, "p", steps=90) for s in "ab"]
+    sweep = tmp_path / "sweep"
+    sweep.mkdir()
+    write(Comparison.of(rows, 5, "base", "a command", "1"), sweep)
+    readme, other = tmp_path / "baselines/README.md", tmp_path / "README.md"
+    untouched = other.read_text()
+    assert put_table.main(str(sweep), "test") == 0
+    begin, end = put_table.marks_of("test")
+    inside = readme.read_text().split(begin)[1].split(end)[0]
+    assert "| `p` | 2/2 | 0 | 1 |" in inside
+    assert readme.read_text().count("old") == 1
+    assert other.read_text() == untouched
+    assert not (tmp_path / "picture.png").exists()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"reference": "p", "scores": [{}]}'])
+def test_a_damaged_table_is_named_and_changes_nothing(put_table, tmp_path, capsys, content):
+    sweep = tmp_path / "sweep"
+    sweep.mkdir()
+    write(Comparison.of([row()], 1, "p", "a command", "1"), sweep)
+    (sweep / "table.json").write_text(content)
+    before = (tmp_path / "README.md").read_text()
+    assert put_table.main(str(sweep)) == 2
+    assert "table.json: was damaged" in capsys.readouterr().err
+    assert (tmp_path / "README.md").read_text() == before
