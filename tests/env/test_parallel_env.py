@@ -265,11 +265,29 @@ def test_a_shorter_limit_of_steps_is_exact():
     assert steps == env.max_cycles == env.scenario.max_steps == 7
 
 
-def test_the_limit_of_steps_is_not_changed_under_return_mode_and_observations():
+@pytest.mark.parametrize("steps", [0, -3, 2.5, "7", True])
+def test_a_limit_that_is_none_cannot_be_set_either(steps):
     env = uas_coverage_v0.parallel_env(practice_ground(), max_cycles=7)
-    with pytest.raises(AttributeError):
-        env.max_cycles = 5  # pyright: ignore[reportAttributeAccessIssue]
-    assert env.max_cycles == env.scenario.max_steps == 7
+    with pytest.raises(ValueError, match="max_cycles is"):
+        env.max_cycles = steps
+    assert env.max_cycles == 7
+
+
+def test_a_limit_that_is_set_is_the_same_as_one_that_was_given():
+    given = uas_coverage_v0.parallel_env(practice_ground(), max_cycles=9, return_mode=True)
+    late = uas_coverage_v0.parallel_env(practice_ground(), max_cycles=40, return_mode=True)
+    late.reset()
+    late.max_cycles = 9
+    with pytest.raises(ResetNeeded):
+        late.step(still(given))
+    assert late.max_cycles == late.scenario.max_steps == 9
+    given.reset(seed=1)
+    late.reset(seed=1)
+    while given.agents:
+        for mine, other in zip(given.step(still(given)), late.step(still(late)), strict=True):
+            for agent, value in mine.items():
+                np.testing.assert_array_equal(value, other[agent])
+    assert not late.agents
 
 
 def test_in_turns_an_invalid_action_is_refused_at_once():

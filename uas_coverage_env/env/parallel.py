@@ -115,15 +115,14 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         max_cycles: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self._episode = Episode(
-            scenario,
-            action=action,
-            dynamics=dynamics,
-            return_mode=return_mode,
-            safety_filter=safety_filter,
-            reward_weights=reward_weights,
-            max_cycles=max_cycles,
-        )
+        self._settings: dict[str, Any] = {
+            "action": action,
+            "dynamics": dynamics,
+            "return_mode": return_mode,
+            "safety_filter": safety_filter,
+            "reward_weights": reward_weights,
+        }
+        self._episode = Episode(scenario, **self._settings, max_cycles=max_cycles)
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode
         self.possible_agents = list(self._episode.names)
@@ -143,8 +142,15 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     @property
     def max_cycles(self) -> int:
-        """Steps after which the episode is cut; return mode reckons with it from the start."""
+        """Steps after which the episode is cut; to set it ends the mission: reset before a step."""
         return self._episode.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, steps: int) -> None:
+        # all anew: return mode and observations reckon with it from the start
+        self._episode = Episode(self.scenario, **self._settings, max_cycles=steps)
+        self._begun = False
+        self.agents = []
 
     @property
     def scenario(self) -> Scenario:
