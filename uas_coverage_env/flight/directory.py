@@ -15,7 +15,10 @@ from typing import Any
 
 from uas_coverage_env.flight.metrics import summary
 from uas_coverage_env.flight.record import MODES, Flight
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.vehicle import vehicle_names
 
 STATE_COLUMNS = (
     *("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "phi_rad", "theta_rad", "psi_rad"),
@@ -58,7 +61,7 @@ def write_flight(flight: Flight, directory: Path, *, overwrite: bool = False) ->
     check_directory(directory, overwrite=overwrite)
     times = [repr(time) for time in flight.time_s.tolist()]
     texts = {
-        "scenario.json": _json(flight.scenario.model_dump(mode="json", by_alias=True)),
+        **_scenario_files(flight.scenario),
         "flight.csv": _csv(FLIGHT_COLUMNS, _flight_rows(flight, times)),
         "moving_obstacles.csv": _csv(MOVING_COLUMNS, _moving_rows(flight, times)),
         "plan.csv": _csv(PLAN_COLUMNS, _plan_rows(flight, times)),
@@ -68,6 +71,22 @@ def write_flight(flight: Flight, directory: Path, *, overwrite: bool = False) ->
     }
     _write_all(directory, texts)
     return directory
+
+
+def _scenario_files(scenario: Scenario) -> dict[str, str]:
+    """The scenario, and beside it its own vehicles: it stays whole wherever the folder goes."""
+    data = scenario.model_dump(mode="json", by_alias=True)
+    named: dict[str, str] = {}
+    texts: dict[str, str] = {}
+    for uas, vehicle in zip(data["uas"], scenario.vehicles, strict=True):
+        path = uas["vehicle"]
+        if path in vehicle_names():
+            continue
+        if path not in named:
+            named[path] = f"vehicle_{uas['name']}.toml"
+            texts[named[path]] = toml_text(vehicle.model_dump(mode="json"))
+        uas["vehicle"] = named[path]
+    return {**texts, "scenario.json": _json(data)}
 
 
 def _flight_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:

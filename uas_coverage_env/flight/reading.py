@@ -82,7 +82,8 @@ def read_flight(directory: Path) -> dict[str, Any]:
         InputError: A file is missing or was damaged.
     """
     path = directory / "scenario.json"
-    scenario = parse(_read(directory, path.name, _object), Scenario, str(path))
+    data = _read(directory, path.name, _object)
+    scenario = parse(data, Scenario, str(path), context={"folder": directory})
     samples = _read(directory, "flight.csv", lambda text: _flight_arrays(text, scenario))
     steps = len(samples["x"]) - 1
     return {

@@ -40,10 +40,7 @@ def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
 
 def scenario_hash(scenario: Scenario) -> str:
     """What the scenario is, its vehicles included, whatever files it came from."""
-    content = scenario.model_dump(mode="json", by_alias=True)
-    for uas, vehicle in zip(content["uas"], scenario.vehicles, strict=True):
-        uas["vehicle"] = vehicle.model_dump(mode="json")
-    return content_hash(content)
+    return content_hash(scenario.content())
 
 
 def seed_range(option: str, text: str) -> range:

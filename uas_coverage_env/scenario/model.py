@@ -328,6 +328,13 @@ class Scenario(StrictModel):
             for obstacle in self.moving_obstacles
         )
 
+    def content(self) -> dict[str, Any]:
+        """All that it says as plain data, vehicles included, whatever files it came from."""
+        data = self.model_dump(mode="json", by_alias=True)
+        for uas, vehicle in zip(data["uas"], self.vehicles, strict=True):
+            uas["vehicle"] = vehicle.model_dump(mode="json")
+        return data
+
     def to_file(self, path: str | Path) -> None:
         """Write a scenario file that `load_scenario` reads back as an equal scenario."""
         data = self.model_dump(mode="json", by_alias=True)

@@ -1,4 +1,4 @@
-"""The text of a scenario file: one point per line, as a person would write it."""
+"""The text of a scenario or vehicle file: one point per line, as a person would write it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ def toml_text(data: Mapping[str, Any]) -> str:
     """TOML of nested plain data; null and empty lists of tables are left out.
 
     Args:
-        data: What `Scenario.model_dump(mode="json", by_alias=True)` returns.
+        data: What `model_dump(mode="json", by_alias=True)` of a scenario or a vehicle returns.
     """
     document = tomlkit.document()
     for key, value in data.items():
