@@ -8,13 +8,13 @@ import dataclasses
 import io
 import json
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from uas_coverage_env.flight.metrics import summary
 from uas_coverage_env.flight.record import MODES, Flight
+from uas_coverage_env.folder import prepare_folder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.strict_toml import InputError
@@ -39,16 +39,7 @@ def check_directory(directory: Path, *, overwrite: bool) -> None:
     Raises:
         InputError: It is a file, is not empty and `overwrite` is not set, or cannot be written.
     """
-    try:
-        if directory.exists() and not directory.is_dir():
-            raise InputError(f"{directory}: is a file; give a folder")
-        directory.mkdir(parents=True, exist_ok=True)
-        empty = not any(directory.iterdir())
-        with tempfile.TemporaryFile(dir=directory):
-            pass
-    except OSError as error:
-        raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
-    if not empty and not overwrite:
+    if prepare_folder(directory) and not overwrite:
         raise InputError(f"{directory}: is not empty; give another folder or ask to overwrite")
 
 

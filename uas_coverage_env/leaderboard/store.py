@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from uas_coverage_env.folder import prepare_folder
 from uas_coverage_env.leaderboard.row import COLUMNS, Row
 from uas_coverage_env.leaderboard.sweep import difference
 from uas_coverage_env.strict_toml import InputError
@@ -152,13 +153,7 @@ def _make_sure_it_is(store: Store, directory: Path, description: Mapping[str, An
 
 
 def _make_folder(directory: Path, *, overwrite: bool) -> None:
-    try:
-        if directory.exists() and not directory.is_dir():
-            raise InputError(f"{directory}: is a file; give a folder")
-        directory.mkdir(parents=True, exist_ok=True)
-        foreign = [path.name for path in directory.iterdir() if path.name != _LOCK]
-    except OSError as error:
-        raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
+    foreign = prepare_folder(directory) - {_LOCK}
     if foreign and STORE not in foreign and not overwrite:
         raise InputError(
             f"{directory}: is not empty and holds no sweep; give another --out or add --overwrite"

@@ -17,6 +17,7 @@ from rich.table import Table
 from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.config import load_config, published_names
+from uas_coverage_env.folder import prepare_folder
 from uas_coverage_env.strict_toml import InputError
 
 if TYPE_CHECKING:
@@ -140,13 +141,7 @@ def _record(order: "Order") -> dict[str, Any]:
 
 def _check_directory(directory: Path, order: "Order", *, overwrite: bool) -> None:
     """Refuse to mix a training with something else."""
-    try:
-        if directory.exists() and not directory.is_dir():
-            raise InputError(f"{directory}: is a file; give a folder")
-        directory.mkdir(parents=True, exist_ok=True)
-        names = {path.name for path in directory.iterdir()} - {".lock"}
-    except OSError as error:
-        raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
+    names = prepare_folder(directory) - {".lock"}
     if names and ORDER not in names:
         raise InputError(f"{directory}: is not empty and holds no training; give another --out")
     if not names or overwrite:
