@@ -6,6 +6,7 @@ them: it is given their addresses, and calls what lies there. What nobody asks f
 """
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,7 @@ def assistants(return_mode: bool, safety_filter: bool, *, goes_to: bool = True) 
     return np.array([_address_of(assistant) for assistant in wanted], dtype=np.int64)
 
 
+@cache  # numba takes milliseconds to find it again
 def _address_of(assistant: Any) -> int:
     compiled = assistant.get_compile_result(types.none(*_types()))
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
