@@ -169,10 +169,10 @@ def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:
             only that, which takes a tenth less time.
     """
     uas = _uas(scenario)
-    rules = _rules(scenario, measured_m)
+    radius_m = max(entry.radius_m for entry in scenario.uas)
+    rules = _rules(scenario, radius_m, measured_m)
     waypoints = _waypoints(scenario)
     rules["unit_m"] = _unit_m(waypoints["position_m"])
-    radius_m = max((entry.radius_m for entry in scenario.uas), default=0.0)
     targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
     overfly_m = _overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
     obstacles, planes, corners = _obstacles(scenario, radius_m, overfly_m)
@@ -209,9 +209,8 @@ def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:
 
 
 def _vehicles(scenario: Scenario) -> NDArray[np.void]:
-    kinds = {uas.vehicle: v for uas, v in zip(scenario.uas, scenario.vehicles, strict=True)}
-    compiled = {name: compile_vehicle(v, scenario.dt_s) for name, v in kinds.items()}
-    return np.stack([compiled[uas.vehicle] for uas in scenario.uas])
+    compiled = {v: compile_vehicle(v, scenario.dt_s) for v in set(scenario.vehicles)}
+    return np.stack([compiled[vehicle] for vehicle in scenario.vehicles])
 
 
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -277,7 +276,7 @@ def _dod_per_s(vehicle: VehicleParams, dod_max: float) -> float:
     return current_A / (3600.0 * battery.capacity_Ah)
 
 
-def _rules(scenario: Scenario, measured_m: float) -> NDArray[np.void]:
+def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np.void]:
     rules = np.zeros(1, dtype=RULES_DTYPE)
     rules["dt_s"] = scenario.dt_s
     rules["max_steps"] = scenario.max_steps
@@ -288,7 +287,6 @@ def _rules(scenario: Scenario, measured_m: float) -> NDArray[np.void]:
     rules["safe_distance_max_m"] = max(
         (o.safe_distance_m for o in (*scenario.obstacles, *scenario.moving_obstacles)), default=0.0
     )
-    radius_m = max((entry.radius_m for entry in scenario.uas), default=0.0)
     rules["measured_m"] = max(
         measured_m,
         radius_m + float(rules["safe_distance_max_m"][0]) + 2 * SURE_M,
@@ -350,7 +348,7 @@ def _obstacles(
         planes.append((sides, footprint.equations[:, 2]))
         low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
         record["hull_middle_m"] = (low_m + high_m) / 2
-        record["hull_half_m"] = (high_m - low_m) / 2 + 1e-6
+        record["hull_half_m"] = (high_m - low_m) / 2 + SURE_M
         near = _widened(hull, near_m)
         record["first_face"] = first
         record["last_face"] = record["first_side"] = first + hull.n_faces
@@ -359,8 +357,8 @@ def _obstacles(
         record["safe_distance_m"] = obstacle.safe_distance_m
         record["near_m"] = near_m
         # the corners are rounded in the last digits: widen the box rather than miss a contact
-        record["lower_m"] = near.min(axis=0) - 1e-6
-        record["upper_m"] = near.max(axis=0) + 1e-6
+        record["lower_m"] = near.min(axis=0) - SURE_M
+        record["upper_m"] = near.max(axis=0) + SURE_M
         record["middle_m"] = (record["lower_m"] + record["upper_m"]) / 2
         record["per_half_m"] = 2 / (record["upper_m"] - record["lower_m"])
         record["rise_m"] = near_m - max(0.0, float(hull.signed_distance(record["middle_m"])))
