@@ -96,8 +96,8 @@ class Episode:
         self.scenario = scenario
         self.names = self._world.names
         self.max_cycles = scenario.max_steps
-        self._filters = bool(safety_filter)
         self.chooses = action == "waypoint"
+        self._filters = self._world.safety_filter
         self._tells_more = self.chooses or self._filters
         self._partners = {
             "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
@@ -118,8 +118,6 @@ class Episode:
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
         self._first_look: tuple[NDArray[Any], ...] | None = None
-        self._nonlinear = dynamics == "nonlinear"
-        self._brings_home = bool(return_mode)
         self._prepare()
 
     @property
@@ -141,11 +139,12 @@ class Episode:
         )
 
     def _prepare(self) -> None:
+        world = self._world
         arrays = (*self._fixed, *self._changing)
-        aboard = assistants(self._brings_home, self._filters, goes_to=self.chooses)
-        addresses = addresses_of(self._world.arena, self._world.state, arrays, aboard)
+        aboard = assistants(world.return_mode, world.safety_filter, goes_to=self.chooses)
+        addresses = addresses_of(world.arena, world.state, arrays, aboard)
         # what the kernel is given in every step: the arrays are written in place
-        self._given = (*addresses, self.actions.kind, self._nonlinear)
+        self._given = (*addresses, self.actions.kind, world.dynamics == "nonlinear")
         look = self.observation
         self._step = compiled_step((*self._given, self.max_cycles, look, look))
 

@@ -41,15 +41,17 @@ def initial_state(scenario: Scenario) -> WorldState:
 class World:
     """One mission of a scenario.
 
-    Attributes:
+    Args:
         scenario: The scenario.
-        names: Names of the UAS, in order.
-        arena: The scenario as arrays; not to be changed.
         dynamics: The model that is flown.
         return_mode: Whether UAS are brought home in time.
         safety_filter: Whether commands are kept clear of harm.
+        measured_m: Up to where distances are measured, see `build_arena`.
 
-    The arena's `rules.measured_m` says up to where distances are measured, see `build_arena`.
+    Attributes:
+        scenario: As given; likewise dynamics, return_mode and safety_filter.
+        names: Names of the UAS, in order.
+        arena: The scenario as arrays; not to be changed.
     """
 
     def __init__(
