@@ -30,6 +30,7 @@ from uas_coverage_env.env.nearest import NO_TARGET
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.put_aside import Limits, check_like, check_values
 from uas_coverage_env.env.rewards import weights_of
+from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
@@ -115,11 +116,7 @@ class CoverageBatch:
         self.autoreset = AUTORESET[autoreset]
         self.worlds = lanes_of(self.num_lanes, self.pool.arenas)
         self.lanes = _empty_lanes(self.pool, self.num_lanes, int(threads))
-        self._settings = (
-            self.actions.kind,
-            weights_of(reward_weights),
-            dynamics == "nonlinear",
-        )
+        self._settings = (self.actions.kind, weights_of(reward_weights), dynamics == "nonlinear")
         self._brings_home = bool(return_mode)
         shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
@@ -313,17 +310,17 @@ class CoverageBatch:
         if self._kernel is None:
             self._aboard = assistants(self._brings_home, self.filters, goes_to=self.chooses)
         settings = (*self._settings, self._aboard, self.autoreset)
-        given = (arenas, tables, self.worlds, self.lanes, orders, *settings)
         before, free = self._observations
+        given = (arenas, tables, self.worlds, self.lanes, orders, *settings, before, free)
         if self._kernel is None:
             kernel = step_batch if self._threads == 1 else step_batch_in_threads
-            self._kernel = _for_these_types(kernel, (*given, before, free))
+            self._kernel = machine_code(kernel, given)
         if self._threads == 1:
-            refused = self._kernel(*given, before, free)
+            refused = self._kernel(*given)
         else:
             threads = numba.get_num_threads()
             numba.set_num_threads(self._threads)
-            refused = self._kernel(*given, before, free)
+            refused = self._kernel(*given)
             numba.set_num_threads(threads)
         if refused == ACCEPTED:
             self._observations = free, before
@@ -367,13 +364,6 @@ def _check_count(name: str, count: Any, most: int) -> None:
     whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
     if not whole or not 1 <= count <= most:
         raise ValueError(f"{name} is {count!r}; give a whole number from 1 to {most}")
-
-
-def _for_these_types(kernel: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
-    """The machine code for arguments of these types: it spares a look at each of them."""
-    if not hasattr(kernel, "compile"):
-        return kernel  # NUMBA_DISABLE_JIT=1: a function like any other
-    return kernel.compile(tuple(numba.typeof(argument) for argument in arguments))
 
 
 def masks_of(candidates: NDArray[np.int64]) -> NDArray[np.bool_]:

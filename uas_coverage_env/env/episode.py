@@ -17,12 +17,13 @@ from uas_coverage_env.env.kernel import (
     REPORT_SIZE,
     STATUS,
     addresses_of,
-    compiled_step,
+    step_episode,
 )
 from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
 from uas_coverage_env.env.observation import observe, scales_of
 from uas_coverage_env.env.rewards import weights_of
+from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
@@ -146,7 +147,7 @@ class Episode:
         # what the kernel is given in every step: the arrays are written in place
         self._given = (*addresses, self.actions.kind, world.dynamics == "nonlinear")
         look = self.observation
-        self._step = compiled_step((*self._given, self.max_cycles, look, look))
+        self._step = machine_code(step_episode, (*self._given, self.max_cycles, look, look))
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses travel

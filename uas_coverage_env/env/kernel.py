@@ -1,10 +1,9 @@
 """One step as a learner sees it, compiled: actions in; world, rewards and observations out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import typeof
 from numpy.typing import NDArray
 
 from uas_coverage_env.borrow import lend, part
@@ -211,13 +210,3 @@ def addresses_of(
         len(arena.waypoints), len(arena.nodes_m), asked.shape[1], len(assistants),
     )  # fmt: skip
     return np.array([*(array.ctypes.data for array in arrays), *assistants]), np.array(sizes)
-
-
-def compiled_step(arguments: Sequence[Any]) -> Callable[..., int]:
-    """`step_episode` as machine code for arguments of these types, which the caller has to keep to.
-
-    Called directly, it spares numba's look at the type of each argument.
-    """
-    if not hasattr(step_episode, "compile"):
-        return step_episode  # NUMBA_DISABLE_JIT=1: a function like any other
-    return step_episode.compile(tuple(typeof(argument) for argument in arguments))

@@ -7,6 +7,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, N_STATES
 from uas_coverage_env.world.arena import build_arena
@@ -14,7 +15,7 @@ from uas_coverage_env.world.assist import AssistantCode, assistants
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, SwarmState, WorldState
-from uas_coverage_env.world.step import ACCEPTED, begin_mission, compiled_step
+from uas_coverage_env.world.step import ACCEPTED, begin_mission, step_world
 
 Dynamics = Literal["lpv", "nonlinear"]
 
@@ -133,7 +134,7 @@ class World:
         last = (commands, self._nonlinear, self._assistants, outcome)
         arguments = (*self._before_commands, *last)
         if self._step is None:
-            self._step = compiled_step(arguments)
+            self._step = machine_code(step_world, arguments)
         invalid = self._step(*arguments)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))

@@ -1,10 +1,6 @@
 """One step of the world: the rules of the game."""
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
-
-from numba import typeof
 
 from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
@@ -174,13 +170,3 @@ def step_world(
     if invalid == ACCEPTED:
         advance(arena, state, commands, nonlinear, assistants, outcome)
     return invalid
-
-
-def compiled_step(arguments: Sequence[Any]) -> Callable[..., int]:
-    """`step_world` for arguments of these types, which the caller has to keep to.
-
-    Called directly it spares the look at the type of each argument, a third of a short step.
-    """
-    if not hasattr(step_world, "compile"):
-        return step_world  # NUMBA_DISABLE_JIT=1: a function like any other
-    return step_world.compile(tuple(typeof(argument) for argument in arguments))
