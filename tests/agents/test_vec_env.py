@@ -159,8 +159,12 @@ def test_missions_go_on_bit_for_bit_from_a_saved_state():
 
 def test_a_state_of_another_environment_is_refused():
     saved = CoverageVecEnv(2, TOWNS).state_dict()
-    with pytest.raises(ValueError, match="episode_returns"):
+    with pytest.raises(ValueError, match="episode_returns has shape"):
         CoverageVecEnv(3, TOWNS).load_state_dict(saved)
+    with pytest.raises(ValueError, match="episode_lengths missing"):
+        CoverageVecEnv(2, TOWNS).load_state_dict(
+            {name: array for name, array in saved.items() if name != "episode_lengths"}
+        )
     with pytest.raises(ValueError, match="surplus"):
         CoverageVecEnv(2, TOWNS).load_state_dict({**saved, "secret": np.zeros(1)})
 
@@ -177,6 +181,8 @@ def test_a_state_of_another_environment_is_refused():
         ("status", 77),
         ("x", np.inf),
         ("observation", np.nan),
+        ("episode_returns", np.inf),
+        ("episode_lengths", -1),
     ],
 )
 def test_missions_do_not_go_on_from_numbers_that_point_at_nothing(name, value):

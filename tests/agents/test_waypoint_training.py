@@ -88,7 +88,7 @@ def test_lanes_go_on_bit_for_bit_from_where_they_were_put_aside():
     fresh.load_state_dict(kept)
     for one, two in zip(expected, fly(fresh, np.random.default_rng(2), 25), strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
-    with pytest.raises(ValueError, match="shape"):
+    with pytest.raises(ValueError, match="has shape"):
         environment(n_lanes=2).load_state_dict(kept)
 
 

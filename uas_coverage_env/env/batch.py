@@ -255,7 +255,7 @@ class CoverageBatch:
         """
         own = self._changing()
         check_like(state, own)
-        check_values(state, self._limits(np.asarray(state["scenario"])))
+        check_values(state, self._limits(state["scenario"]))
         for name, array in own.items():
             array[...] = state[name]
         # the other array of observations is not what it was

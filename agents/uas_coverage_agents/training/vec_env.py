@@ -18,6 +18,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from uas_coverage_env.env import CoverageBatch, observation_bounds
 from uas_coverage_env.env.kernel import STATUS
+from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING
 
@@ -170,12 +171,12 @@ class CoverageVecEnv(VecEnv):
             The observations of all lanes, as the latest step or reset gave them.
 
         Raises:
-            ValueError: An array is missing, surplus, or of another shape or dtype.
+            ValueError: See `CoverageBatch.load_state_dict`.
         """
         own = {"episode_returns": self._returns, "episode_lengths": self._lengths}
-        for name, array in own.items():
-            if name not in state or np.shape(state[name]) != array.shape:
-                raise ValueError(f"{name} is missing, or not of shape {array.shape}")
+        given = {name: array for name, array in state.items() if name in own}
+        check_like(given, own)
+        check_values(given, {"episode_lengths": (0, np.inf)})
         self.batch.load_state_dict({k: v for k, v in state.items() if k not in own})
         for name, array in own.items():
             array[:] = state[name]
