@@ -12,7 +12,7 @@ from typing import Any
 
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
-from uas_coverage_env.leaderboard.row import FAILED, Row
+from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
 from uas_coverage_env.leaderboard.table import (
     effort_cells,
@@ -135,12 +135,13 @@ def published(directory: Path) -> tuple[list[Row], str]:
 def _schema() -> dict[str, Any]:
     import polars  # 50 MB of code that only this needs
 
-    kinds = {"str": polars.String, "int": polars.Int64, "bool": polars.Boolean}
-    schema = {}
-    for field in dataclasses.fields(Row):
-        kind = str(getattr(field.type, "__name__", field.type)).partition(" | ")[0]
-        schema[field.name] = kinds.get(kind, polars.Float64)
-    return schema
+    kinds = {
+        str: polars.String,
+        int: polars.Int64,
+        bool: polars.Boolean,
+        float: polars.Float64,
+    }
+    return {name: kinds[kind] for name, (kind, *_) in COLUMNS.items()}
 
 
 def _parquet(rows: Sequence[Row]) -> bytes:

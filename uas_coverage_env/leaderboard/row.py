@@ -146,16 +146,16 @@ class Row:
             ValueError: A value is none that we write; names the column.
         """
         found = dict(values)
-        for field in fields(cls):
-            kinds, value = get_args(field.type) or (field.type,), found[field.name]
+        for name, kinds in COLUMNS.items():
+            value = found[name]
             if bool in kinds and value in (0, 1):  # SQLite knows no others
                 value = bool(value)
             elif float in kinds and type(value) is int:
                 value = float(value)
             finite = not isinstance(value, float) or math.isfinite(value)
             if type(value) not in kinds or not finite or (type(value) is int and value < 0):
-                raise ValueError(f"{field.name} of a flight is {repr(value)[:40]}")
-            found[field.name] = value
+                raise ValueError(f"{name} of a flight is {repr(value)[:40]}")
+            found[name] = value
         row = cls(**found)
         if row.status not in (FLOWN, FAILED):
             raise ValueError(f"status of a flight is {row.status[:40]!r}")
@@ -167,7 +167,8 @@ class Row:
         return self.status == FLOWN and not self.violations
 
 
-COLUMNS = tuple(field.name for field in fields(Row))
+COLUMNS = {field.name: get_args(field.type) or (field.type,) for field in fields(Row)}
+"""What a row holds: name -> the types of its values, None's last."""
 
 
 def _identity(entry: Entry) -> dict[str, Any]:

@@ -200,11 +200,9 @@ def _connection(path: Path) -> sqlite3.Connection:
 
 def _schema() -> str:
     columns = []
-    for field in dataclasses.fields(Row):
-        plain, _, optional = str(getattr(field.type, "__name__", field.type)).partition(" | ")
-        sql = next(sql for kind, sql in _SQL_TYPES.items() if kind.__name__ == plain)
-        key = " PRIMARY KEY" if field.name == "key" else ""
-        columns.append(f"{field.name} {sql}{'' if optional else ' NOT NULL'}{key}")
+    for name, (kind, *optional) in COLUMNS.items():
+        key = " PRIMARY KEY" if name == "key" else ""
+        columns.append(f"{name} {_SQL_TYPES[kind]}{'' if optional else ' NOT NULL'}{key}")
     return ", ".join(columns)
 
 
