@@ -17,6 +17,7 @@ from uas_coverage_env.flight.directory import (
     INPUT_COLUMNS,
     MOVING_COLUMNS,
     PLAN_COLUMNS,
+    STATE_COLUMNS,
 )
 from uas_coverage_env.flight.record import MODES, PLAN_DTYPE, DecisionRecord, Violation
 from uas_coverage_env.scenario import Scenario
@@ -108,18 +109,18 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     x, u = np.zeros((*shape, N_STATES)), np.zeros((*shape, N_INPUTS))
     voltage_V, current_A = np.zeros(shape), np.zeros(shape)
     mode, covered = np.zeros(shape, np.int8), np.zeros(shape[0], np.int64)
-    first_input = FLIGHT_COLUMNS.index(INPUT_COLUMNS[0])
     last = np.zeros(len(index), np.int64)
     found = np.zeros(shape, np.bool_)
 
     def put(row: list[str]) -> None:
-        k, i = _step(row[0], scenario), _chosen("uas", row[1], index)
-        x[k, i] = [_number(value) for value in row[2 : 2 + N_STATES]]
-        _number(row[-10])  # the charge follows from the depth of discharge
-        voltage_V[k, i], current_A[k, i] = _number(row[-9]), _number(row[-8])
-        mode[k, i] = _chosen("mode", row[-7], modes)
-        u[k, i] = [_number(value) for value in row[first_input : first_input + N_INPUTS]]
-        covered[k] = _whole("covered", row[-1], len(scenario.waypoints))
+        told = dict(zip(FLIGHT_COLUMNS, row, strict=True))
+        k, i = _step(told["t_s"], scenario), _chosen("uas", told["uas"], index)
+        x[k, i] = [_number(told[name]) for name in STATE_COLUMNS]
+        _number(told["soc"])  # it follows from the depth of discharge
+        voltage_V[k, i], current_A[k, i] = _number(told["voltage_V"]), _number(told["current_A"])
+        mode[k, i] = _chosen("mode", told["mode"], modes)
+        u[k, i] = [_number(told[name]) for name in INPUT_COLUMNS]
+        covered[k] = _whole("covered", told["covered"], len(scenario.waypoints))
         last[i] = k
         found[k, i] = True
 
