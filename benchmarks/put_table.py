@@ -75,10 +75,11 @@ def main(folder: str, mark: str = "leaderboard") -> int:
     """Fill the files; the exit code."""
     sweep = Path(folder)
     try:
-        contents = {ROOT / "baselines" / "README.md": _short(sweep)}
+        short = _short(sweep)
+        contents = {ROOT / "baselines" / "README.md": short}
         if mark == "leaderboard":
             long = (sweep / "table.md").read_text(encoding="utf-8")
-            contents = {ROOT / "README.md": _short(sweep), ROOT / "baselines" / "README.md": long}
+            contents = {ROOT / "README.md": short, ROOT / "baselines" / "README.md": long}
         texts = {}
         for path, content in contents.items():
             try:

@@ -61,9 +61,8 @@ def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
     lanes, states = make_lanes(n, arenas)
     covered, discharged = np.zeros(states.uncovered.shape, bool), np.zeros(states.status.shape)
     each = np.arange(n)
-    begin_lanes(
-        arenas, legs, lanes, states, each, each, covered, discharged, True, assistants(True, True)
-    )
+    helped = (True, assistants(True, True))
+    begin_lanes(arenas, legs, lanes, states, each, each, covered, discharged, *helped)
     candidate = [feature.name for feature in CANDIDATE.features]
     team = [feature.name for feature in TEAM.features]
     # back to seconds / unit_s, see the scales in the layout
@@ -78,7 +77,7 @@ def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
             scale * seen[:, team.index(f)] for f, scale in home_costs.items()
         )
         choices = np.where(lanes.legal, cost, np.inf).argmin(axis=1)
-        step_lanes(arenas, legs, lanes, states, choices, True, assistants(True, True))
+        step_lanes(arenas, legs, lanes, states, choices, *helped)
     account = lanes.account
     return np.column_stack(
         [

@@ -153,7 +153,10 @@ def test_a_terminal_that_is_full_or_gone_is_one_line(elsewhere, capsys, monkeypa
     monkeypatch.setattr(sys, "stdout", Full())
     assert main(["planners"]) == 2
     monkeypatch.undo()
-    assert capsys.readouterr().err.count("\n") == 1
+    err = capsys.readouterr().err
+    assert err.startswith("error: ")
+    assert "no space left on device" in err
+    assert err.count("\n") == 1
 
 
 def test_a_name_that_the_terminal_cannot_show_is_shown_as_it_can(elsewhere, monkeypatch):
