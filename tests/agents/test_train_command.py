@@ -215,7 +215,9 @@ def test_a_checkpoint_of_another_network_is_refused():
         ("last/counters", np.zeros(3, np.float16)),
         ("last/observation", np.zeros((3, 3), np.float32)),
         ("last/episode_starts", np.zeros(1, np.bool_)),
+        ("last/counters", np.array([64, -1, 0])),
         ("random/numpy", np.full(624, np.inf, np.float16)),
+        ("random/numpy.place", np.array([10**9, 0])),
         ("optimiser/policy/1/exp_avg", np.zeros((3, 3), np.float32)),
     ],
 )
@@ -227,6 +229,32 @@ def test_a_checkpoint_with_an_array_of_another_kind_is_refused(name, array):
     assert name in arrays
     with pytest.raises(InputError, match=name):
         thaw({**arrays, name: array}, second.model, second.lanes)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("memory/place", lambda place: place + 10**6, r"memory/place\[0\] is"),
+        ("memory/place", lambda place: place - 10**6, r"memory/place\[0\] is -"),
+        ("memory/place", lambda place: place + 1, "memory/observations has shape"),
+        ("memory/rewards", lambda rewards: rewards[:1], "memory/rewards has shape"),
+        ("memory/actions", lambda actions: actions * np.nan, r"memory/actions\[0, 0, 0\] is nan"),
+    ],
+)
+def test_a_memory_that_points_elsewhere_is_refused(remembering, name, change, words):
+    order, arrays = remembering
+    model = Trainee.untrained(order)
+    with pytest.raises(InputError, match=words):
+        thaw({**arrays, name: change(arrays[name])}, model.model, model.lanes)
+
+
+@pytest.fixture(scope="module")
+def remembering():
+    """A training off-policy, put aside."""
+    order = Order("tiny", load_config("sac", changes=["player.hidden=[8]", *SAC]), seed=0)
+    trainee = Trainee.untrained(order)
+    trainee.model.learn(64)
+    return order, frozen(trainee.model, trainee.lanes)
 
 
 class Payload:

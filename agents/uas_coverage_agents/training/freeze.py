@@ -15,10 +15,12 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
 from uas_coverage_agents.training.learner import Lanes
+from uas_coverage_env.env.put_aside import check_values
 from uas_coverage_env.strict_toml import InputError
 
 Arrays = dict[str, NDArray[np.generic]]
 
+_KEYS = 624  # of NumPy's global generator
 _REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -63,17 +65,33 @@ def thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
         ) from error
 
 
-def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+def _check(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+    """Refuse what nobody else would notice: NumPy reads its keys wherever the place says."""
     seen = (lanes.num_envs, *cast(tuple[int, ...], model.observation_space.shape))
-    for name, shape, kind in (
-        ("last/observation", seen, "f"),
-        ("last/episode_starts", (lanes.num_envs,), "b"),
-        ("last/counters", (3,), "i"),
-        ("random/numpy", (624,), "u"),
-        ("random/numpy.place", (2,), "i"),
-    ):
+    expected = {
+        "last/observation": (seen, "f"),
+        "last/episode_starts": ((lanes.num_envs,), "b"),
+        "last/counters": ((3,), "i"),
+        "random/numpy": ((_KEYS,), "u"),
+        "random/numpy.place": ((2,), "i"),
+    }
+    limits: dict[str, Any] = {
+        "last/counters": (0, np.inf),
+        "random/numpy.place": (0, [_KEYS, 1]),
+    }
+    if isinstance(model, OffPolicyAlgorithm):
+        buffer = cast(Any, model.replay_buffer)
+        expected["memory/place"] = ((2,), "i")
+        limits["memory/place"] = (0, [buffer.buffer_size - 1, 1])
+    for name, (shape, kind) in expected.items():
         if arrays[name].shape != shape or arrays[name].dtype.kind != kind:
             raise ValueError(f"{name} has shape {arrays[name].shape} and {arrays[name].dtype}")
+    ours = ("last/", "random/", "memory/")
+    check_values({k: array for k, array in arrays.items() if k.startswith(ours)}, limits)
+
+
+def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+    _check(arrays, model, lanes)
     with torch.no_grad():
         _make_optimiser_state(arrays, model)
         for name, tensor in _tensors(model):
@@ -103,7 +121,11 @@ def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
         buffer.pos, buffer.full = pos, bool(full)
         model._last_original_obs = model._last_obs
         for name in _REMEMBERED:
-            getattr(buffer, name)[: len(arrays[f"memory/{name}"])] = arrays[f"memory/{name}"]
+            remembered = arrays[f"memory/{name}"]
+            filled = getattr(buffer, name)[: buffer.buffer_size if full else pos]
+            if remembered.shape != filled.shape:
+                raise ValueError(f"memory/{name} has shape {remembered.shape}, not {filled.shape}")
+            filled[:] = remembered
 
 
 def _optimisers(model: BaseAlgorithm) -> Iterator[tuple[str, torch.optim.Optimizer]]:
