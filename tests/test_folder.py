@@ -1,8 +1,9 @@
 import tempfile
+from pathlib import Path
 
 import pytest
 
-from uas_coverage_env.folder import prepare_folder
+from uas_coverage_env.folder import prepare_folder, write_files
 from uas_coverage_env.strict_toml import InputError
 
 
@@ -30,3 +31,21 @@ def test_a_folder_that_takes_no_files_is_refused_although_it_is_there(tmp_path, 
     monkeypatch.setattr(tempfile, "TemporaryFile", closed)
     with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
         prepare_folder(tmp_path)
+
+
+def test_files_are_written_all_or_none(tmp_path, monkeypatch):
+    write_files(tmp_path, {"one": b"1", "two": b"2"})
+    write_bytes = Path.write_bytes
+
+    def full_disk(path, content):
+        if "two" in path.name:
+            raise OSError(28, "No space left on device")
+        return write_bytes(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    with pytest.raises(InputError, match=r"cannot be written \(No space left on device\)"):
+        write_files(tmp_path, {"one": b"11", "two": b"22", "three": b"33"})
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {
+        "one": b"1",
+        "two": b"2",
+    }

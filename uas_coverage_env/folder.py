@@ -1,6 +1,8 @@
-"""The folder that somebody names for results: there, and open to us, before the work begins."""
+"""The folder that somebody names for results: tried before the work, written all or nothing."""
 
+import os
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from uas_coverage_env.strict_toml import InputError
@@ -24,3 +26,24 @@ def prepare_folder(directory: Path) -> set[str]:
             return names
     except OSError as error:
         raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
+
+
+def write_files(directory: Path, contents: Mapping[str, bytes]) -> None:
+    """Write every file beside its place first, then move them all: no half of them stays behind.
+
+    Raises:
+        InputError: One cannot be written.
+    """
+    written: list[tuple[Path, Path]] = []
+    try:
+        for name, content in contents.items():
+            temporary = directory / f".{name}.{os.getpid()}"
+            written.append((temporary, directory / name))
+            temporary.write_bytes(content)
+        for temporary, final in written:
+            temporary.replace(final)
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
+    finally:
+        for temporary, _ in written:
+            temporary.unlink(missing_ok=True)

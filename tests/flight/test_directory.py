@@ -269,14 +269,14 @@ def test_a_file_is_no_folder(flight, tmp_path):
 def test_a_write_that_fails_leaves_the_former_flight_whole(flight, yard, tmp_path, monkeypatch):
     former = rollout(yard, _Predicting(), max_steps=1)
     former.save(tmp_path)
-    write_text = Path.write_text
+    write_bytes = Path.write_bytes
 
-    def full_disk(path, *args, **kwargs):
+    def full_disk(path, content):
         if "run.json" in path.name:
             raise OSError(28, "No space left on device")
-        return write_text(path, *args, **kwargs)
+        return write_bytes(path, content)
 
-    monkeypatch.setattr(Path, "write_text", full_disk)
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
     with pytest.raises(InputError, match="No space left"):
         flight.save(tmp_path, overwrite=True)
     assert {path.name for path in tmp_path.iterdir()} == FILES

@@ -7,14 +7,13 @@ import csv
 import dataclasses
 import io
 import json
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from uas_coverage_env.flight.metrics import summary
 from uas_coverage_env.flight.record import MODES, Flight
-from uas_coverage_env.folder import prepare_folder
+from uas_coverage_env.folder import prepare_folder, write_files
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.strict_toml import InputError
@@ -60,7 +59,7 @@ def write_flight(flight: Flight, directory: Path, *, overwrite: bool = False) ->
         # the summary last: where it is, the rest is
         "summary.json": _json(summary(flight)),
     }
-    _write_all(directory, texts)
+    write_files(directory, {name: text.encode() for name, text in texts.items()})
     return directory
 
 
@@ -130,20 +129,3 @@ def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     writer.writerow(header)
     writer.writerows(rows)
     return text.getvalue()
-
-
-def _write_all(directory: Path, texts: dict[str, str]) -> None:
-    """Write every file beside its place first, then move them all: no half flight stays behind."""
-    written: list[tuple[Path, Path]] = []
-    try:
-        for name, text in texts.items():
-            temporary = directory / f".{name}.{os.getpid()}"
-            written.append((temporary, directory / name))
-            temporary.write_text(text, encoding="utf-8", newline="")
-        for temporary, final in written:
-            temporary.replace(final)
-    except OSError as error:
-        raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
-    finally:
-        for temporary, _ in written:
-            temporary.unlink(missing_ok=True)

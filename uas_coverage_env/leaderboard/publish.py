@@ -4,12 +4,12 @@ import csv
 import dataclasses
 import io
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from uas_coverage_env.folder import write_files
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
 from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
@@ -90,15 +90,7 @@ def write(comparison: Comparison, directory: Path) -> list[str]:
         PICTURE: picture(comparison.scores, comparison.rows, comparison.reference),
     }
     there = {name: content for name, content in files.items() if content is not None}
-    for name, content in there.items():
-        temporary = directory / f".{name}.{os.getpid()}"
-        try:
-            temporary.write_bytes(content)
-            temporary.replace(directory / name)
-        except OSError as error:
-            raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
-        finally:
-            temporary.unlink(missing_ok=True)
+    write_files(directory, there)
     return list(there)
 
 
