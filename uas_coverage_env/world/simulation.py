@@ -131,8 +131,7 @@ class World:
             # not before: environments have a world, too, and a step of their own
             self._assistants = assistants(self.return_mode, self.safety_filter)
         outcome = self._fresh_outcome()
-        last = (commands, self._nonlinear, self._assistants, outcome)
-        arguments = (*self._before_commands, *last)
+        arguments = (*self._before_commands, commands, self._nonlinear, self._assistants, outcome)
         if self._step is None:
             self._step = machine_code(step_world, arguments)
         invalid = self._step(*arguments)
