@@ -257,6 +257,20 @@ def test_a_vehicle_file_is_found_beside_the_scenario_and_kept_as_an_absolute_pat
     assert here.vehicle == str(own)
 
 
+def test_a_scenario_takes_its_vehicles_along_to_where_their_files_are_others(tmp_path):
+    text = (resources.files(vehicle) / "s500_v2.toml").read_text(encoding="utf-8")
+    own = tmp_path / "own.toml"
+    own.write_text(text, encoding="utf-8")
+    uas = small().uas[0].model_copy(update={"vehicle": str(own)})
+    scenario = small().model_copy(update={"uas": (uas,)})
+    copy = pickle.dumps(scenario)
+    own.write_text(text.replace("capacity_Ah = 5.0", "capacity_Ah = 6.0"), encoding="utf-8")
+    assert pickle.loads(copy) == scenario
+    assert [known.battery.capacity_Ah for known in pickle.loads(copy).vehicles] == [5.0]
+    own.unlink()
+    assert [known.battery.capacity_Ah for known in pickle.loads(copy).vehicles] == [5.0]
+
+
 def test_a_generated_scenario_is_a_scenario_like_any_other(tmp_path):
     scenario = generate_scenario(3, n_waypoints=9)
     scenario.to_file(tmp_path / "generated.toml")

@@ -262,6 +262,12 @@ class Scenario(StrictModel):
     waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
     decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
 
+    def __getstate__(self) -> dict[Any, Any]:
+        # unlike the rest of what is computed: where the copy goes their files may be others
+        state = super().__getstate__()
+        state["__dict__"]["vehicles"] = self.vehicles
+        return state
+
     @model_validator(mode="after")
     def _has_no_problem(self) -> Self:
         found = problems(self)
