@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from uas_coverage_env.flight.directory import (
     FLIGHT_COLUMNS,
@@ -26,6 +26,7 @@ from uas_coverage_env.vehicle import N_INPUTS, N_STATES
 from uas_coverage_env.world import Dynamics
 
 T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
 
 Count = Annotated[int, Field(ge=0)]
 Seconds = Annotated[float, Field(ge=0.0)]
@@ -82,20 +83,19 @@ def read_flight(directory: Path) -> dict[str, Any]:
     Raises:
         InputError: A file is missing or was damaged.
     """
-    path = directory / "scenario.json"
-    data = _read(directory, path.name, _object)
-    scenario = parse(data, Scenario, str(path), context={"folder": directory})
-    samples = _read(directory, "flight.csv", lambda text: _flight_arrays(text, scenario))
+    # an own vehicle's file is named relative to the folder
+    scenario = _parsed(directory / "scenario.json", Scenario, context={"folder": directory})
+    samples = _read(directory / "flight.csv", lambda text: _flight_arrays(text, scenario))
     steps = len(samples["x"]) - 1
     return {
         "scenario": scenario,
-        **_summary_fields(directory, scenario),
-        **_run_fields(directory, steps),
+        **_summary_fields(directory / "summary.json", scenario),
+        **_run_fields(directory / "run.json", steps),
         **samples,
         "moving_position_m": _read(
-            directory, "moving_obstacles.csv", lambda text: _moving_array(text, scenario, steps)
+            directory / "moving_obstacles.csv", lambda text: _moving_array(text, scenario, steps)
         ),
-        "plan": _read(directory, "plan.csv", lambda text: _plan_array(text, scenario)),
+        "plan": _read(directory / "plan.csv", lambda text: _plan_array(text, scenario)),
     }
 
 
@@ -170,9 +170,8 @@ def _plan_array(text: str, scenario: Scenario) -> NDArray[np.void]:
     return np.array(_each(_rows(text, PLAN_COLUMNS), point), dtype=PLAN_DTYPE)
 
 
-def _run_fields(directory: Path, steps: int) -> dict[str, Any]:
-    path = directory / "run.json"
-    run = parse(_read(directory, path.name, _object), _Run, str(path))
+def _run_fields(path: Path, steps: int) -> dict[str, Any]:
+    run = _parsed(path, _Run)
     if len(run.decisions) != steps:
         raise InputError(
             f"{path}: was damaged: it holds {len(run.decisions)} decisions for {steps} steps"
@@ -181,9 +180,8 @@ def _run_fields(directory: Path, steps: int) -> dict[str, Any]:
     return {**dict(run), "decisions": decisions}
 
 
-def _summary_fields(directory: Path, scenario: Scenario) -> dict[str, Any]:
-    path = directory / "summary.json"
-    summary = parse(_read(directory, path.name, _object), _Summary, str(path))
+def _summary_fields(path: Path, scenario: Scenario) -> dict[str, Any]:
+    summary = _parsed(path, _Summary)
     names = {uas.name: i for i, uas in enumerate(scenario.uas)}
     for number, contact in enumerate(summary.violations):
         try:
@@ -200,6 +198,10 @@ def _summary_fields(directory: Path, scenario: Scenario) -> dict[str, Any]:
         "planner": summary.planner.name,
         "planner_options": dict(summary.planner.options),
     }
+
+
+def _parsed(path: Path, model: type[M], *, context: Any = None) -> M:
+    return parse(_read(path, _object), model, str(path), context=context)
 
 
 def _object(text: str) -> dict[str, Any]:
@@ -266,8 +268,7 @@ def _short(value: object) -> str:
     return repr(value)[:_LONGEST_SHOWN]
 
 
-def _read(directory: Path, name: str, reader: Callable[[str], T]) -> T:
-    path = directory / name
+def _read(path: Path, reader: Callable[[str], T]) -> T:
     try:
         return reader(path.read_text(encoding="utf-8"))
     except OSError as error:
