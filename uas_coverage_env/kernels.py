@@ -92,6 +92,26 @@ def _on_the_stack(number: types.Float, element: ir.Type) -> Any:
     return intrinsic(prefer_literal=True)(make)
 
 
+def lowest_bit(bits: int) -> int:
+    """The place of the lowest bit that is set, counted from 0; in a kernel one instruction.
+
+    Args:
+        bits: Above 0.
+    """
+    return (int(bits) & -int(bits)).bit_length() - 1
+
+
+def _trailing_zeros() -> Any:
+    def make(typing_context, bits):
+        def generate(context, builder, signature, arguments):
+            return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+
+        return types.int64(types.int64), generate
+
+    return intrinsic(make)
+
+
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    lowest_bit = _trailing_zeros()
     room = _on_the_stack(types.float64, ir.DoubleType())
     single_room = _on_the_stack(types.float32, ir.FloatType())

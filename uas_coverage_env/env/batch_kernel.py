@@ -179,16 +179,17 @@ def _settle(worlds, lanes, lane, n_uas, max_steps):
         if i < n_uas:
             flies |= worlds.status[lane, i] == FLYING
             lanes.rewards[lane, i] = report[i, REWARD]
-    reward = 0.0
+    swarm = borrow(lanes.swarm, lane, (SWARM_SIZE,))
     for column in range(SWARM_COVERED):
-        total = 0.0
-        for i in range(n_uas):
-            total += report[i, column]
-        lanes.swarm[lane, column] = total
-        if column < N_TERMS:
-            reward += total
-    lanes.swarm[lane, SWARM_COVERED] = report[0, COVERED]
-    lanes.swarm[lane, SWARM_REWARD] = reward
+        swarm[column] = 0.0
+    for i in range(n_uas):
+        for column in range(SWARM_COVERED):
+            swarm[column] += report[i, column]
+    reward = 0.0
+    for term in range(N_TERMS):
+        reward += swarm[term]
+    swarm[SWARM_COVERED] = report[0, COVERED]
+    swarm[SWARM_REWARD] = reward
     lanes.terminated[lane] = not flies
     lanes.truncated[lane] = flies and worlds.step[lane, 0] >= max_steps
     return lanes.terminated[lane] or lanes.truncated[lane]

@@ -99,7 +99,7 @@ def step_learners(
         weights: (R,) of the reward terms.
         nonlinear: See `world.advance`.
         assistants: See `world.advance`.
-        asked: (U, size) the actions.
+        asked: (U, size) the actions, all finite.
         targets: (U,) where each is flying to (waypoint action); written.
         candidates: (U, K_WAYPOINTS) as in the last observation; written.
         company: (W, 2) see `count_company`; written.
@@ -108,20 +108,13 @@ def step_learners(
         report: (U, REPORT_SIZE) reward terms, then the columns named above; written.
         max_cycles: Steps after which the episode is cut.
         observation: (U, OBSERVATION_SIZE) float32; that of a UAS that did not fly stays.
-
-    Returns:
-        ACCEPTED, or the index of a UAS whose action is not finite; then nothing has changed.
     """
-    invalid = first_not_finite(asked)
-    if invalid != ACCEPTED:
-        return invalid
     write_commands(state, kind, ranges, asked, candidates, targets, commands)
     advance(arena, state, commands, nonlinear, assistants, outcome)
     settle(
         arena, state, scales, neighbours, weights, targets, candidates, company, commands, outcome,
         report, max_cycles, observation,
     )  # fmt: skip
-    return ACCEPTED
 
 
 N_ARRAYS = 32
@@ -147,6 +140,9 @@ def step_episode(at, sizes, kind, nonlinear, max_cycles, before, observation):
         max_cycles: Steps after which the episode is cut.
         before: (U, OBSERVATION_SIZE) float32, the observation of the step before.
         observation: (U, OBSERVATION_SIZE) float32, another array; written.
+
+    Returns:
+        ACCEPTED, or the index of a UAS whose action is not finite; then nothing has changed.
     """
     u = sizes[0]
     o = sizes[1]
@@ -169,18 +165,23 @@ def step_episode(at, sizes, kind, nonlinear, max_cycles, before, observation):
         lend(at[17], BOOL, (u,)), lend(at[18], BOOL, (u,)), lend(at[19], BOOL, (w,)),
         lend(at[20], INT, (1,)),
     )  # fmt: skip
+    asked = lend(at[25], FLOAT, (u, sizes[7]))
+    invalid = first_not_finite(asked)
+    if invalid != ACCEPTED:
+        return invalid
     for i in range(u):
         if state.status[i] != FLYING:
             for k in range(OBSERVATION_SIZE):
                 observation[i, k] = before[i, k]
-    return step_learners(
+    step_learners(
         arena, state, kind, lend(at[21], RANGES_DTYPE, (u,)), lend(at[22], SCALES_DTYPE, (u,)),
         lend(at[23], NEIGHBOURS_DTYPE, (w,)), lend(at[24], FLOAT, (len(REWARD_TERMS),)),
-        nonlinear, part(at, N_ARRAYS, sizes[8]), lend(at[25], FLOAT, (u, sizes[7])),
+        nonlinear, part(at, N_ARRAYS, sizes[8]), asked,
         lend(at[26], INT, (u,)), lend(at[27], INT, (u, K_WAYPOINTS)), lend(at[28], SINGLE, (w, 2)),
         lend(at[29], COMMAND_DTYPE, (u,)), lend(at[30], OUTCOME_DTYPE, (u,)),
         lend(at[31], FLOAT, (u, REPORT_SIZE)), max_cycles, observation,
     )  # fmt: skip
+    return ACCEPTED
 
 
 def addresses_of(

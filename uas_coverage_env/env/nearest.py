@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.borrow import borrow
+from uas_coverage_env.borrow import borrow, part
 from uas_coverage_env.env.layout import (
     CROWD,
     CROWD_M,
@@ -25,7 +25,7 @@ from uas_coverage_env.env.relative import (
     direction,
     within,
 )
-from uas_coverage_env.kernels import inlined_kernel, kernel, room, single_room
+from uas_coverage_env.kernels import inlined_kernel, kernel, lowest_bit, room, single_room
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world import FLYING
@@ -35,7 +35,12 @@ NO_TARGET = -2
 
 N_NEIGHBOURS = 24
 
+_WORD = 63
+"""As many waypoints are asked at once: their answers are the bits of one number that has a sign."""
+
 _WAYPOINTS_SIZE = 12 * K_WAYPOINTS
+_OTHERS_SIZE = 8 * K_UAS
+_MOVING_SIZE = 8 * K_MOVING
 
 _ZERO, _ONE, _INFINITE = np.float32(0.0), np.float32(1.0), np.float32(math.inf)
 _NEARBY_M = np.float32(NEARBY_M)
@@ -103,20 +108,24 @@ def _insert(index, away, found, which, distance):
 
 
 @inlined_kernel
-def _holds(index, found, which):
-    """Whether the first entries of a list hold one."""
-    times = 0
-    for at in range(found):
-        times += index[at] == which
-    return times > 0
-
-
-@inlined_kernel
 def _away_m2(columns, w, x, y, z):
     dx = columns[0, w] - x
     dy = columns[1, w] - y
     dz = columns[2, w] - z
     return dx * dx + dy * dy + dz * dz
+
+
+@inlined_kernel
+def _open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
+    """The open waypoints no farther than a limit, as the bits of a number."""
+    bits = 0
+    for w in range(uncovered.shape[0]):
+        dx = north_m[w] - x
+        dy = east_m[w] - y
+        dz = down_m[w] - z
+        near = uncovered[w] & (dx * dx + dy * dy + dz * dz <= limit_m2)
+        bits |= np.int64(near) << w
+    return bits
 
 
 @inlined_kernel
@@ -144,15 +153,24 @@ def nearest_waypoints(arena, state, i, candidates):
         if 0 <= w < n_waypoints and uncovered[w]:
             m2 = _away_m2(columns, w, x, y, z)
             found = _insert(candidates, away_m2, found, w, m2)
-    limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
-    near = 0
-    for w in range(n_waypoints):
-        near += uncovered[w] & (_away_m2(columns, w, x, y, z) <= limit_m2)
-    if near > found:
-        for w in range(n_waypoints):
+    for first in range(0, n_waypoints, _WORD):
+        n = min(_WORD, n_waypoints - first)
+        limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
+        bits = _open_within(
+            part(columns, first, n), part(columns, n_waypoints + first, n),
+            part(columns, 2 * n_waypoints + first, n), part(uncovered, first, n),
+            x, y, z, limit_m2,
+        )  # fmt: skip
+        held = 0
+        for c in range(found):
+            at = candidates[c] - first
+            held |= (1 << at) if 0 <= at < n else 0
+        bits &= ~held
+        while bits != 0:
+            w = first + lowest_bit(bits)
+            bits &= bits - 1
             m2 = _away_m2(columns, w, x, y, z)
-            if uncovered[w] and m2 <= limit_m2 and not _holds(candidates, found, w):
-                found = _insert(candidates, away_m2, found, w, m2)
+            found = _insert(candidates, away_m2, found, w, m2)
     for c in range(found, K_WAYPOINTS):
         candidates[c] = -1
 
@@ -231,7 +249,7 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     Feature by feature rather than waypoint by waypoint, always for as many as there may be: so
     the processor does several at a time. From the ways on in single precision, as they are told:
     its roots and divisions take a third of the time. Waypoints that are not there are the first
-    waypoint until they become zeros.
+    waypoint until they are left out.
     """
     uas = arena.uas[i]
     x = state.x[i, X]
@@ -296,6 +314,10 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
     # a view of its own: the compiler knows that its indices are not negative
     told = borrow(row, k, (_WAYPOINTS_SIZE,))
     for c in range(K_WAYPOINTS):
+        # an end that nobody can foretell: so the compiler does not write four waypoints at a time,
+        # by instructions for scattered numbers that take longer than one by one
+        if candidates[c] < 0:
+            break
         told[12 * c] = _ONE
         told[12 * c + 1] = north[c]
         told[12 * c + 2] = east[c]
@@ -308,9 +330,8 @@ def waypoints(arena, state, scale, company, i, targets, candidates, row, k):
         told[12 * c + 9] = taken[c]
         told[12 * c + 10] = from_home[c]
         told[12 * c + 11] = margin[c]
-    if n < K_WAYPOINTS:
-        for at in range(_WAYPOINTS_SIZE):
-            told[at] = told[at] if at < 12 * n else _ZERO
+    for at in range(12 * n, _WAYPOINTS_SIZE):
+        told[at] = _ZERO
     return k + _WAYPOINTS_SIZE
 
 
@@ -326,21 +347,21 @@ def others(arena, state, scale, i, row, k):
             other = state.x[j]
             m = apart_m(other[X] - x[X], other[Y] - x[Y], other[Z] - x[Z])
             found = _insert(index, away_m, found, j, m)
+    told = borrow(row, k, (_OTHERS_SIZE,))
+    for at in range(_OTHERS_SIZE):
+        told[at] = 0.0
     for c in range(found):
         nearest = int(index[c])
         other = state.x[nearest]
-        row[k] = 1.0
-        direction(other[X] - x[X], other[Y] - x[Y], row, k + 1)
-        row[k + 3] = close(away_m[c])
-        row[k + 4] = within((other[Z] - x[Z]) / HEIGHT_M, -1.0, 1.0)
-        row[k + 5] = within((other[VX] - x[VX]) * scale.per_v_xy, -2.0, 2.0)
-        row[k + 6] = within((other[VY] - x[VY]) * scale.per_v_xy, -2.0, 2.0)
-        row[k + 7] = charge_left(arena, state, nearest)
-        k += 8
-    for _ in range(8 * (K_UAS - found)):
-        row[k] = 0.0
-        k += 1
-    return k
+        at = 8 * c
+        told[at] = 1.0
+        direction(other[X] - x[X], other[Y] - x[Y], told, at + 1)
+        told[at + 3] = close(away_m[c])
+        told[at + 4] = within((other[Z] - x[Z]) / HEIGHT_M, -1.0, 1.0)
+        told[at + 5] = within((other[VX] - x[VX]) * scale.per_v_xy, -2.0, 2.0)
+        told[at + 6] = within((other[VY] - x[VY]) * scale.per_v_xy, -2.0, 2.0)
+        told[at + 7] = charge_left(arena, state, nearest)
+    return k + _OTHERS_SIZE
 
 
 @inlined_kernel
@@ -357,19 +378,19 @@ def moving_obstacles(arena, state, scale, i, row, k):
         beside_m -= arena.moving[m].radius_m
         above_m = abs(x[Z] - centre_m[2]) - arena.moving[m].half_height_m
         found = _insert(index, away_m, found, m, max(beside_m, above_m))
+    told = borrow(row, k, (_MOVING_SIZE,))
+    for at in range(_MOVING_SIZE):
+        told[at] = 0.0
     for c in range(found):
         nearest = int(index[c])
         centre_m = arena.moving_path_m[sample, nearest]
         velocity_mps = arena.moving_velocity_mps[sample, nearest]
-        row[k] = 1.0
-        direction(centre_m[0] - x[X], centre_m[1] - x[Y], row, k + 1)
-        row[k + 3] = close(max(0.0, away_m[c] - arena.uas[i].radius_m))
-        row[k + 4] = within((centre_m[2] - x[Z]) / HEIGHT_M, -1.0, 1.0)
-        row[k + 5] = within((velocity_mps[0] - x[VX]) * scale.per_v_xy, -2.0, 2.0)
-        row[k + 6] = within((velocity_mps[1] - x[VY]) * scale.per_v_xy, -2.0, 2.0)
-        row[k + 7] = within((velocity_mps[2] - x[VZ]) * scale.per_v_z, -2.0, 2.0)
-        k += 8
-    for _ in range(8 * (K_MOVING - found)):
-        row[k] = 0.0
-        k += 1
-    return k
+        at = 8 * c
+        told[at] = 1.0
+        direction(centre_m[0] - x[X], centre_m[1] - x[Y], told, at + 1)
+        told[at + 3] = close(max(0.0, away_m[c] - arena.uas[i].radius_m))
+        told[at + 4] = within((centre_m[2] - x[Z]) / HEIGHT_M, -1.0, 1.0)
+        told[at + 5] = within((velocity_mps[0] - x[VX]) * scale.per_v_xy, -2.0, 2.0)
+        told[at + 6] = within((velocity_mps[1] - x[VY]) * scale.per_v_xy, -2.0, 2.0)
+        told[at + 7] = within((velocity_mps[2] - x[VZ]) * scale.per_v_z, -2.0, 2.0)
+    return k + _MOVING_SIZE
