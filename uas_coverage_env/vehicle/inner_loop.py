@@ -34,7 +34,6 @@ from uas_coverage_env.vehicle.layout import (
 
 _BLOCKS = -GOVERNOR_BLOCK  # as a mask: to whole blocks
 _TINY = 1e-12
-_SURELY_LESS = 0.999999
 _FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant, say, goes on
 _HALVES = math.sqrt(0.5)  # of a norm for each of two axes
 
@@ -54,10 +53,7 @@ def reseed_reference(x, reference):
 @kernel
 def _within_limit(north, east, limit):
     """By what to scale a vector so that it is no longer than a limit."""
-    if north * north + east * east < _SURELY_LESS * limit * limit:
-        # spares the exact length, a slow function
-        return 1.0
-    return min(1.0, limit / max(math.hypot(north, east), _TINY))
+    return min(1.0, limit / max(math.sqrt(north * north + east * east), _TINY))
 
 
 @kernel
@@ -177,7 +173,7 @@ def _turn_towards(vehicle, angle, rate, wanted, rate_max, alpha_max):
 @kernel
 def _level_out(vehicle, x, u):
     """Torques to a level attitude; leaning against the velocity while that is beyond its limit."""
-    speed = math.hypot(x[VX], x[VY])
+    speed = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
     lean = 0.0
     if speed > vehicle.reference_max_mps:
         lean = -0.5 * vehicle.tilt_max_rad / speed

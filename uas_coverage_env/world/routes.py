@@ -220,7 +220,9 @@ def shortest_way(arena, target, x0, y0, z0, x1, y1, z1):
         corner = _next_corner(arena, target, x0, y0)
         if corner >= 0:
             return _round(arena, corner, target, x0, y0)
-    return x1, y1, math.hypot(x1 - x0, y1 - y0)
+    dx = x1 - x0
+    dy = y1 - y0
+    return x1, y1, math.sqrt(dx * dx + dy * dy)
 
 
 @kernel
