@@ -4,6 +4,9 @@ Numba counts a reference for every array that a kernel takes out of a named tupl
 an atomic instruction; in one step of two UAS that is as much work as the flight. The arrays of a
 step outlive it, so nothing has to be counted. The price is that such a kernel cannot make arrays:
 what it needs for a while lies on the stack (`room`). The same source compiles for a GPU.
+
+Whatever is compiled with these decorators is kept on disk by the contents of its sources
+(`kernel_cache.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -17,27 +20,44 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-_compiler: Any = njit  # the types that numba ships leave out the option _nrt
+from uas_coverage_env.kernel_cache import keep_on_disk
 
-kernel = _compiler(cache=True, error_model="numpy", _nrt=False)
+
+def _decorator(**options: Any) -> Any:
+    """A decorator that compiles with some options; called with more options, it makes another."""
+    compiler: Any = njit  # the types that numba ships leave out the option _nrt
+
+    def decorate(function: Any = None, /, **more: Any) -> Any:
+        if function is None:
+            return _decorator(**options, **more)
+        compiled = compiler(**options)(function)
+        if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+            keep_on_disk(compiled)
+        return compiled
+
+    return decorate
+
+
+kernel = _decorator(error_model="numpy", _nrt=False)
 """Compiles a function that makes no arrays and returns none."""
 
-inlined_kernel = _compiler(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+inlined_kernel = _decorator(error_model="numpy", _nrt=False, forceinline=True)
 """A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
 to hand over their hundred machine words takes longer than most of these parts themselves. Numba
 hands this on: a `kernel` that is compiled first because such a part calls it is inlined, too."""
 
-counting_kernel = _compiler(
-    cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"reassoc", "nsz"}
+counting_kernel = _decorator(
+    error_model="numpy", _nrt=False, forceinline=True, fastmath={"reassoc", "nsz"}
 )
 """An `inlined_kernel` that adds floats in any order, several at a time. Only for whole numbers
 below 2⁵³, which have one sum in every order: two compilations of a step must agree to the bit."""
 
-lending_kernel = _compiler(cache=True, error_model="numpy", _nrt=True, forceinline=True)
+lending_kernel = _decorator(error_model="numpy", _nrt=True, forceinline=True)
 """Compiles a function that returns borrowed arrays (`borrow.py`), part of its callers."""
 
-allocating_kernel = _compiler(cache=True, error_model="numpy", _nrt=True)
-"""Compiles a function that makes arrays; also what it calls, unless that is a `kernel`."""
+allocating_kernel = _decorator(error_model="numpy", _nrt=True)
+"""Compiles a function that makes arrays; also what it calls, unless that is a `kernel`. Takes
+numba's other options: `@allocating_kernel(parallel=True)`."""
 
 
 def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
@@ -24,7 +24,7 @@ from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NO_TARGET
 from uas_coverage_env.env.pool import first_look_of, tables_of
 from uas_coverage_env.env.rewards import REWARD_TERMS
-from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.pool import arena_of, begin, state_of
 
@@ -320,7 +320,7 @@ def step_batch(
     return refused
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@allocating_kernel(parallel=True)
 def step_batch_in_threads(
     pool, tables, worlds, lanes, orders, kind, weights, nonlinear, assistants, autoreset,
     before, observation,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
@@ -16,6 +16,7 @@ from uas_coverage_agents.waypoint.team import (
     choose,
     fly_on,
 )
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, WorldState, build_arena
@@ -47,7 +48,7 @@ def pool_legs(scenarios: Sequence[Scenario]) -> LegsPool:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def legs_at(pool, s, n_uas, n_waypoints):
     """The legs of scenario s: views into the arrays of the pool."""
     a = pool.first[s]
@@ -103,7 +104,7 @@ def make_lanes(n_lanes: int, pool: ArenaPool) -> tuple[Lanes, WorldState]:
     ), states
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, assistants):
     s = lanes.scenario[lane]
     arena = arena_of(arenas, s)
@@ -118,7 +119,7 @@ def _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, assistants):
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def begin_lane(
     arenas, all_legs, lanes, states, lane, s, covered, discharged, return_mode, assistants
 ):
@@ -152,7 +153,7 @@ def begin_lane(
     _fly_lane(arenas, all_legs, lanes, states, lane, return_mode, assistants)
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@allocating_kernel(parallel=True)
 def begin_lanes(
     arenas, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants
 ):
@@ -164,7 +165,7 @@ def begin_lanes(
         )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@allocating_kernel(parallel=True)
 def step_lanes(arenas, all_legs, lanes, states, choices, return_mode, assistants):
     """Let the UAS whose turn it is decide, and fly on to the next decision, in every lane.
 

@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import CRUISE_SHARE
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import N_STATES, X, Y, Z
 from uas_coverage_env.world import Arena, route, seconds_home
 
@@ -34,7 +34,7 @@ class Legs(NamedTuple):
     """(2,) `unit_m` and `unit_s`, see `layout`."""
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def leg_s(uas, way_m, rise_m, radius_m):
     """Time [s] to fly a leg: the slower of its horizontal and its vertical part.
 
@@ -52,14 +52,14 @@ def leg_s(uas, way_m, rise_m, radius_m):
     return max(flying_s, missing_m / rate_mps + _LEAD_S)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def home_leg_s(uas, way_m, altitude_m):
     """Time [s] to fly home over way_m, from altitude_m above the start, and land."""
     flying_s = way_m / (CRUISE_SHARE * uas.speed_mps)
     return max(flying_s, altitude_m / uas.descent_mps - _LEAD_S) + LANDING_S
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _unit_m(waypoints):
     """Mean horizontal distance of a waypoint from its nearest neighbour [m]."""
     n = waypoints.shape[0]
@@ -77,7 +77,7 @@ def _unit_m(waypoints):
     return total_m / n
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _fill(arena, between_s, home_s, return_s, unit):
     waypoints = arena.waypoints
     n = waypoints.shape[0]

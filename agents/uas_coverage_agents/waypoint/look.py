@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from uas_coverage_agents.waypoint.layout import (
     CANDIDATE_HIGH,
@@ -17,6 +16,7 @@ from uas_coverage_agents.waypoint.layout import (
 )
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
 from uas_coverage_agents.waypoint.outlook import ABSENT, IN_THE_AIR, outlook
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
 from uas_coverage_env.world import FLYING, HOME, path_length_home_m, route
 
@@ -27,13 +27,13 @@ _CLOCK_RESERVE_S = 18.0
 _TURN_MPS2 = 3.0
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def covers(state, targets, i):
     """Whether a UAS flies and is not on its way home."""
     return state.status[i] == FLYING and not state.returning[i] and targets[i] != HOME
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def claimed_by_mates(state, targets, i, claimed):
     """Mark in `claimed` (W,) the open waypoints to which other UAS fly."""
     claimed[:] = False
@@ -42,7 +42,7 @@ def claimed_by_mates(state, targets, i, claimed):
             claimed[targets[j]] = state.uncovered[targets[j]]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def allowed(state, blocked, claimed, may):
     """Mark in `may` (W,) what may be chosen: what is free and nobody's; else the next best.
 
@@ -66,7 +66,7 @@ def allowed(state, blocked, claimed, may):
     return 0
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def budget_s(arena, state, i):
     """Flying time [s] that battery and clock still allow."""
     uas = arena.uas[i]
@@ -76,7 +76,7 @@ def budget_s(arena, state, i):
     return min(battery_s, clock_s)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _nearest_by_way(arena, state, i, may, candidates, way_m, towards):
     """The K waypoints to which the ways are shortest, and the directions of their first legs.
 
@@ -116,7 +116,7 @@ def _nearest_by_way(arena, state, i, may, candidates, way_m, towards):
         towards[at, 1] = end_y - x[Y]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _turning_s(cruise_mps, vx, vy, towards):
     """Time [s] lost until the velocity points along the first leg."""
     length_m = math.hypot(towards[0], towards[1]) + 1e-9
@@ -125,7 +125,7 @@ def _turning_s(cruise_mps, vx, vy, towards):
     return (dx * dx + dy * dy) / (2.0 * _TURN_MPS2 * cruise_mps)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, place):
     """Where and when each UAS is free, see `outlook`."""
     for j in range(targets.shape[0]):
@@ -156,7 +156,7 @@ def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, 
                 from_s[j, w] = leg_s(uas, way_m, x[Z] - to_m[2], arena.waypoints[w].radius_m)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
     """Write what UAS i sees and may choose; the numbers are those of `layout`.
 
@@ -338,14 +338,14 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
     return n_legal
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _worth(total_s, longest_s, left, k, best):
     """Whether the outlook of choice k is better than that of the best so far."""
     cost_s = total_s[k] + longest_s[k] + 120.0 * left[k]
     return cost_s < total_s[best] + longest_s[best] + 120.0 * left[best]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _company(legs, state, w, row, c):
     """Write what is open around waypoint w: five numbers from column c on."""
     unit_s = legs.unit[1]

@@ -7,7 +7,7 @@ one choice from another the better the fewer waypoints are left.
 
 import math
 
-from numba import njit
+from uas_coverage_env.kernels import allocating_kernel
 
 ABSENT = -2
 """Place of a UAS that covers no more."""
@@ -16,7 +16,7 @@ IN_THE_AIR = -1
 """Place of a UAS that covers, but has no target yet."""
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def outlook(legs, from_s, here_home_s, budget_s, ready_s, place, todo, n_todo):
     """Let every UAS go on greedily until nothing is left.
 

@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.policy.tensors import Tensors
 from uas_coverage_agents.waypoint.layout import N_CANDIDATE, N_TEAM, WAY, K
+from uas_coverage_env.kernels import allocating_kernel
 
 
 class Weights(NamedTuple):
@@ -37,7 +37,7 @@ def weights_of(network: Pointer, tensors: Tensors) -> Weights:
     return Weights._make([*arrays, np.array([network.prior])])
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _layer(x, weight, bias, out):
     """Write relu(x · weight + bias)."""
     out[:] = bias
@@ -48,7 +48,7 @@ def _layer(x, weight, bias, out):
         out[b] = max(out[b], 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def score(weights, observation, scores):
     """Write the score of every choice, see `Pointer`; those that are not there get -inf.
 
@@ -96,7 +96,7 @@ def score(weights, observation, scores):
     scores[K] = total
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def best_choice(weights, observation, legal, scores):
     """The legal choice with the highest score; `scores` (K+1,) is written."""
     score(weights, observation, scores)

@@ -10,7 +10,6 @@ they will do; what they cover now comes last.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE, K
@@ -26,6 +25,7 @@ from uas_coverage_agents.waypoint.team import (
     choose,
     fly_on,
 )
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.world import HOME, WorldState
 
 PRICES_WH = {ENERGY: 1.0, TIME: 0.1, LEFT: 20.0, LOST_UAS: 100.0, NOT_HOME: 100.0}
@@ -68,7 +68,7 @@ class Desk(NamedTuple):
     scores: NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _copy(state):
     return WorldState(
         state.x.copy(), state.reference.copy(), state.status.copy(), state.departed.copy(),
@@ -76,7 +76,7 @@ def _copy(state):
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _draw(scores, legal, not_this, rng):
     """A choice drawn with the probabilities of the policy, another one than `not_this`.
 
@@ -95,7 +95,7 @@ def _draw(scores, legal, not_this, rng):
     return drawn
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def planned(uncovered, plan, at, i, candidates, legal):
     """The choice that a plan has for UAS i, or -1; `at` (U,) moves on, over what is done too."""
     while at[i] < plan.length[i]:
@@ -111,7 +111,7 @@ def planned(uncovered, plan, at, i, candidates, legal):
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def simulate(
     arena, legs, weights, start, start_targets, start_blocked, return_mode, assistants,
     plan, change_at, keep_on, desk, rng, new,
@@ -172,7 +172,7 @@ def simulate(
     return (account * _PRICES_WH).sum(), n
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def improve(
     arena, legs, weights, state, targets, blocked, return_mode, assistants, plan, n_simulations,
     desk, rng, trial, best,

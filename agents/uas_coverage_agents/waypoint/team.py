@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE
 from uas_coverage_agents.waypoint.look import (
@@ -13,6 +12,7 @@ from uas_coverage_agents.waypoint.look import (
     covers,
     look,
 )
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world import (
     FLYING,
@@ -32,7 +32,7 @@ which the filter changed the command; at the end: UAS lost, UAS in the air, wayp
 ACCOUNT_SIZE = LEFT + 1
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def find_blocked(arena, step, blocked):
     """Mark in `blocked` (W,) the waypoints that moving obstacles keep everybody out of now."""
     blocked[:] = False
@@ -54,7 +54,7 @@ def find_blocked(arena, step, blocked):
                 blocked[w] = True
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _needs_target(state, blocked, claimed, may, targets, i):
     """Whether a covering UAS has none, or waits for a moving obstacle while there is other work."""
     w = targets[i]
@@ -67,13 +67,13 @@ def _needs_target(state, blocked, claimed, may, targets, i):
     return (may & ~blocked).any()
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def choose(targets, candidates, i, choice):
     """Note the choice of UAS i."""
     targets[i] = HOME if choice == HOME_CHOICE else candidates[choice]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def next_to_decide(
     arena, legs, state, return_mode, blocked, targets, candidates, legal, observation
 ):
@@ -116,7 +116,7 @@ def next_to_decide(
     return NOBODY
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def write_commands(state, targets, commands):
     """The commands that fly every UAS to its target."""
     for i in range(targets.shape[0]):
@@ -131,13 +131,13 @@ def write_commands(state, targets, commands):
             command.values[0] = targets[i]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def is_over(arena, state):
     """Whether nobody flies any more, or the time is up."""
     return state.step[0] >= arena.rules[0].max_steps or not (state.status == FLYING).any()
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def fly_on(
     arena, legs, state, nonlinear, return_mode, assistants, blocked, targets, commands,
     outcome, candidates, legal, observation, account,

@@ -24,12 +24,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks.battery_reserve import short_s
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.verify import first_trouble, trouble_between
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     compile_vehicle,
     lpv_step,
@@ -142,7 +142,7 @@ def prolonged(problem: PlanningProblem, steps: int) -> tuple[MovingHull, ...]:
     return tuple(result)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def brake(vehicle, start, steps):
     """States after each step (steps, 14) and inputs (steps, 5) of braking from a state."""
     states, inputs = np.empty((steps, start.shape[0])), np.zeros((steps, 5))

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.blocks import time_to_go
 from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Tour
 from uas_coverage_env.geometry import closed_cylinder_faces, signed_distance, sphere_faces
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     VX,
     VY,
@@ -259,7 +259,7 @@ def _stacked_hulls(problem: PlanningProblem, uas: int):
     return normals, offsets, first, last, clearance
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _out_m(faces, x, center):
     """How far out a position is from the centre of a polyhedron, by its farthest face."""
     out = 0.0
@@ -271,7 +271,7 @@ def _out_m(faces, x, center):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _aim_at(center, reach_m, faces, x, following):
     """A point well inside the waypoint's polyhedron on the way to what follows."""
     point = np.empty(3)
@@ -285,7 +285,7 @@ def _aim_at(center, reach_m, faces, x, following):
     return point
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _over_roofs(vehicle, x, down_mps, normals, offsets, first, last, clearance):
     """Climb instead where the way ahead leads into an obstacle."""
     for step in range(1, _ROOF_LOOKAHEAD + 1):
@@ -298,7 +298,7 @@ def _over_roofs(vehicle, x, down_mps, normals, offsets, first, last, clearance):
     return down_mps
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _depth_inside(x, normals, offsets, first, last, clearance):
     """How far the position is inside keep-out zones or outside the fence [m]."""
     depth = 0.0
@@ -310,7 +310,7 @@ def _depth_inside(x, normals, offsets, first, last, clearance):
     return depth + max(d + clearance[fence], 0.0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _fly_all(
     vehicle,
     x0,

@@ -13,11 +13,11 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.braking import BRAKING_S, prolonged
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     compile_vehicle,
     lpv_step,
@@ -110,7 +110,7 @@ def _squared(short_m: FloatArray) -> FloatArray:
     return (np.maximum(short_m, 0.0) ** 2).sum(axis=1)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _pushed(vehicle, start, north_mps, east_mps, down_mps, push, steps):
     """States (steps+1, 14) and inputs (steps, 5): a velocity for some steps, then braking."""
     states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))

@@ -12,13 +12,13 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.braking import BRAKING_S, brake, prolonged
 from uas_coverage_baselines.milp_mpc.energy import dod_per_s, seconds_home
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import (
     DOD,
@@ -148,7 +148,7 @@ class WayHome:
         return _homeward(self._arena, row, problem.x0[uas], pursued, steps, command)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _homeward(arena, i, start, pursued, steps, commands):
     states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
     x, reference = start.copy(), np.empty(2)

@@ -9,8 +9,9 @@ is open: much at the fringe of the open set, nothing in its middle.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from uas_coverage_env.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -43,13 +44,13 @@ def seconds_saved(
     return np.maximum(saved_m / speed_mps, 0.0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _squared_m2(places, i, j):
     north, east = places[i, 0] - places[j, 0], places[i, 1] - places[j, 1]
     return north * north + east * east
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _parents(places):
     """The shortest tree, grown from place 0: who joined when, and each one's parent."""
     W = len(places)
@@ -70,7 +71,7 @@ def _parents(places):
     return joined, parent
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _preorder(joined, parent):
     """Places such that every subtree is a slice: (W,) places, (W,) begin and end of each slice."""
     W = len(joined)
@@ -86,7 +87,7 @@ def _preorder(joined, parent):
     return places_in_order, first, first + size
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _saved_m(places, along, rows):
     """(K,) what the places `rows` save; the places are sorted by their coordinate `along`."""
     W = len(places)
@@ -113,7 +114,7 @@ def _saved_m(places, along, rows):
     return saved[rows]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _branch_of(place, children, first, last):
     """Number of the child whose subtree holds the place; one more where none does."""
     for number in range(len(children)):
@@ -122,7 +123,7 @@ def _branch_of(place, children, first, last):
     return len(children)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _reconnected_m(places, along, taken, roots, in_order, first, last):
     """Length of the edges that join the branches of the tree once `taken` is out of it."""
     W, count = len(places), len(roots)
@@ -151,7 +152,7 @@ def _reconnected_m(places, along, taken, roots, in_order, first, last):
     return _tree_m(squared)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _look_aside(places, along, w, side, taken, mine, children, first, last, squared):
     """Shorten what joins branch `mine` to others by edges from one of its places to one side."""
     farthest = squared[mine].max()
@@ -169,7 +170,7 @@ def _look_aside(places, along, w, side, taken, mine, children, first, last, squa
         other += side
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@allocating_kernel(nogil=True)
 def _tree_m(squared):
     """Length of the shortest tree over a few branches."""
     count = len(squared)

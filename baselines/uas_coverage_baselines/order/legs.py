@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
@@ -146,7 +146,7 @@ def _straight_s(
     return np.maximum(level, np.maximum(up, down))
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, octagon):
     """Flight times past the fixed obstacles; `targets` are rows of the arena's routes."""
     result = np.empty(len(targets))

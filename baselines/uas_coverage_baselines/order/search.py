@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.order.task import Task
+from uas_coverage_env.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def _arrays(task: Task):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _turn(table, place, a, b, c):
     """Cost in radii of turning at place b on the way from a to c."""
     ax, ay = place[b, 0] - place[a, 0], place[b, 1] - place[a, 1]
@@ -154,7 +154,7 @@ def _turn(table, place, a, b, c):
     return table[int(0.5 * (cosine + 1.0) * (len(table) - 1) + 0.5)]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _setting_off_s(place, velocity, speed_mps, acceleration_mps2, here, to):
     """What is lost until the velocity points to the first waypoint."""
     dx, dy = place[to, 0] - place[here, 0], place[to, 1] - place[here, 1]
@@ -163,7 +163,7 @@ def _setting_off_s(place, velocity, speed_mps, acceleration_mps2, here, to):
     return (ax * ax + ay * ay) / (2.0 * acceleration_mps2 * speed_mps)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _route_s(task, u, route, length):
     """Flight time of one UAS along a route and home."""
     (first, between, kind, home, idle, place, velocity, speed, acceleration, radius_s) = task[:10]
@@ -186,7 +186,7 @@ def _route_s(task, u, route, length):
     return time + home[u, here]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _cost_s(task, seconds, left_out, n_left_out, total_weight):
     budget, weight = task[11], task[12]
     longest, cost = 0.0, 0.0
@@ -200,14 +200,14 @@ def _cost_s(task, seconds, left_out, n_left_out, total_weight):
     return cost + longest
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _put_in(route, length, at, waypoint):
     for k in range(length, at, -1):
         route[k] = route[k - 1]
     route[at] = waypoint
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _insert_missing(task, routes, lengths, missing, total_weight):
     """Give each missing waypoint, taken out of the last row, to the route it lengthens least.
 
@@ -242,7 +242,7 @@ def _insert_missing(task, routes, lengths, missing, total_weight):
                 break
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window, total_weight, rng):
     """Anneal `routes` in place (its last row: left out); the cost of the best, which is returned.
 

@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.tour.pursuit import HOME_TARGET, fly_step
 from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_distance
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.guidance import target_position
 from uas_coverage_env.world.lookahead import fixed_slack, fly_and_brake, moving_slack
@@ -49,7 +49,7 @@ class Around(NamedTuple):
     path_m: FloatArray
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def look_around(arena, i, x, others_m):
     """What is kept from obstacles and fence: less where there is less already."""
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
@@ -69,7 +69,7 @@ def look_around(arena, i, x, others_m):
     return Around(keep_m, fence_m, others_m, path_m)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _is_clear(arena, around, x0, y0, z0, x1, y1, z1):
     """Whether a segment keeps its distances from obstacles and fence."""
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
@@ -87,7 +87,7 @@ def _is_clear(arena, around, x0, y0, z0, x1, y1, z1):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _has_landed(arena, i, task, x, covered):
     if covered < len(task.route):
         return False
@@ -98,7 +98,7 @@ def _has_landed(arena, i, task, x, covered):
     return near and speed_mps < 0.9 * rules.landing_speed_mps
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _seconds_to(arena, i, task, x, covered):
     """Flight time left after the plan, estimated."""
     uas = arena.uas[i]
@@ -124,7 +124,7 @@ def _seconds_to(arena, i, task, x, covered):
     return seconds
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _surroundings_cost(arena, i, task, plan, n_flown, others_m):
     """Cost of coming near to other UAS and to what moves."""
     cost = 0.0
@@ -148,7 +148,7 @@ def _surroundings_cost(arena, i, task, plan, n_flown, others_m):
     return cost
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def cost_s(arena, i, task, plan, first, around, command, limit_s):
     """Simulate a plan from step `first` on; the flight time to the end, and what it costs more.
 

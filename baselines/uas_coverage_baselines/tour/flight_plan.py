@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, cost_s, look_around
 from uas_coverage_baselines.tour.pursuit import LEGS, aim, begin, pull_clear, push_to_guidance
+from uas_coverage_env.kernels import allocating_kernel
 
 _STRETCH_S = 5.0  # the longest stretch that a change touches
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _change(arena, i, task, plan, rng, spread):
     """Change a plan in place; the step from which on it is another flight."""
     n_steps = plan.commands.shape[0]
@@ -59,7 +58,7 @@ def _change(arena, i, task, plan, rng, spread):
     return first
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _copy(plan, other, first):
     plan.aim_m[:] = other.aim_m
     plan.share[:] = other.share
@@ -73,7 +72,7 @@ def _copy(plan, other, first):
     plan.path_m[first:] = other.path_m[first:]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_changes, rng, command):
     """Plan the coming seconds of a UAS.
 

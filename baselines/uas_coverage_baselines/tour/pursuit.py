@@ -11,10 +11,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import CLIMB, VELOCITY
 from uas_coverage_env.world.control import command_wrench, write_command
@@ -98,7 +98,7 @@ def empty_plan(n_steps: int) -> Plan:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def brake_seconds(arena, i, command):
     """How far braking leads ahead from the highest speed, over that speed [s]."""
     x, reference, u = np.zeros(14), np.zeros(2), np.zeros(5)
@@ -112,7 +112,7 @@ def brake_seconds(arena, i, command):
     return (path_m[:, 0].max() - x[X]) / speed_mps
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def begin(plan, x, reference):
     """Put the flight of a plan at its start."""
     plan.x[0] = x
@@ -122,7 +122,7 @@ def begin(plan, x, reference):
     plan.path_m[0] = x[:3]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _write_step(arena, i, task, plan, k, command):
     """Simulate step k of a plan."""
     x, reference = plan.x[k + 1], plan.reference[k + 1]
@@ -151,7 +151,7 @@ def _write_step(arena, i, task, plan, k, command):
     plan.leg[k + 1] = leg
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _roofs_ahead(arena, i, x, x1, y1):
     """Altitude that low obstacles on a leg ask for, and the speed that leaves time to climb."""
     needed_m, speed_mps = -math.inf, arena.uas[i].speed_mps
@@ -168,7 +168,7 @@ def _roofs_ahead(arena, i, x, x1, y1):
     return needed_m, speed_mps
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _pursue(arena, i, task, plan, k):
     """Write command k of a plan: towards the aim of its leg, or to rest at home."""
     x, leg, uas, rules = plan.x[k], plan.leg[k], arena.uas[i], arena.rules[0]
@@ -198,7 +198,7 @@ def _pursue(arena, i, task, plan, k):
     _write_pushed(arena, i, plan, k, share * dx, share * dy, altitude_m)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def _write_pushed(arena, i, plan, k, north_mps, east_mps, altitude_m):
     """Write command k of a plan: the one given and the push, within the limits."""
     rules, push = arena.rules[0], plan.push[k]
@@ -211,7 +211,7 @@ def _write_pushed(arena, i, plan, k, north_mps, east_mps, altitude_m):
     plan.commands[k, 2] = min(pushed_m, max(rules.ceiling_m, altitude_m))
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def fly_step(arena, i, task, plan, k, command):
     """Pursue for step k of a plan: its command, and the state that it leads to."""
     _pursue(arena, i, task, plan, k)
@@ -220,7 +220,7 @@ def fly_step(arena, i, task, plan, k, command):
     _write_step(arena, i, task, plan, k, command)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def push_to_guidance(arena, i, task, plan, command):
     """Choose the pushes so that the world's own guidance is flown."""
     plan.share[:] = 1.0
@@ -239,7 +239,7 @@ def push_to_guidance(arena, i, task, plan, command):
         fly_step(arena, i, task, plan, k, command)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def aim(arena, i, task, plan, leg):
     """Aim a leg anew: at the side of the sphere where the flight turns, and climbs or descends."""
     waypoint = arena.waypoints[task.route[leg]]
@@ -263,7 +263,7 @@ def aim(arena, i, task, plan, leg):
     pull_clear(arena, i, task, plan, leg)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_kernel
 def pull_clear(arena, i, task, plan, leg):
     """Pull an aim towards the centre of its sphere until it is in it and clear of obstacles."""
     normals, offsets_m = arena.normals, arena.offsets_m
