@@ -14,7 +14,7 @@ import os
 import pickle
 import re
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
 
@@ -55,9 +55,11 @@ class _KernelCache(FunctionCache):
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return sig, codegen.magic_tuple(), _function_key(self._py_func)
 
-    def _guard_against_spurious_io_errors(self) -> contextlib.AbstractContextManager[None]:
+    @contextlib.contextmanager
+    def _guard_against_spurious_io_errors(self) -> Iterator[None]:
         # a full disk costs the next process a compilation, not this one its flight
-        return contextlib.suppress(OSError)
+        with contextlib.suppress(OSError):
+            yield
 
 
 def _function_key(function: Any) -> tuple[object, ...]:
@@ -67,11 +69,11 @@ def _function_key(function: Any) -> tuple[object, ...]:
 
 
 def _cell_key(content: Any) -> object:
-    if not isinstance(content, Dispatcher):
+    cache = getattr(content, "_cache", None)
+    if not isinstance(content, Dispatcher) or not isinstance(cache, _KernelCache):
         return hashlib.sha256(dumps(content)).hexdigest()
     function = content.py_func
-    own = getattr(content._cache, "digest", None) or dumps(content)
-    return function.__qualname__, own, _function_key(function)
+    return function.__qualname__, cache.digest, _function_key(function)
 
 
 class _Files:
