@@ -19,7 +19,7 @@ from functools import cache
 from typing import Any
 
 import numba
-from numba.core.caching import FunctionCache, NullCache
+from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
@@ -28,14 +28,18 @@ from uas_coverage_env.source_digest import source_digest
 _NAME = re.compile(r"-\w+\.py\w+\.(?P<stamp>[0-9a-f]{16})\.[0-9a-f]{16}\.nbc$")
 
 
-def keep_on_disk(dispatcher: Any) -> None:
+def keep_on_disk(dispatcher: Any, form: type[CacheImpl] = CompileResultCacheImpl) -> None:
     """Give a dispatcher that has compiled nothing yet a cache keyed by contents.
 
     Where its source cannot be read (typed into a prompt) or no folder can be written to, it is
     compiled anew in each process.
+
+    Args:
+        dispatcher: What numba makes of a function.
+        form: How compiled versions are written and read; forms have files of their own.
     """
     try:
-        dispatcher._cache = _KernelCache(dispatcher.py_func)
+        dispatcher._cache = _KernelCache(dispatcher.py_func, form)
     except (OSError, RuntimeError):
         dispatcher._cache = NullCache()
 
@@ -47,13 +51,14 @@ class _KernelCache(FunctionCache):
     are pickled, which differs in each process.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], form: type[CacheImpl]) -> None:
         self.digest = source_digest(function.__code__.co_filename)
+        self._impl_class = form
         super().__init__(function)
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, self.digest)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return sig, codegen.magic_tuple(), _function_key(self._py_func)
+        return sig, codegen.magic_tuple(), self._impl_class.__name__, _function_key(self._py_func)
 
     @contextlib.contextmanager
     def _guard_against_spurious_io_errors(self) -> Iterator[None]:

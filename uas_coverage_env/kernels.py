@@ -14,25 +14,27 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import config, njit, typeof, types
+from numba import config, typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
 from uas_coverage_env.kernel_cache import keep_on_disk
+from uas_coverage_env.kernel_compiler import KernelDispatcher, PartCacheImpl
 
 
 def _decorator(**options: Any) -> Any:
     """A decorator that compiles with some options; called with more options, it makes another."""
-    compiler: Any = njit  # the types that numba ships leave out the option _nrt
 
     def decorate(function: Any = None, /, **more: Any) -> Any:
         if function is None:
             return _decorator(**options, **more)
-        compiled = compiler(**options)(function)
-        if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
-            keep_on_disk(compiled)
+        if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+            return function
+        compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
+        keep_on_disk(compiled)
+        keep_on_disk(compiled.part, PartCacheImpl)
         return compiled
 
     return decorate
