@@ -8,11 +8,12 @@ import pytest
 from toy_problems import S500, box, flight, flown, state, toy
 from uas_coverage_baselines.milp_mpc import decision
 from uas_coverage_baselines.milp_mpc.braking import way_out
-from uas_coverage_baselines.milp_mpc.construction import NEVER, Flight, flights, teams
+from uas_coverage_baselines.milp_mpc.construction import Flight, flights, teams
 from uas_coverage_baselines.milp_mpc.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.problem import Target
+from uas_coverage_baselines.milp_mpc.problem import NEVER, Plan, Target
 from uas_coverage_baselines.milp_mpc.program import NARROW, WIDE, Program
+from uas_coverage_baselines.milp_mpc.reasons import Reason
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 from uas_coverage_baselines.milp_mpc.standby import standby_plans
@@ -106,12 +107,12 @@ def test_one_uas_with_time_gets_its_best_plan():
     assert plan.relative_gap() < 0.01
 
 
-def test_a_decision_that_cannot_be_made_is_none():
+def test_a_decision_that_cannot_be_made_says_that_there_is_no_plan():
     start = state((60.0, 60.0, -10.0), (11.5, 0.0, 0.0))
     wall = box((75.0, 0.0, -49.0), (120.0, 200.0, 0.0))
     problem = toy(start, horizon=6, obstacles=[wall])
-    assert decide(problem, None, 1.0, BY_NODES) is None
-    assert decide(problem, None, 1.0, WITH_TIME) is None
+    assert decide(problem, None, 1.0, BY_NODES) is Reason.NO_PLAN
+    assert decide(problem, None, 1.0, WITH_TIME) is Reason.NO_PLAN
 
 
 def test_a_plan_is_found_by_nodes_even_where_every_flight_to_a_waypoint_is_blocked():
@@ -124,7 +125,7 @@ def test_a_plan_is_found_by_nodes_even_where_every_flight_to_a_waypoint_is_block
         waypoints=[((59.9, 60.0, -6.0), 5.0)],
     )
     assert solve(formulate(problem)[0].build(), SolverLimits()).values is not None
-    assert decide(problem, None, 1.0, BY_NODES) is not None
+    assert isinstance(decide(problem, None, 1.0, BY_NODES), Plan)
 
 
 def test_several_uas_get_plans_by_nodes_where_every_flight_is_blocked():
@@ -143,9 +144,9 @@ def test_several_uas_get_plans_by_nodes_where_every_flight_is_blocked():
     assert first_trouble(problem, plan) is None
 
 
-def test_a_decision_whose_time_is_over_when_it_begins_is_none(problem):
+def test_a_decision_whose_time_is_over_when_it_begins_says_so(problem):
     late = time.perf_counter() - 10.0
-    assert decide(problem, None, 1.0, Effort(time_limit_s=1.0), began=late) is None
+    assert decide(problem, None, 1.0, Effort(time_limit_s=1.0), began=late) is Reason.NO_TIME
 
 
 @pytest.fixture
@@ -187,7 +188,7 @@ def test_where_no_team_holds_who_can_leaves_standby(problem, by_nodes, monkeypat
         )
         search.collect(uas, [alone])
     search.combine([standby_plans(problem, uas, None, 1.0) for uas in range(2)])
-    assert search.plan.x == pytest.approx(by_nodes.x)
+    assert search.outcome.x == pytest.approx(by_nodes.x)
 
 
 @pytest.mark.parametrize("uas", [0, 1])

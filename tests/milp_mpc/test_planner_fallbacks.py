@@ -8,6 +8,7 @@ from practice_missions import fly, mission, planner
 from toy_problems import flown
 from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
 from uas_coverage_baselines.milp_mpc.problem import Plan
+from uas_coverage_baselines.milp_mpc.reasons import Reason
 from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 from uas_coverage_env.scenario import load_scenario
@@ -29,12 +30,12 @@ class RoughDecisions:
     def __call__(self, problem, previous, dt_s, effort, **rest):
         self.calls += 1
         if self.refused(self.calls - 1):
-            return None
+            return Reason.NO_TIME
         for _ in range(12):
             plan = self._wild(problem, dt_s)
             if first_trouble(problem, plan) is None:
                 return plan
-        return None
+        return Reason.NO_PLAN
 
     def _wild(self, problem, dt_s):
         flights = []
@@ -84,6 +85,7 @@ def test_nobody_touches_anything_however_often_there_is_no_plan(monkeypatch, nam
     for call, decision in enumerate(decisions):
         if PATTERNS[pattern](call):
             assert decision.fallback
+            assert decision.reason == Reason.NO_TIME
             assert decision.mip_gap is None
     moved_m = np.linalg.norm(positions[-1] - positions[0], axis=1).max()
     assert moved_m > 10.0, "a flight that stays at home proves nothing"
@@ -137,7 +139,7 @@ def test_a_way_out_that_a_moving_obstacle_has_come_to_cross_is_not_flown(monkeyp
     monkeypatch.setattr(planner_module, "decide", AlwaysNorth())
     for _ in range(3):
         world.step(made.act(world.swarm_state()))
-    monkeypatch.setattr(planner_module, "decide", lambda *args, **rest: None)
+    monkeypatch.setattr(planner_module, "decide", lambda *args, **rest: Reason.NO_PLAN)
     ahead_m = world.state.x[0, :3] + np.array([25.0, 0.0, 0.0])
     seen = dataclasses.replace(
         world.swarm_state(),
@@ -181,7 +183,7 @@ def test_a_planner_without_time_still_commands_everybody(limit_s):
 def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):
     scenario = load_scenario("village")
     positions, decisions, outcomes = flown_with(
-        monkeypatch, scenario, lambda *args, **rest: None, 25
+        monkeypatch, scenario, lambda *args, **rest: Reason.NO_PLAN, 25
     )
     homes = np.array([uas.start_m for uas in scenario.uas])
     assert np.abs(positions - homes).max() < 0.1
@@ -190,7 +192,7 @@ def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):
 
 
 def test_a_hover_command_names_the_altitude_and_no_speed(monkeypatch):
-    monkeypatch.setattr(planner_module, "decide", lambda *args, **rest: None)
+    monkeypatch.setattr(planner_module, "decide", lambda *args, **rest: Reason.NO_PLAN)
     scenario = load_scenario("open_field")
     commands = planner(scenario).act(World(scenario).swarm_state())
     assert set(commands.values()) == {Velocity(0.0, 0.0, 1.0, mode="covering")}
@@ -202,6 +204,7 @@ def test_a_plan_without_a_way_out_is_not_flown(monkeypatch):
     made = planner(scenario)
     commands = made.act(World(scenario).swarm_state())
     assert made.last_decision.fallback
+    assert made.last_decision.reason == Reason.NO_BACKUP
     assert all(isinstance(command, Velocity) for command in commands.values())
 
 
@@ -218,7 +221,7 @@ def test_decisions_that_fail_in_between_do_not_end_a_mission(monkeypatch, garden
 
     def decide(*args, **rest):
         if PATTERNS["now_and_then"](next(calls)):
-            return None
+            return Reason.NO_TIME
         return decide_in_earnest(*args, **rest)
 
     _, decisions, outcomes = flown_with(monkeypatch, garden, decide, 60)
@@ -257,9 +260,9 @@ def test_a_decision_is_told_what_is_left_of_the_way_out_and_when_its_time_began(
 ):
     told = []
 
-    def decide(problem, *rest, out, began, turns):
+    def decide(problem, *rest, out, began, **others):
         told.append((problem, out, began))
-        return decide_in_earnest(problem, *rest, out=out, began=began, turns=turns)
+        return decide_in_earnest(problem, *rest, out=out, began=began, **others)
 
     monkeypatch.setattr(planner_module, "decide", decide)
     world, made = World(garden), planner(garden)

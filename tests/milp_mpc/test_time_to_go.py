@@ -7,8 +7,7 @@ import pytest
 from golden_lp import compare, readable
 from toy_problems import FIELD, S500, TO_OPTIMALITY, state, toy, written
 from uas_coverage_baselines.milp_mpc.blocks import TimeToGo
-from uas_coverage_baselines.milp_mpc.blocks.time_to_go import time_to_go
-from uas_coverage_baselines.milp_mpc.problem import Tour
+from uas_coverage_baselines.milp_mpc.problem import Tour, Trajectories
 from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -38,6 +37,12 @@ def path(seed):
     return np.vstack([np.zeros(3), steps.cumsum(axis=0)]) + NORTHBOUND[:3]
 
 
+def time_to_go(problem, positions, visits):
+    """The block's cost of a flight, in closed form."""
+    flights = Trajectories(positions[None], np.array([visits]))
+    return TimeToGo().cost_along(problem, 0, flights)[0]
+
+
 def cost_in_program(problem, positions, visits):
     """The smallest cost with the flight and its visits given; None where they are not allowed."""
     milp, v = written(problem, TimeToGo())
@@ -61,10 +66,10 @@ def cost_in_program(problem, positions, visits):
 @pytest.mark.parametrize("visits", [(N, N, N), (0, N, N), (1, 2, N), (0, 1, 3)])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_program_and_the_arithmetic_give_a_flight_the_same_cost(seed, visits):
-    problem, tour = with_tour(prune=False)
+    problem, _ = with_tour(prune=False)
     positions = path(seed)
-    counted = time_to_go(problem, 0, tour, positions[None], np.array([visits]))
-    assert cost_in_program(problem, positions, visits) == pytest.approx(counted[0], abs=1e-6)
+    counted = time_to_go(problem, positions, visits)
+    assert cost_in_program(problem, positions, visits) == pytest.approx(counted, abs=1e-6)
 
 
 @pytest.mark.parametrize("visited", range(4))
@@ -72,7 +77,7 @@ def test_only_the_next_aim_counts(visited):
     problem, tour = with_tour(lead_s=0.0)
     positions = path(5)
     visits = np.where(np.arange(3) < visited, np.arange(3), N)
-    cost = time_to_go(problem, 0, tour, positions[None], visits[None])[0]
+    cost = time_to_go(problem, positions, visits)
     away = tour.aims_m[visited] - positions[-1]
     turns = np.arange(8) * np.pi / 4
     limits = S500.limits
@@ -84,11 +89,10 @@ def test_only_the_next_aim_counts(visited):
 
 
 def test_a_visit_out_of_order_counts_for_nothing():
-    problem, tour = with_tour(prune=False)
+    problem, _ = with_tour(prune=False)
     positions = path(0)
     none, second, both = (
-        time_to_go(problem, 0, tour, positions[None], np.array([visits]))[0]
-        for visits in ((N, N, N), (N, 1, N), (0, 1, N))
+        time_to_go(problem, positions, visits) for visits in ((N, N, N), (N, 1, N), (0, 1, N))
     )
     assert second == none
     assert both != none

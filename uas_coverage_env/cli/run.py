@@ -19,6 +19,7 @@ from uas_coverage_env.flight import (
     check_directory,
     draw_flight,
     energy_Wh,
+    fallback_reasons,
     filtered_share,
     load_planner,
     rollout,
@@ -155,7 +156,9 @@ def _report(screen: Console, flight: Flight, directory: Path) -> None:
         times = ", ".join(
             f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
         )
-        screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks", markup=False)
+        counts = fallback_reasons(flight).items()
+        why = f" ({', '.join(f'{n} {reason}' for reason, n in counts)})" if counts else ""
+        screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks{why}", markup=False)
     if flight.safety_filter:
         share = filtered_share(flight)
         screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)

@@ -168,4 +168,5 @@ def _decision_record(duration_s: float, decision: Decision | None, filtered: int
     if gap is not None:
         # an infinite gap says that there is no bound
         gap = float(gap) if math.isfinite(gap) else None
-    return DecisionRecord(duration_s, decision.fallback, gap, filtered)
+    reason = None if decision.reason is None else str(decision.reason)
+    return DecisionRecord(duration_s, decision.fallback, gap, filtered, reason)

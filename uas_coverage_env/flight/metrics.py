@@ -1,5 +1,6 @@
 """Measures of one flight, each a pure function of its record, and the summary made of them."""
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,14 @@ def filtered_share(flight: Flight) -> float:
     """Share of the commands that the safety filter replaced, 0..1; 0 where there was none."""
     commands = int(flight.last_sample.sum())
     return sum(decision.filtered for decision in flight.decisions) / max(commands, 1)
+
+
+def fallback_reasons(flight: Flight) -> dict[str, int]:
+    """Why there were fallbacks, and how many: the most frequent reason first."""
+    reasons = Counter(
+        decision.reason or "no reason given" for decision in flight.decisions if decision.fallback
+    )
+    return dict(reasons.most_common())
 
 
 def summary(flight: Flight) -> dict[str, Any]:

@@ -29,11 +29,13 @@ class Decision:
         predicted_m: Name of a UAS -> (N+1, 3) [m] positions, n = 0 is now.
         fallback: Whether the decision was flown on a fallback.
         mip_gap: Relative to what the plan can influence; None where there is none.
+        reason: Why there was a fallback, in a few words; None where the planner does not say.
     """
 
     predicted_m: Mapping[str, NDArray[np.float64]]
     fallback: bool = False
     mip_gap: float | None = None
+    reason: str | None = None
 
 
 class Planner(Protocol):

@@ -67,6 +67,7 @@ class _Decision(StrictModel):
     fallback: bool = False
     mip_gap: float | None = None
     filtered: Count = 0
+    reason: str | None = None
 
 
 class _Run(StrictModel):

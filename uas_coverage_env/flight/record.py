@@ -34,13 +34,15 @@ class Violation:
 class DecisionRecord:
     """One decision of the planner: how long it took, how it came about, what was left of it.
 
-    `filtered` counts the UAS whose command the safety filter replaced.
+    `filtered` counts the UAS whose command the safety filter replaced; `reason` says why there was
+    a fallback, where the planner says it.
     """
 
     duration_s: float
     fallback: bool = False
     mip_gap: float | None = None
     filtered: int = 0
+    reason: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

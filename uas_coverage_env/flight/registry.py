@@ -152,6 +152,8 @@ def _values(annotation: Any) -> str:
         return "true|false"
     if get_origin(annotation) is Literal:
         return "|".join(_plain(value) for value in get_args(annotation))
+    if get_origin(annotation) is tuple:
+        return ",".join((_values(get_args(annotation)[0]), "..."))
     if get_origin(annotation) in (Union, UnionType):
         return "|".join(_values(argument) for argument in get_args(annotation))
     if annotation is type(None):
@@ -160,4 +162,6 @@ def _values(annotation: Any) -> str:
 
 
 def _plain(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ",".join(map(_plain, value)) or "none"
     return str(value).lower() if value is None or isinstance(value, bool) else str(value)

@@ -21,14 +21,17 @@ decides what is flown: a rule that then refused the way home would keep it in th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.milp_mpc.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.blocks.battery_reserve import short_s
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.problem import MovingHull, Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.verify import first_trouble, trouble_between
+from uas_coverage_baselines.milp_mpc.verify import trouble_between
 from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     compile_vehicle,
@@ -42,7 +45,9 @@ BRAKING_S = 14.0
 """Braking from any speed has ended after this time."""
 
 
-def way_out(problem: PlanningProblem, plan: Plan, dt_s: float) -> Plan | None:
+def way_out(
+    problem: PlanningProblem, plan: Plan, dt_s: float, blocks: Sequence[Block] = OCP
+) -> Plan | None:
     """Everybody's plan followed as long as possible and then a braking flight; None where all fail.
 
     It is clear of everything, and from its hover everybody's charge suffices to come home: of
@@ -50,7 +55,7 @@ def way_out(problem: PlanningProblem, plan: Plan, dt_s: float) -> Plan | None:
     ways out before it; where so there is none for somebody, all follow theirs equally long.
     """
     steps = plan.u.shape[1] + int(np.ceil(BRAKING_S / dt_s))
-    exits = _Exits(problem, plan, dt_s, steps)
+    exits = _Exits(problem, plan, dt_s, steps, blocks)
     longest = exits.one_after_the_other()
     for followed in [longest, *([n] * problem.n_uas for n in range(plan.u.shape[1], 0, -1))]:
         if followed is not None and (result := exits.together(followed)) is not None:
@@ -61,8 +66,16 @@ def way_out(problem: PlanningProblem, plan: Plan, dt_s: float) -> Plan | None:
 class _Exits:
     """What everybody flies that follows a plan for some steps and brakes then."""
 
-    def __init__(self, problem: PlanningProblem, plan: Plan, dt_s: float, steps: int) -> None:
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        plan: Plan,
+        dt_s: float,
+        steps: int,
+        blocks: Sequence[Block],
+    ) -> None:
         self._problem, self._plan, self._steps = problem, plan, steps
+        self._blocks = blocks
         self._braking_steps = steps - plan.u.shape[1]
         self._longer = replace(problem, moving=prolonged(problem, steps))
         self._records = [compile_vehicle(vehicle, dt_s)[()] for vehicle in problem.vehicles]
@@ -100,7 +113,7 @@ class _Exits:
             covers[uas, :n] = plan.covers[plan.of(name), :n]
         x, u = (np.array([flight[k] for flight in flown]) for k in range(2))
         result = Plan(self._problem.names, x, u, covers, plan.objective, -np.inf)
-        return result if first_trouble(self._longer, result) is None else None
+        return result if trouble(self._longer, result, self._blocks) is None else None
 
     def _flown(self, uas: int, followed: int, steps: int) -> tuple[FloatArray, FloatArray]:
         """States (steps+1, 14) and inputs (steps, 5) of one UAS."""
@@ -113,22 +126,22 @@ class _Exits:
         end = followed + self._braking_steps
         alone = Plan(
             *(self._alone[uas].names, x[None, : end + 1], u[None, :end]),
-            *(np.zeros((1, end, 0), bool), 0.0, -np.inf),
+            *(np.zeros((1, end, self._problem.n_scenario_waypoints), bool), 0.0, -np.inf),
         )
         comes_home = self._comes_home(uas, x[end])
-        return not comes_home or first_trouble(self._alone[uas], alone) is not None
+        return not comes_home or trouble(self._alone[uas], alone, self._blocks) is not None
 
     def _comes_home(self, uas: int, x: FloatArray) -> bool:
         late = short_s(self._problem, uas, x, allowance=False) > 0.0
         return not (late and self._in_time[uas])
 
 
-def still_holds(problem: PlanningProblem, out: Plan) -> bool:
+def still_holds(problem: PlanningProblem, out: Plan, blocks: Sequence[Block] = OCP) -> bool:
     """Whether what is left of a way out is clear of what is seen now, beginning where it is."""
     if any(name not in out.names for name in problem.names):
         return False
     longer = replace(problem, moving=prolonged(problem, out.u.shape[1]))
-    return first_trouble(longer, out) is None
+    return trouble(longer, out, blocks) is None
 
 
 def prolonged(problem: PlanningProblem, steps: int) -> tuple[MovingHull, ...]:

@@ -8,14 +8,15 @@ waypoints can be had when; around the best of these flights a restricted MILP is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.blocks import time_to_go
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Tour
-from uas_coverage_env.geometry import closed_cylinder_faces, signed_distance, sphere_faces
+from uas_coverage_baselines.milp_mpc.appraisal import Appraisal, gains
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.problem import NEVER, PlanningProblem, Tour, Trajectories
+from uas_coverage_env.geometry import signed_distance, sphere_faces
 from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     VX,
@@ -30,7 +31,6 @@ from uas_coverage_env.vehicle import (
 )
 
 FloatArray = NDArray[np.float64]
-NEVER = 10_000
 _DEPTH = 4
 _TOUR_DEPTH = 6
 _BRANCHES = (10, 5, 4, 3)
@@ -46,13 +46,14 @@ class Flight:
     Attributes:
         positions_m: (N+1, 3).
         visit: (W,) first step at which each waypoint of the problem is covered, `NEVER` if not.
-        target_cost: what its target distance would cost.
-        too_close_m: how deep it enters keep-out zones, summed over samples; 0 where clear.
+        cost: its part of the objective besides coverage, as far as it is known.
+        too_close_m: how deep it enters keep-out zones, summed over samples; 0 where clear. Rows
+            of other blocks that it breaks are counted likewise.
     """
 
     positions_m: FloatArray
     visit: NDArray[np.int64]
-    target_cost: float
+    cost: float
     too_close_m: float
 
     @property
@@ -61,7 +62,13 @@ class Flight:
         return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
 
 
-def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> list[Flight]:
+def flights(
+    problem: PlanningProblem,
+    uas: int,
+    dt_s: float,
+    keep: int = 40,
+    blocks: Sequence[Block] = OCP,
+) -> list[Flight]:
     """The most promising flights of one UAS, best first, no two covering the same waypoints.
 
     Args:
@@ -69,7 +76,9 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
         uas: row of the UAS.
         dt_s: sampling time.
         keep: how many at most.
+        blocks: of the OCP.
     """
+    appraisal = Appraisal(problem, blocks)
     sequences = _sequences(problem, uas)
     vehicle = compile_vehicle(problem.vehicles[uas], dt_s)[()]
     normals, offsets, first, last, clearance = _stacked_hulls(problem, uas)
@@ -96,15 +105,34 @@ def flights(problem: PlanningProblem, uas: int, dt_s: float, keep: int = 40) -> 
             problem.horizon,
         )
         visits[:, ~problem.assigned[uas]] = NEVER
-        costs = target_cost(problem, uas, positions, visits)
-        values = _rewards(problem, visits).sum(axis=1) - costs - depth
+        costs = appraisal.costs(uas, Trajectories(positions, visits))
+        values = gains(problem, visits).sum(axis=1) - costs - depth
         for row in np.argsort(-values, kind="stable")[: 4 * keep]:
             key = (visits[row] < NEVER).tobytes()
             if key not in best or best[key][0] < values[row]:
                 flight = Flight(positions[row], visits[row], float(costs[row]), float(depth[row]))
                 best[key] = (float(values[row]), flight)
     ranked = sorted(best.values(), key=lambda pair: -pair[0])
-    return [flight for _, flight in ranked[:keep]]
+    return _priced(appraisal, uas, [flight for _, flight in ranked[:keep]], problem)
+
+
+def _priced(
+    appraisal: Appraisal, uas: int, found: Sequence[Flight], problem: PlanningProblem
+) -> list[Flight]:
+    """Flights with what blocks say of them that are priced by their rows, best first."""
+    prices = appraisal.prices_of_paths(uas, [(one.positions_m, one.visit) for one in found])
+    priced = [
+        replace(one, cost=one.cost + price.cost, too_close_m=one.too_close_m + price.excess)
+        for one, price in zip(found, prices, strict=True)
+    ]
+    # a stable sort: nothing moves where nothing is added
+    value = [price.cost + price.excess for price in prices]
+    if not any(value):
+        return priced
+    return sorted(
+        priced,
+        key=lambda one: one.cost + one.too_close_m - float(gains(problem, one.visit).sum()),
+    )
 
 
 def teams(
@@ -116,10 +144,9 @@ def teams(
     are charged, and each metre a little: who gains nothing more flies no detour to a waypoint that
     another one takes. Coordinate ascent from each UAS's leading flights.
     """
-    rewards = [np.array([_rewards(problem, f.visit[None])[0] for f in pool]) for pool in pools]
+    rewards = [np.array([gains(problem, f.visit[None])[0] for f in pool]) for pool in pools]
     costs = [
-        np.array([f.target_cost + f.too_close_m + _PER_METRE * f.length_m for f in pool])
-        for pool in pools
+        np.array([f.cost + f.too_close_m + _PER_METRE * f.length_m for f in pool]) for pool in pools
     ]
     clashes = _clashes(problem, pools)
     undecided = [uas for uas, pool in enumerate(pools) if len(pool) > 1]
@@ -152,29 +179,6 @@ def teams(
             found[tuple(chosen)] = float(together)
     ranked = sorted(found, key=lambda key: -found[key])
     return [tuple(pools[j][row] for j, row in enumerate(key)) for key in ranked[:keep]]
-
-
-def _rewards(problem: PlanningProblem, visits: NDArray[np.int64]) -> FloatArray:
-    """(S, W) what covering at those steps takes off part III of the objective."""
-    return problem.waypoint_weight * np.maximum(problem.horizon - visits, 0)
-
-
-def target_cost(
-    problem: PlanningProblem, uas: int, positions: FloatArray, visits: NDArray[np.int64]
-) -> FloatArray:
-    """(S,) part II of the objective, or the time to go, along S flights of one UAS."""
-    tour = problem.tours[uas] if problem.tours else None
-    if tour is not None:
-        return time_to_go(problem, uas, tour, positions, visits)
-    target = problem.targets[uas]
-    if target is None:
-        return np.zeros(len(positions))
-    faces = closed_cylinder_faces(problem.physical_sides)
-    distance = ((positions[:, 1:] - target.position_m) @ faces.T).max(axis=2)
-    if target.waypoint is not None:
-        steps = np.arange(1, problem.horizon + 1)
-        distance = np.where(steps > visits[:, [target.waypoint]], 0.0, distance)
-    return target.weight * np.maximum(distance, 0.0).sum(axis=1)
 
 
 def _clashes(

@@ -18,13 +18,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.milp_mpc.appraisal import Appraisal, visits
 from uas_coverage_baselines.milp_mpc.construction import Flight, flights, teams
-from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.program import ALONG, NARROW, NEVER, WIDE, Nearness, Program
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.problem import NEVER, Plan, PlanningProblem
+from uas_coverage_baselines.milp_mpc.program import ALONG, NARROW, WIDE, Nearness, Program
+from uas_coverage_baselines.milp_mpc.reasons import Reason
 from uas_coverage_baselines.milp_mpc.solvers import (
     Solution,
     SolverError,
     SolverLimits,
+    SolveStatus,
     Start,
     solver_named,
 )
@@ -32,10 +36,9 @@ from uas_coverage_baselines.milp_mpc.standby import (
     as_flight,
     left_over_flights,
     standby_plans,
-    visits,
 )
 from uas_coverage_baselines.milp_mpc.turns import Turns
-from uas_coverage_baselines.milp_mpc.verify import first_trouble, trouble_between
+from uas_coverage_baselines.milp_mpc.verify import trouble_between
 
 FloatArray = NDArray[np.float64]
 
@@ -84,8 +87,9 @@ def decide(
     out: Plan | None = None,
     began: float | None = None,
     turns: Turns | None = None,
-) -> Plan | None:
-    """The best plan found, verified by our own arithmetic; None where nobody has a new one.
+    blocks: Sequence[Block] = OCP,
+) -> Plan | Reason:
+    """The best plan found, verified by our own arithmetic; or why no UAS has a new one.
 
     Args:
         problem: the decision to make.
@@ -94,27 +98,29 @@ def decide(
         effort: how much work it may take.
         out: what is left of the last way out, beginning now.
         began: `time.perf_counter()` at which the decision's time began to count; now where None.
-        turns: who was planned for when; where None nobody has been.
+        turns: which UAS was planned for when; where None none has been.
+        blocks: of the OCP.
     """
-    search = _Search(problem, effort, time.perf_counter() if began is None else began)
+    search = _Search(problem, effort, time.perf_counter() if began is None else began, blocks)
     everyone = range(problem.n_uas)
-    left = [standby_plans(problem, uas, out, dt_s) for uas in everyone]
+    left = [standby_plans(problem, uas, out, dt_s, blocks) for uas in everyone]
     standby = [search.safe(uas, plans) for uas, plans in enumerate(left)]
     goes_on = [len(left[u]) > 1 and any(p is left[u][0] for p in standby[u]) for u in everyone]
     turns = Turns() if turns is None else turns
     turn = search.turn(turns, [uas for uas in everyone if not goes_on[uas]])
     with ThreadPoolExecutor(effort.threads) as side_by_side:  # kernels and solver free the GIL
-        constructing = {uas: side_by_side.submit(flights, problem, uas, dt_s) for uas in turn}
+        constructing = {
+            uas: side_by_side.submit(flights, problem, uas, dt_s, blocks=blocks) for uas in turn
+        }
         turns.writing_s = search.formulate(turn) / len(turn)
         pools = [
             constructing[uas].result() if uas in turn else [as_flight(problem, uas, left[uas][0])]
             for uas in everyone
         ]
-        tasks = [
-            task
-            for task in _unique_tasks(problem, previous, teams(problem, pools, effort.teams), dt_s)
-            if task[0] in turn
-        ]
+        candidates: list[Sequence[Flight]] = list(teams(problem, pools, effort.teams))
+        if previous is not None:
+            candidates.insert(0, left_over_flights(problem, previous, dt_s, blocks))
+        tasks = [task for task in _unique_tasks(candidates) if task[0] in turn]
         if problem.tours:
             per_uas_s = search.time_left_s() * effort.threads / len(turn)
             polished = side_by_side.map(lambda uas: search.polished(uas, tasks, per_uas_s), turn)
@@ -135,7 +141,7 @@ def decide(
             search.collect(uas, [plan])
     search.combine(standby)
     search.improve()
-    return search.plan
+    return search.outcome
 
 
 _RESORTS = 2  # flights of a UAS without a plan that are refined again, more widely
@@ -149,15 +155,8 @@ def _last_resorts(
     return own + [(uas, as_flight(problem, uas, plan)) for plan in standby[-1:]]
 
 
-def _unique_tasks(
-    problem: PlanningProblem,
-    previous: Plan | None,
-    constructed: Sequence[Sequence[Flight]],
-    dt_s: float,
-) -> list[tuple[int, Flight]]:
+def _unique_tasks(candidates: Sequence[Sequence[Flight]]) -> list[tuple[int, Flight]]:
     """(UAS, flight) pairs to refine, the most promising first, none twice."""
-    candidates = [] if previous is None else [left_over_flights(problem, previous, dt_s)]
-    candidates += [list(team) for team in constructed]
     tasks, seen = [], set()
     for team in candidates:
         for uas, flight in enumerate(team):
@@ -171,10 +170,19 @@ def _unique_tasks(
 class _Search:
     """The programs of one decision, the best verified plan so far and the time left."""
 
-    def __init__(self, problem: PlanningProblem, effort: Effort, began: float) -> None:
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        effort: Effort,
+        began: float,
+        blocks: Sequence[Block] = OCP,
+    ) -> None:
         self.problem, self.effort, self._began = problem, effort, began
-        self._solve = solver_named(effort.solver)
+        self._blocks, self._solve = blocks, solver_named(effort.solver)
         self._alone = [problem.only(uas) for uas in range(problem.n_uas)]
+        self._appraisals = [Appraisal(alone, blocks) for alone in self._alone]
+        self._together = Appraisal(problem, blocks)
+        self._late = False  # whether a program had no solution when its time was up
         self._own: dict[int, Program] = {}
         self._formulating_s = 0.0
         self._plans: list[list[Plan]] = [[] for _ in range(problem.n_uas)]
@@ -184,13 +192,13 @@ class _Search:
     def formulate(self, turn: Sequence[int]) -> float:
         """Write the own programs of those whose turn it is; how long it took [s]."""
         before = time.perf_counter()
-        self._own = {uas: Program(self._alone[uas]) for uas in turn}
+        self._own = {uas: Program(self._alone[uas], self._blocks) for uas in turn}
         self._formulating_s = time.perf_counter() - before
         return self._formulating_s
 
     def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
         """Those of a UAS's plans that are clear of everything but the other UAS."""
-        return [plan for plan in plans if first_trouble(self._alone[uas], plan) is None]
+        return [plan for plan in plans if self._appraisals[uas].trouble(plan) is None]
 
     def turn(self, turns: Turns, urgent: Collection[int]) -> list[int]:
         """Who is planned for: everybody where the time suffices."""
@@ -205,17 +213,22 @@ class _Search:
         return bool(self._plans[uas])
 
     @property
-    def plan(self) -> Plan | None:
-        """The best verified plan, with the bound proven; None where nobody has a new one."""
-        if self._best is None or not self._best.renewed:
-            return None
-        return replace(self._best, bound=min(self._bound, self._best.objective))
+    def outcome(self) -> Plan | Reason:
+        """The best verified plan, with the bound proven; or why no UAS has a new one."""
+        if self._best is not None and self._best.renewed:
+            return replace(self._best, bound=min(self._bound, self._best.objective))
+        if self._best is not None:
+            return Reason.WAITING_IS_CHEAPER
+        if any(self._plans):
+            return Reason.NO_TEAM
+        return Reason.NO_TIME if self._late else Reason.NO_PLAN
 
     def refined(
         self, uas: int, flight: Flight, nearness: Nearness, at_most_s: float = np.inf
     ) -> Plan | None:
         """Solve a UAS's own OCP restricted to what lies near a flight."""
         if not self._has_time(_WORTH_STARTING_S):
+            self._late = True
             return None
         program = self._own[uas]
         path, visit = flight.positions_m[None], flight.visit[None]
@@ -232,7 +245,11 @@ class _Search:
         if self.effort.deterministic:
             limits = replace(limits, time_s=None, nodes=_RESTRICTED_NODES)
         solution = self._solved(program, limits, start, bounds)
-        return None if solution is None or solution.values is None else program.plan(solution)
+        if solution is None or solution.values is None:
+            unsolved = solution is not None and solution.status is SolveStatus.NO_SOLUTION
+            self._late |= unsolved and limits.time_s is not None
+            return None
+        return program.plan(solution)
 
     def polished(
         self, uas: int, tasks: Sequence[tuple[int, Flight]], at_most_s: float
@@ -247,13 +264,14 @@ class _Search:
         # two flights the one that gets farther is first, since time may be up before the other's
         own = sorted(
             [flight for other, flight in tasks if other == uas][:_STARTS],
-            key=lambda flight: flight.target_cost + flight.too_close_m,
+            key=lambda flight: flight.cost + flight.too_close_m,
         )
         plans: list[Plan] = []
         for _ in range(_STARTS + _POLISHES):
             left_s = until - time.perf_counter()
             enough_s = _WORTHWHILE_S if plans else _WORTH_STARTING_S
             if not self.effort.deterministic and left_s < enough_s:
+                self._late |= not plans
                 break
             flight = own.pop(0) if own else as_flight(self._alone[uas], 0, plans[0])
             plan = self.refined(uas, flight, ALONG, left_s)
@@ -269,7 +287,7 @@ class _Search:
     def collect(self, uas: int, plans: Sequence[Plan | None]) -> None:
         """Keep the plans found for a UAS."""
         for plan in plans:
-            if plan is not None and first_trouble(self._alone[uas], plan) is None:
+            if plan is not None and self._appraisals[uas].trouble(plan) is None:
                 self._plans[uas].append(plan)
 
     def combine(self, standby: Sequence[Sequence[Plan]]) -> None:
@@ -323,7 +341,13 @@ class _Search:
             for name, plan, own in zip(self.problem.names, plans, self._plans, strict=True)
             if any(plan is one for one in own)
         )
-        return replace(_joined(self.problem, plans), renewed=renewed)
+        joined = _joined(self.problem, plans)
+        # what blocks cost that look at several UAS at once, or at what is covered by any
+        coupling = self._together.price_of(joined).cost - sum(
+            appraisal.price_of(plan).cost
+            for appraisal, plan in zip(self._appraisals, plans, strict=True)
+        )
+        return replace(joined, objective=joined.objective + coupling, renewed=renewed)
 
     def improve(self) -> None:
         """The whole OCP from the best plan so far, with the time that is left.
@@ -337,7 +361,7 @@ class _Search:
         # the whole program takes about as long to write as everybody's own together
         if not self._has_time(_WORTHWHILE_S + (0.0 if alone else 1.5 * self._formulating_s)):
             return
-        program = self._own[0] if alone else Program(self.problem)
+        program = self._own[0] if alone else Program(self.problem, self._blocks)
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
@@ -368,7 +392,7 @@ class _Search:
         """Keep a plan that is better than the best and whose geometry holds."""
         if self._best is not None and plan.objective >= self._best.objective - 1e-6:
             return
-        if first_trouble(self.problem, plan) is None:
+        if self._together.trouble(plan) is None:
             self._best = plan
 
     def _has_time(self, seconds: float) -> bool:

@@ -7,14 +7,17 @@ the time still to go along one's own order, and as the few waypoints that get bi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
 
-from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon, MovingHorizonOptions
+from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Target, Weights
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Target
 from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import Mode, SwarmState, World
@@ -32,23 +35,26 @@ class Options(MovingHorizonOptions):
         le=1.0,
         description="worth of covering a waypoint a step earlier, in seconds of flight",
     )
+    # in seconds, as the terminal cost is
+    weight_lift: float = weight(0.02, "of the lift")
+    weight_torque: float = weight(0.01, "of the torques")
+    weight_rate: float = weight(0.01, "of the angular rates")
+    weight_climb: float = weight(0.03, "of the climb rate")
 
 
 class MilpMpcGuided(MovingHorizon[Options]):
-    """MILP-MPC with a global order as terminal cost."""
+    """MILP-MPC with a global order as terminal cost.
+
+    Args:
+        options: see `uas-coverage planners`.
+        blocks: of the OCP; those that the option `blocks` names come after them.
+    """
 
     Options = Options
 
-    def __init__(self, options: Options | None = None) -> None:
-        super().__init__(options or Options())
-        # in seconds, as the terminal cost is
-        self._weights = Weights(
-            lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03
-        )
-
-    def rehearsal(self) -> MilpMpcGuided:
-        """The same planner with time enough to compile everything."""
-        return MilpMpcGuided(self.options.model_copy(update={"time_limit_s": 10.0}))
+    def __init__(self, options: Options | None = None, blocks: Sequence[Block] = OCP) -> None:
+        super().__init__(options or Options(), blocks)
+        self._weights = self.options.weights
 
     def reset(self, scenario: Scenario, seed: int) -> None:
         """Start a mission: the first order is searched here, before take-off.

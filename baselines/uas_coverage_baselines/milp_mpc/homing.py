@@ -8,16 +8,17 @@ out. So at every later decision there is either more of the way home or the rest
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.milp_mpc.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.braking import BRAKING_S, brake, prolonged
 from uas_coverage_baselines.milp_mpc.energy import dod_per_s, seconds_home
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
 from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import (
@@ -44,9 +45,11 @@ class WayHome:
     Args:
         scenario: the mission; what its moving obstacles are going to do is not looked at.
         margin_m: kept in addition to every safe distance.
+        blocks: of the OCP; what of their rows the guidance breaks is not flown.
     """
 
-    def __init__(self, scenario: Scenario, margin_m: float) -> None:
+    def __init__(self, scenario: Scenario, margin_m: float, blocks: Sequence[Block] = OCP) -> None:
+        self._blocks = blocks
         wider = [
             obstacle.model_copy(update={"safe_distance_m": obstacle.safe_distance_m + margin_m})
             for obstacle in scenario.obstacles
@@ -91,7 +94,7 @@ class WayHome:
             for pursued_s in _PURSUED_S:
                 trial = self._replaced(problem, out, uas, pursued_s)
                 moving = prolonged(problem, trial.u.shape[1])
-                if first_trouble(replace(problem, moving=moving), trial) is None:
+                if trouble(replace(problem, moving=moving), trial, self._blocks) is None:
                     out = trial
                     turning.append(problem.names[uas])
                     break

@@ -77,6 +77,14 @@ class BuiltMilp:
         return max(worst)
 
 
+class MissingColumnsError(ValueError):
+    """A block looks for columns of another one that is not there."""
+
+
+class EliminatedColumnError(ValueError):
+    """Rows or costs use a column that a reduced formulation expresses through others."""
+
+
 class Milp:
     """Accumulates named groups of columns and rows; `build` turns them into one sparse program."""
 
@@ -147,14 +155,18 @@ class Milp:
         """Let columns take whole numbers only, though they were added as continuous."""
         self._whole.append(columns[columns >= 0])
 
+    def __contains__(self, name: str) -> bool:
+        """Whether a group of columns of this name has been added."""
+        return name in self._columns
+
     def columns(self, name: str) -> Columns:
         """Index array of a group added before; blocks find each other's columns by name.
 
         Raises:
-            ValueError: Nobody has added it: the block that does is missing or comes later.
+            MissingColumnsError: the block that adds it is not in the program or comes later.
         """
         if name not in self._columns:
-            raise ValueError(
+            raise MissingColumnsError(
                 f"columns {name!r} are not there (yet); the block that adds them goes first"
             )
         return self._columns[name]
@@ -180,7 +192,7 @@ class Milp:
             where: mask in the shape of the family; rows are made only where it is True.
 
         Raises:
-            ValueError: if a term uses an eliminated column.
+            EliminatedColumnError: if a term uses one.
         """
         shapes = [np.broadcast_shapes(np.shape(c), np.shape(k)) for c, k in terms]
         masks = () if where is None else (np.shape(where),)
@@ -198,7 +210,7 @@ class Milp:
             values = np.broadcast_to(np.asarray(coefficients, float), wide)[made]
             keep = (picked != ABSENT) & (values != 0.0)
             if (picked[keep] < 0).any():
-                raise ValueError(f"rows '{name}' use a column that the formulation has eliminated")
+                raise EliminatedColumnError(f"rows '{name}' use an eliminated column")
             entries.append((picked, values, keep))
             wanted |= keep.any(axis=1)
         rows = self._n_rows + np.cumsum(wanted) - 1
@@ -214,14 +226,14 @@ class Milp:
         """Add coefficients · columns (broadcast together) to the objective.
 
         Raises:
-            ValueError: if an eliminated column is used.
+            EliminatedColumnError: if one is used.
         """
         shape = np.broadcast_shapes(np.shape(coefficients), columns.shape)
         picked = np.broadcast_to(columns, shape).ravel()
         values = np.broadcast_to(np.asarray(coefficients, float), shape).ravel()
         keep = picked != ABSENT
         if (picked[keep] < 0).any():
-            raise ValueError("the objective uses a column that the formulation has eliminated")
+            raise EliminatedColumnError("the objective uses an eliminated column")
         self._cost.append((picked[keep], values[keep]))
 
     def add_constant(self, value: float) -> None:

@@ -1,9 +1,14 @@
-"""The optimal control problem (OF), (OCP_1) to (OCP_8): its table of contents."""
+"""The optimal control problem (OF), (OCP_1) to (OCP_8): its table of contents.
+
+`OCP` is the one tuple of blocks. Whatever is flown is derived from it: the reduced formulations
+replace some of its blocks (`reductions.formulations`), flights that no solver made are priced and
+checked by its blocks (`appraisal`). A block that is added to it is in all of them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +29,11 @@ from uas_coverage_baselines.milp_mpc.blocks import (
     coverable,
 )
 from uas_coverage_baselines.milp_mpc.milp import ELIMINATED, Milp
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES
 
 
+@runtime_checkable
 class Block(Protocol):
     """One constraint family of the OCP (Sec. III-C), with its part of the objective."""
 
@@ -36,17 +42,31 @@ class Block(Protocol):
         ...
 
 
+@runtime_checkable
+class Priced(Protocol):
+    """A block that knows its part of the objective along given flights in closed form.
+
+    It is optional: the cost of a block without it is found from its rows (`appraisal`).
+    """
+
+    def cost_along(
+        self, problem: PlanningProblem, uas: int, flights: Trajectories
+    ) -> NDArray[np.float64]:
+        """(S,) what the block adds to the objective along flights of one UAS."""
+        ...
+
+
 OCP: tuple[Block, ...] = (
     Dynamics(),
     Capabilities(),
     Slack(),
-    Collision(),
     Geofence(),
+    TargetDistance(),
+    Collision(),
     Obstacles(),
     MovingObstacles(),
     CornerCutting(),
     Coverage(),
-    TargetDistance(),
     TimeToGo(),
     BatteryReserve(),
 )

@@ -14,7 +14,9 @@ from uas_coverage_baselines.milp_mpc.modes import (
     target_of,
     update_modes,
 )
-from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon, MovingHorizonOptions
+from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Target, Weights
 from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
 from uas_coverage_env.scenario import Scenario
@@ -37,20 +39,23 @@ class Options(MovingHorizonOptions):
         le=20.0,
         description="D_r,max over the distance from home to the fence's far corner",
     )
+    weight_transit: float = weight(Weights.transit, "of the way to a transit target")
+    weight_homing: float = weight(Weights.homing, "of the way home")
 
 
 class MilpMpc(MovingHorizon[Options]):
-    """The paper's energy-aware MILP-MPC (Gasche et al., Sec. III)."""
+    """The paper's energy-aware MILP-MPC (Gasche et al., Sec. III).
+
+    Args:
+        options: see `uas-coverage planners`.
+        blocks: of the OCP; those that the option `blocks` names come after them.
+    """
 
     Options = Options
 
-    def __init__(self, options: Options | None = None) -> None:
-        super().__init__(options or Options())
-        self._weights, self._choice = Weights(), TargetChoice()
-
-    def rehearsal(self) -> MilpMpc:
-        """The same planner with time enough to compile everything."""
-        return MilpMpc(self.options.model_copy(update={"time_limit_s": 10.0}))
+    def __init__(self, options: Options | None = None, blocks: Sequence[Block] = OCP) -> None:
+        super().__init__(options or Options(), blocks)
+        self._weights, self._choice = self.options.weights, TargetChoice()
 
     def reset(self, scenario: Scenario, seed: int) -> None:
         """Start a mission; the planner draws no lots, so the seed changes nothing."""

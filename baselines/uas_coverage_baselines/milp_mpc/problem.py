@@ -19,6 +19,8 @@ from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.vehicle import LinearModel, VehicleParams
 
 FloatArray = NDArray[np.float64]
+NEVER = 10_000
+"""The step of a visit that does not take place."""
 
 
 @dataclass(frozen=True)
@@ -279,6 +281,23 @@ class Variables:
     def velocity(self) -> Columns:
         """(U, N+1, 3)."""
         return self.x[..., 3:6]
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """S flights of one UAS over the horizon, as far as they are known: what a block prices.
+
+    Attributes:
+        positions_m: (S, N+1, 3).
+        visits: (S, W) first step at which each covers a waypoint of the problem, `NEVER` if not.
+        x: (S, N+1, 14) states; None where only positions are known.
+        u: (S, N, 5) inputs; None likewise.
+    """
+
+    positions_m: FloatArray
+    visits: NDArray[np.int64]
+    x: FloatArray | None = None
+    u: FloatArray | None = None
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -14,10 +15,10 @@ from uas_coverage_baselines.milp_mpc.blocks.separation import (
     from_moving_obstacles,
     from_obstacles,
 )
-from uas_coverage_baselines.milp_mpc.construction import NEVER
 from uas_coverage_baselines.milp_mpc.milp import ABSENT, Columns
-from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS, Formulation
+from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.problem import NEVER, Plan, PlanningProblem
+from uas_coverage_baselines.milp_mpc.reductions import Formulation, write_smallest
 from uas_coverage_baselines.milp_mpc.reductions.elimination import flown_states
 from uas_coverage_baselines.milp_mpc.solvers import Solution
 
@@ -61,18 +62,32 @@ class Program:
 
     Args:
         problem: the decision.
+        blocks: of the OCP.
         formulation: how it is written, see `reductions`; all give the same optimum. Where None,
             what is quickest.
     """
 
-    def __init__(self, problem: PlanningProblem, formulation: Formulation | None = None) -> None:
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        blocks: Sequence[Block] = OCP,
+        *,
+        formulation: Formulation | None = None,
+    ) -> None:
         self.problem = problem
-        formulation = formulation or FORMULATIONS[_TIGHTEST if problem.tours else _QUICKEST]
-        self.milp, self.variables = formulation.write(problem)
+        if formulation is None:
+            first = _TIGHTEST if problem.tours else _QUICKEST
+            formulation, self.milp, self.variables = write_smallest(problem, blocks, first)
+        else:
+            self.milp, self.variables = formulation.write(problem, blocks)
         self.built = formulation.finish(self.milp.build())
-        self._separations = list(
-            chain(from_obstacles(problem), from_moving_obstacles(problem), from_each_other(problem))
-        )
+        self._separations = [
+            separation
+            for separation in chain(
+                from_obstacles(problem), from_moving_obstacles(problem), from_each_other(problem)
+            )
+            if f"{separation.name}.crossed" in self.milp
+        ]
 
     def near(
         self, positions_m: FloatArray, visits: NDArray[np.int64], nearness: Nearness = NARROW
@@ -95,8 +110,6 @@ class Program:
         allowed |= nearness.other_waypoints & ~visited[:, None, :]
         upper[_made(self.variables.covers[~allowed])] = 0.0
         for separation in self._separations:
-            if not separation.undecided.any():
-                continue
             crossed = self.milp.columns(f"{separation.name}.crossed")
             spare = _open_spare_m(separation, positions_m)
             best = spare.max(axis=2, keepdims=True)
@@ -121,8 +134,6 @@ class Program:
         covers = steps == visits[:, None, :]
         columns, values = [self.variables.covers.ravel()], [covers.astype(float).ravel()]
         for separation in self._separations:
-            if not separation.undecided.any():
-                continue
             crossed = self.milp.columns(f"{separation.name}.crossed")
             spare = _open_spare_m(separation, positions_m)
             best = spare.argmax(axis=2)[..., None]

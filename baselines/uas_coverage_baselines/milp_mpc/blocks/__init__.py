@@ -11,7 +11,7 @@ from uas_coverage_baselines.milp_mpc.blocks.moving_obstacles import MovingObstac
 from uas_coverage_baselines.milp_mpc.blocks.obstacles import Obstacles
 from uas_coverage_baselines.milp_mpc.blocks.slack import Slack
 from uas_coverage_baselines.milp_mpc.blocks.target_distance import TargetDistance
-from uas_coverage_baselines.milp_mpc.blocks.time_to_go import TimeToGo, time_to_go
+from uas_coverage_baselines.milp_mpc.blocks.time_to_go import TimeToGo
 
 __all__ = [
     "BatteryReserve",
@@ -27,5 +27,4 @@ __all__ = [
     "TargetDistance",
     "TimeToGo",
     "coverable",
-    "time_to_go",
 ]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.energy import DETOUR, LANDING_S, SPEED_SHARE, dod_per_s
 from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle import DELTA_THRUST, DOD, U_TH, LinearModel
 
@@ -60,6 +60,15 @@ class BatteryReserve:
                 where=excess > 0.0,
             )
             milp.minimize(cost_per_s(problem), short)
+
+    def cost_along(self, problem: PlanningProblem, uas: int, flights: Trajectories) -> FloatArray:
+        """(S,) what falls short costs, 0 where states are not known."""
+        cost = np.zeros(len(flights.positions_m))
+        if flights.x is None:
+            return cost
+        for row, x in enumerate(flights.x):
+            cost[row] = cost_per_s(problem.only(uas)) * max(short_s(problem, uas, x[-1]), 0.0)
+        return cost
 
 
 def cost_per_s(problem: PlanningProblem) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.vehicle import DOD, LIFT, PSI, TAU_X, TAU_Y, TAU_Z, VZ, WX, WY, WZ
 
 
@@ -48,3 +48,28 @@ class Slack:
         steps = np.arange(1, problem.horizon + 1)
         in_any_case = problem.x0[:, DOD, None] + hovering[:, None] * steps
         milp.add_constant(-float((w.energy / hovering[:, None] * in_any_case).sum()))
+
+    def cost_along(self, problem: PlanningProblem, uas: int, flights: Trajectories) -> np.ndarray:
+        """(S,) part I of the objective, 0 where states and inputs are not known."""
+        cost = np.zeros(len(flights.positions_m))
+        if flights.x is None or flights.u is None:
+            return cost
+        for row, (x, u) in enumerate(zip(flights.x, flights.u, strict=True)):
+            cost[row] = _steadiness_cost(problem, uas, x, u)
+        return cost
+
+
+def _steadiness_cost(problem: PlanningProblem, uas: int, x: np.ndarray, u: np.ndarray) -> float:
+    """Part I of the objective along states (N+1, 14) and inputs (N, 5), see `Slack`."""
+    w, vehicle = problem.weights, problem.vehicles[uas]
+    limits, torque = vehicle.limits, vehicle.torque_max_Nm
+    rate, yaw_rate = limits.rate_max_radps, limits.yaw_rate_max_radps
+    inputs = np.abs(u[:, [LIFT, TAU_X, TAU_Y, TAU_Z]]).sum(axis=0)
+    states = np.abs(x[1:, [WX, WY, WZ, PSI]]).sum(axis=0)
+    cost = inputs @ np.array([w.lift / limits.lift_max_N, *(w.torque / t for t in torque[:3])])
+    cost += states @ np.array([w.rate / rate, w.rate / rate, w.rate / yaw_rate, 0.0])
+    cost += states[3] * w.yaw / limits.yaw_max_rad
+    cost += float(np.abs(x[1:, VZ]).sum()) * w.climb / limits.v_down_max_mps
+    hovering = problem.models[uas].E[DOD]
+    in_any_case = x[0, DOD] + hovering * np.arange(1, len(x))
+    return float(cost + w.energy / hovering * (x[1:, DOD] - in_any_case).sum())

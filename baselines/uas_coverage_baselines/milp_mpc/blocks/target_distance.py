@@ -6,7 +6,7 @@ import numpy as np
 
 from uas_coverage_baselines.milp_mpc.blocks.coverage import uncovered_as
 from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Variables
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.geometry import closed_cylinder_faces
 
 
@@ -39,3 +39,15 @@ class TargetDistance:
                 lower = lower - big_m * (1.0 - constant)
             milp.subject_to(f"{name}.from_target", *terms, lower=lower)
             milp.minimize(target.weight, distance)
+
+    def cost_along(self, problem: PlanningProblem, uas: int, flights: Trajectories) -> np.ndarray:
+        """(S,) part II of the objective."""
+        target = problem.targets[uas]
+        if target is None:
+            return np.zeros(len(flights.positions_m))
+        faces = closed_cylinder_faces(problem.physical_sides)
+        distance = ((flights.positions_m[:, 1:] - target.position_m) @ faces.T).max(axis=2)
+        if target.waypoint is not None:
+            steps = np.arange(1, problem.horizon + 1)
+            distance = np.where(steps > flights.visits[:, [target.waypoint]], 0.0, distance)
+        return target.weight * np.maximum(distance, 0.0).sum(axis=1)

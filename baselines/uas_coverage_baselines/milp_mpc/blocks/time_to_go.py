@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.milp import ABSENT, Milp
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Tour, Variables
+from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle import VehicleParams
 
@@ -62,6 +62,22 @@ class TimeToGo:
                     where=(visits[:, 1:] != ABSENT),
                 )
 
+    def cost_along(self, problem: PlanningProblem, uas: int, flights: Trajectories) -> FloatArray:
+        """(S,) the remaining time; the last velocity is that of the last step."""
+        tour = problem.tours[uas] if problem.tours else None
+        if tour is None:
+            return np.zeros(len(flights.positions_m))
+        positions_m = flights.positions_m
+        rates, slack = flight_time_faces(problem.vehicles[uas], problem.physical_sides)
+        offset = tour.aims_m @ rates.T + tour.radius_m[:, None] * slack
+        visited = flights.visits[:, tour.waypoints] < problem.horizon
+        prefix = np.cumprod(visited, axis=1).astype(bool)
+        first_left = prefix.sum(axis=1)
+        velocity = (positions_m[:, -1] - positions_m[:, -2]) / problem.dt_s
+        ahead = positions_m[:, -1] + tour.lead_s * velocity
+        distance = np.maximum((ahead @ rates.T - offset[first_left]).max(axis=1), 0.0)
+        return (~prefix) @ tour.onward_s + distance
+
 
 def flight_time_faces(vehicle: VehicleParams, sides: int) -> tuple[FloatArray, FloatArray]:
     """Rows whose largest value along a way is the time it takes.
@@ -80,22 +96,3 @@ def flight_time_faces(vehicle: VehicleParams, sides: int) -> tuple[FloatArray, F
     down = np.array([[0.0, 0.0, -1.0 / limits.v_down_max_mps]])
     rates = np.vstack([level, up, down])
     return rates, np.linalg.norm(rates, axis=1)
-
-
-def time_to_go(
-    problem: PlanningProblem,
-    uas: int,
-    tour: Tour,
-    positions_m: FloatArray,
-    visits: NDArray[np.int64],
-) -> FloatArray:
-    """(S,) the same along S simulated flights (S, N+1, 3) that visit at steps `visits` (S, W)."""
-    rates, slack = flight_time_faces(problem.vehicles[uas], problem.physical_sides)
-    offset = tour.aims_m @ rates.T + tour.radius_m[:, None] * slack
-    visited = visits[:, tour.waypoints] < problem.horizon
-    prefix = np.cumprod(visited, axis=1).astype(bool)
-    first_left = prefix.sum(axis=1)
-    velocity = (positions_m[:, -1] - positions_m[:, -2]) / problem.dt_s
-    ahead = positions_m[:, -1] + tour.lead_s * velocity
-    distance = np.maximum((ahead @ rates.T - offset[first_left]).max(axis=1), 0.0)
-    return (~prefix) @ tour.onward_s + distance

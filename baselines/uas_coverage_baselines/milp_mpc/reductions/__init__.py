@@ -3,7 +3,11 @@
 One reduction per file, with the proof that it is exact; `formulations` names what they add up to.
 """
 
-from uas_coverage_baselines.milp_mpc.reductions.formulations import FORMULATIONS, Formulation
+from uas_coverage_baselines.milp_mpc.reductions.formulations import (
+    FORMULATIONS,
+    Formulation,
+    write_smallest,
+)
 from uas_coverage_baselines.milp_mpc.reductions.lazy import LazySolution, solve_lazily
 
-__all__ = ["FORMULATIONS", "Formulation", "LazySolution", "solve_lazily"]
+__all__ = ["FORMULATIONS", "Formulation", "LazySolution", "solve_lazily", "write_smallest"]
