@@ -3,18 +3,18 @@
 The states come from `python benchmarks/planner.py states`.
 """
 
-from dataclasses import replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toy_problems import S500, TO_OPTIMALITY, box, flight, state, toy
+from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy
 from uas_coverage_baselines.milp_mpc.blocks import coverable
 from uas_coverage_baselines.milp_mpc.blocks.separation import from_obstacles
 from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.problem import Target, Tour
+from uas_coverage_baselines.milp_mpc.problem import Target, Tour, Weights
 from uas_coverage_baselines.milp_mpc.problem_file import read_problems, write_problems
 from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS, solve_lazily
 from uas_coverage_baselines.milp_mpc.reductions.bounds import rows_as_bounds
@@ -30,6 +30,9 @@ from uas_coverage_baselines.milp_mpc.reductions.travel import (
 )
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 from uas_coverage_baselines.milp_mpc.solvers.interface import SolverLimits, SolveStatus
+
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.vehicle import VehicleParams
 
 FLOWN = read_problems(Path(__file__).parents[2] / "benchmarks" / "village_decisions.json")
 CLOSED = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
@@ -248,6 +251,46 @@ def test_a_decision_survives_its_file(tmp_path):
     again = read_problems(tmp_path / "one.json")[7]
     one, other = (FORMULATIONS["lift"].write(p)[0].lp_text() for p in (problem, again))
     assert one == other
+
+
+def test_every_field_of_a_decision_survives_its_file(tmp_path):
+    place = ((66.0, 52.0, -10.0), 8.0, 2.0)
+    problem = toy(
+        *(state((50.0, east, -10.0), (6.0, 0.0, 0.0), dod=0.2) for east in (50.0, 80.0)),
+        horizon=3,
+        obstacles=[box((80.0, 40.0, -20.0), (90.0, 60.0, 0.0))],
+        moving_obstacles=[moving([(10.0, 10.0, -5.0)] * 4)],
+        waypoints=[place, ((90.0, 20.0, -12.0), 6.0)],
+        waypoint_sides=12,
+        targets=[Target(np.array([80.0, 50.0, -5.0]), 0.2, 1), None],
+        tours=(None, Tour(np.array([1]), np.eye(3)[:2], np.ones(2), 0.5, np.array([6.0]))),
+        weights=Weights(lift=0.3, homing=1.0),
+        dt_s=0.5,
+        physical_sides=12,
+        obstacle_sides=6,
+        prune=False,
+    )
+    for one in fields(problem):
+        default = one.default_factory() if callable(one.default_factory) else one.default
+        same = plain(getattr(problem, one.name)) == plain(default)
+        assert same is not True, f"{one.name} is looked at only where it is not the default"
+    write_problems(tmp_path / "one.json", "a test", [problem], [0])
+    again = read_problems(tmp_path / "one.json")[0]
+    for one in fields(problem):
+        np.testing.assert_equal(
+            plain(getattr(again, one.name)), plain(getattr(problem, one.name)), one.name
+        )
+
+
+def plain(value):
+    """Records as dictionaries, so that their arrays are compared value by value."""
+    if isinstance(value, tuple | list):
+        return [plain(one) for one in value]
+    if isinstance(value, VehicleParams):
+        return value.model_dump()
+    if isinstance(value, ConvexPolytope):
+        return [value.normals, value.offsets_m, value.vertices_m]
+    return asdict(value) if is_dataclass(value) else value
 
 
 def test_obstacles_out_of_reach_are_left_out_and_change_no_row():

@@ -94,6 +94,7 @@ def toy(
         home_m=np.array(states)[:, :3] if home_m is None else np.array(home_m, float),
         dod_max=np.full(U, dod_max),
         targets=(None,) * U if targets is None else tuple(targets),
+        dt_s=dt_s,
         **fields,
     )
 

@@ -8,12 +8,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem, Target
+from uas_coverage_baselines.milp_mpc.problem import (
+    MovingHull,
+    PlanningProblem,
+    Target,
+    Tour,
+    Weights,
+)
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model
 
@@ -29,6 +36,7 @@ _ARRAYS = (
     "dod_max",
 )
 _NUMBERS = ("horizon", "dt_s", "fence_margin_m", "n_scenario_waypoints")
+_OF_A_TOUR = ("aims_m", "radius_m", "onward_s")
 _SIDES = ("physical_sides", "obstacle_sides", "waypoint_sides")
 
 
@@ -40,14 +48,9 @@ def write_problems(
     Args:
         path: of the file.
         made_by: the command that makes it.
-        problems: the decisions, with the default weights and no tours.
+        problems: the decisions.
         steps: which sample of the mission each was taken at.
-
-    Raises:
-        ValueError: a problem follows a tour, which a file does not hold.
     """
-    if any(tour is not None for problem in problems for tour in problem.tours):
-        raise ValueError("decisions along a tour cannot be written to a file")
     shared = problems[0]
     document = {
         "made_by": made_by,
@@ -105,7 +108,15 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
             }
             for target in problem.targets
         ],
+        "tours": [None if tour is None else _tour(tour) for tour in problem.tours],
+        "weights": asdict(problem.weights),
+        "prune": problem.prune,
     }
+
+
+def _tour(tour: Tour) -> dict[str, Any]:
+    arrays = {name: getattr(tour, name).tolist() for name in _OF_A_TOUR}
+    return {"waypoints": tour.waypoints.tolist(), "lead_s": tour.lead_s, **arrays}
 
 
 def _problem(
@@ -143,7 +154,19 @@ def _problem(
             else Target(np.array(target["position_m"], float), target["weight"], target["waypoint"])
             for target in row["targets"]
         ),
+        # files from before these were written: no tours, the default weights
+        tours=tuple(None if tour is None else _read_tour(tour) for tour in row.get("tours", ())),
+        weights=Weights(**row.get("weights", {})),
+        prune=row.get("prune", True),
         **fields,
+    )
+
+
+def _read_tour(tour: dict[str, Any]) -> Tour:
+    return Tour(
+        waypoints=np.array(tour["waypoints"], np.int64),
+        lead_s=tour["lead_s"],
+        **{name: np.array(tour[name], float) for name in _OF_A_TOUR},
     )
 
 
