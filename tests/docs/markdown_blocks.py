@@ -56,6 +56,14 @@ def blocks(page: Path) -> Iterator[Block]:
     assert start is None, f"{page.name}: the block of line {start} has no end"
 
 
+def save_modules(page: Path, folder: Path) -> None:
+    """Write the modules that a page says to save: Python blocks that begin with `# NAME.py`."""
+    for block in blocks(page):
+        named = re.match(r"# (\w+\.py)\n", block.text)
+        if block.language == "python" and named:
+            (folder / named[1]).write_text(block.text, encoding="utf-8")
+
+
 def command_lines(page: Path, *, inline: bool = True) -> Iterator[list[str]]:
     """Every command of ours in the blocks, and the inline code, of a page, as its words."""
     shells = [b.text for b in blocks(page) if b.language in ("bash", "console", "", "sh")]

@@ -6,7 +6,7 @@ As they stand, but where a mission, a sweep or a training would take minutes: th
 from itertools import pairwise
 
 import pytest
-from markdown_blocks import PAGES, ROOT, blocks, command_lines
+from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_modules
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 
 from uas_coverage_env import generate_scenario
@@ -47,7 +47,8 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
         monkeypatch.delenv(name, raising=False)
     # nobody is timed here, so nothing has to be compiled before the first decision
     monkeypatch.setattr(MovingHorizon, "warm_up", lambda planner, scenario: None)
-    # what the reader brings along: a scenario of one's own, and those the page says to save
+    # what the reader brings along: a scenario of one's own, and what the page says to save
+    save_modules(page, tmp_path)
     generate_scenario(seed=1, n_uas=1, n_waypoints=4, n_obstacles=2).to_file("my_area.toml")
     for block in blocks(page):
         if block.language == "toml" and block.text.startswith("schema"):
