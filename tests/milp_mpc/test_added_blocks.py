@@ -11,7 +11,7 @@ from practice_missions import fly, mission
 from toy_problems import TO_OPTIMALITY, flown, state, toy
 from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided, decision
 from uas_coverage_baselines.milp_mpc.appraisal import Appraisal
-from uas_coverage_baselines.milp_mpc.blocks import Geofence
+from uas_coverage_baselines.milp_mpc.blocks import Geofence, TargetDistance
 from uas_coverage_baselines.milp_mpc.braking import way_out
 from uas_coverage_baselines.milp_mpc.construction import flights
 from uas_coverage_baselines.milp_mpc.decision import Effort, decide
@@ -153,6 +153,17 @@ def test_what_is_flown_while_waiting_costs_what_its_rows_cost(grounded):
     upper[v.covers[v.covers >= 0]] = 0.0
     whole = solve(built, TO_OPTIMALITY, lower=lower, upper=upper)
     assert whole.objective == pytest.approx(plan.objective, abs=2e-3)
+
+
+def test_a_subclass_with_rows_of_its_own_is_priced_by_these(grounded):
+    class Costly(TargetDistance):
+        def add_to(self, milp, v, problem):
+            Floor(8.0, 5.0).add_to(milp, v, problem)
+
+    blocks = tuple(Costly() if type(block) is TargetDistance else block for block in OCP)
+    (plan,) = standby_plans(grounded, 0, None, 1.0, blocks)
+    (floor,) = standby_plans(grounded, 0, None, 1.0, (*OCP, Floor(8.0, 5.0)))
+    assert plan.objective == pytest.approx(floor.objective)
 
 
 def test_a_flight_that_breaks_rows_is_refused_by_name(grounded):

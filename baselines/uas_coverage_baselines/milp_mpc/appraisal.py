@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,7 @@ class Appraisal:
 
     def __init__(self, problem: PlanningProblem, blocks: Sequence[Block] = OCP) -> None:
         self._problem = problem
-        self._closed = tuple(block for block in blocks if isinstance(block, Priced))
+        self._closed = tuple(block for block in blocks if _prices_itself(block))
         self._by_rows = _by_rows(blocks)
 
     def costs(self, uas: int, flights: Trajectories) -> FloatArray:
@@ -163,10 +164,20 @@ def trouble(problem: PlanningProblem, plan: Plan, blocks: Sequence[Block]) -> st
     return Appraisal(replace(problem, horizon=steps, moving=moving), blocks).broken(plan)
 
 
+def _prices_itself(block: Block) -> TypeGuard[Priced]:
+    """Whether its `cost_along` is of its rows: a subclass that changes these alone has none."""
+    family = type(block).__mro__
+    rows, cost = (
+        next((k for k, one in enumerate(family) if name in vars(one)), len(family))
+        for name in ("add_to", "cost_along")
+    )
+    return cost <= rows and isinstance(block, Priced)
+
+
 def _by_rows(blocks: Sequence[Block]) -> tuple[Block, ...]:
     """The blocks that nothing else prices or measures."""
     return tuple(
-        block for block in blocks if type(block) not in _MEASURED and not isinstance(block, Priced)
+        block for block in blocks if type(block) not in _MEASURED and not _prices_itself(block)
     )
 
 
