@@ -4,6 +4,7 @@ import independent_check
 import pytest
 from lively_missions import with_balloon
 from uas_coverage_baselines.milp_mpc import moving_horizon
+from uas_coverage_baselines.milp_mpc.reasons import Reason
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 
@@ -26,7 +27,7 @@ def test_everybody_gets_out_of_the_way_of_what_comes_straight_at_them(
     monkeypatch, tmp_path, gap_m, speed_mps, solver_works
 ):
     if not solver_works:
-        monkeypatch.setattr(moving_horizon, "decide", lambda *args, **keywords: None)
+        monkeypatch.setattr(moving_horizon, "decide", lambda *args, **keywords: Reason.NO_PLAN)
     scenario = approached(gap_m, speed_mps)
     flight = rollout(scenario, load_planner("milp-mpc", QUICK), max_steps=30)
     flight.save(tmp_path / "flight")
