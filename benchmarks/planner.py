@@ -22,14 +22,15 @@ from rich.console import Console
 from rich.table import Table
 from solver_watch import Watched, watch
 from uas_coverage_baselines.milp_mpc import MilpMpc
-from uas_coverage_baselines.milp_mpc.blocks import coverable
-from uas_coverage_baselines.milp_mpc.construction import flights, teams
-from uas_coverage_baselines.milp_mpc.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.blocks import coverable
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
+from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, Formulation
 from uas_coverage_baselines.milp_mpc.planner import Options
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem
-from uas_coverage_baselines.milp_mpc.problem_file import read_problems, write_problems
-from uas_coverage_baselines.milp_mpc.program import Program
-from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS, Formulation
+from uas_coverage_baselines.milp_mpc.search.heuristic import construct
+from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
+from uas_coverage_baselines.milp_mpc.search.trajectories import teams
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -190,18 +191,18 @@ def restricted(
     for name in _ALL if which == "all" else which.split(","):
         build_s, solve_s, objectives = [], [], []
         for problem in problems:
-            pools = [flights(problem, uas, problem.dt_s) for uas in range(problem.n_uas)]
+            pools = [construct(problem, uas, problem.dt_s) for uas in range(problem.n_uas)]
             best_teams = teams(problem, pools, 3)
             for uas in range(problem.n_uas):
                 own = problem.only(uas)
-                Program(own, FORMULATIONS[name])  # compile and warm up
+                RestrictedMilp(own, FORMULATIONS[name])  # compile and warm up
                 began = time.process_time()
-                program = Program(replace(own), FORMULATIONS[name])
+                program = RestrictedMilp(replace(own), FORMULATIONS[name])
                 build_s.append(time.process_time() - began)
                 paths = {team[uas].visit.tobytes(): team[uas] for team in best_teams}
                 for flight in paths.values():
                     near = flight.positions_m[None], flight.visit[None]
-                    lower, upper = program.near(*near)
+                    lower, upper = program.bounds_near(*near)
                     start = program.start(*near)
                     began = time.process_time()
                     solution = solve(program.built, limits, start=start, lower=lower, upper=upper)

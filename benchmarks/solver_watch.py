@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import highspy
 import numpy as np
-from uas_coverage_baselines.milp_mpc.milp import BuiltMilp
+from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 
 ONE_PERCENT = 0.01
 

@@ -3,8 +3,8 @@
 from itertools import product
 
 import numpy as np
-from uas_coverage_baselines.milp_mpc.decision import Effort
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, Options
+from uas_coverage_baselines.milp_mpc.search.decision import Effort
 
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import parse

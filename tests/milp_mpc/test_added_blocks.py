@@ -9,19 +9,20 @@ import pytest
 from added_blocks import Apart, Ceiling, Doubled, Early, Floor, OneLevel, Thrifty, Turned
 from practice_missions import fly, mission
 from toy_problems import TO_OPTIMALITY, flown, state, toy
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided, decision
-from uas_coverage_baselines.milp_mpc.appraisal import Appraisal
-from uas_coverage_baselines.milp_mpc.blocks import Geofence, TargetDistance
-from uas_coverage_baselines.milp_mpc.braking import way_out
-from uas_coverage_baselines.milp_mpc.construction import flights
-from uas_coverage_baselines.milp_mpc.decision import Effort, decide
-from uas_coverage_baselines.milp_mpc.ocp import OCP, formulate
-from uas_coverage_baselines.milp_mpc.problem import Plan
-from uas_coverage_baselines.milp_mpc.program import Program
-from uas_coverage_baselines.milp_mpc.reasons import Reason
-from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS
+from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
+from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
+from uas_coverage_baselines.milp_mpc.model.blocks import Geofence, TargetDistance
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
+from uas_coverage_baselines.milp_mpc.search import team_search
+from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
+from uas_coverage_baselines.milp_mpc.search.heuristic import construct
+from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
-from uas_coverage_baselines.milp_mpc.standby import standby_plans
 
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import World
@@ -87,22 +88,22 @@ def test_a_subclass_of_a_block_is_not_replaced_and_a_block_left_out_is_not_misse
             super().add_to(milp, v, dataclasses.replace(problem, fence_margin_m=20.0))
 
     inner = tuple(Inner() if isinstance(block, Geofence) else block for block in OCP)
-    program = Program(grounded, inner)
+    program = RestrictedMilp(grounded, inner)
     north = program.variables.position[:, 1:, 0]
     assert (program.built.lower[north] >= 20.0 - 1e-9).all()
-    rows = Program(grounded, OCP[:-1]).milp.row_names()
+    rows = RestrictedMilp(grounded, OCP[:-1]).milp.row_names()
     assert not any(row.startswith("reserve") for row in rows)
     without_corners = tuple(b for b in OCP if type(b).__name__ != "CornerCutting")
-    assert Program(grounded, without_corners).milp.row_names()
+    assert RestrictedMilp(grounded, without_corners).milp.row_names()
 
 
 @pytest.mark.parametrize("block", [Thrifty(), Turned(), Early(), Doubled()])
 def test_a_block_may_use_columns_that_reduced_programs_do_without(grounded, block):
     alone = grounded.only(0)
-    found = solve(Program(alone, (*OCP, block)).built, TO_OPTIMALITY)
+    found = solve(RestrictedMilp(alone, (*OCP, block)).built, TO_OPTIMALITY)
     whole = solve(formulate(alone, (*OCP, block))[0].build(), TO_OPTIMALITY)
     assert found.objective == pytest.approx(whole.objective, abs=1e-4)
-    plain = solve(Program(alone).built, TO_OPTIMALITY)
+    plain = solve(RestrictedMilp(alone).built, TO_OPTIMALITY)
     assert isinstance(block, Thrifty) or found.objective > plain.objective + 1e-3
 
 
@@ -125,24 +126,24 @@ def test_a_ceiling_holds_in_the_flight(planner, garden):
     assert not any(decision.fallback for decision in decisions)
 
 
-def test_the_way_out_keeps_below_a_ceiling_too():
+def test_the_backup_trajectory_keeps_below_a_ceiling_too():
     climbing = state((50.0, 50.0, -6.0), (0.0, 0.0, -2.5))
     problem = toy(climbing, horizon=8)
     x, u = flown(problem.vehicles[0], climbing, [(0.0, 0.0, -2.5)] * 2 + [(6.0, 0.0, 0.0)] * 6)
     plan = Plan(problem.names, x[None], u[None], np.zeros((1, 8, 0), bool), 0.0, -np.inf)
     top = -x[:, 2].min()
-    over = -way_out(problem, plan, 1.0).x[0, :, 2].min()
+    over = -backup_trajectory(problem, plan, 1.0).x[0, :, 2].min()
     assert over >= top - 1e-9
-    below = way_out(problem, plan, 1.0, (*OCP, Ceiling(top + 0.05)))
+    below = backup_trajectory(problem, plan, 1.0, (*OCP, Ceiling(top + 0.05)))
     assert below is not None
     assert -below.x[0, :, 2].min() <= top + 0.05 + 1e-4
-    assert way_out(problem, plan, 1.0, (*OCP, Ceiling(6.2))) is None
+    assert backup_trajectory(problem, plan, 1.0, (*OCP, Ceiling(6.2))) is None
 
 
 def test_what_is_flown_while_waiting_costs_what_its_rows_cost(grounded):
     alone, blocks = grounded.only(0), (*OCP, Floor(8.0, 5.0))
-    (plan,) = standby_plans(grounded, 0, None, 1.0, blocks)
-    (before,) = standby_plans(grounded, 0, None, 1.0)
+    (plan,) = fallback_plans(grounded, 0, None, 1.0, blocks)
+    (before,) = fallback_plans(grounded, 0, None, 1.0)
     below_m = np.maximum(8.0 + plan.x[0, 1:, 2], 0.0)
     assert plan.objective == pytest.approx(before.objective + 5.0 * below_m.sum(), abs=1e-3)
     milp, v = formulate(alone, blocks)
@@ -161,13 +162,13 @@ def test_a_subclass_with_rows_of_its_own_is_priced_by_these(grounded):
             Floor(8.0, 5.0).add_to(milp, v, problem)
 
     blocks = tuple(Costly() if type(block) is TargetDistance else block for block in OCP)
-    (plan,) = standby_plans(grounded, 0, None, 1.0, blocks)
-    (floor,) = standby_plans(grounded, 0, None, 1.0, (*OCP, Floor(8.0, 5.0)))
+    (plan,) = fallback_plans(grounded, 0, None, 1.0, blocks)
+    (floor,) = fallback_plans(grounded, 0, None, 1.0, (*OCP, Floor(8.0, 5.0)))
     assert plan.objective == pytest.approx(floor.objective)
 
 
 def test_a_flight_that_breaks_rows_is_refused_by_name(grounded):
-    (plan,) = standby_plans(grounded, 0, None, 1.0)
+    (plan,) = fallback_plans(grounded, 0, None, 1.0)
     alone = grounded.only(0)
     assert Appraisal(alone, (*OCP, Ceiling(5.0))).trouble(plan) is None
     refused = Appraisal(alone, (*OCP, Ceiling(0.5))).trouble(plan)
@@ -184,8 +185,10 @@ def test_whole_columns_of_a_block_are_chosen_at_best(grounded):
 
 
 def test_constructed_flights_are_ranked_by_what_blocks_say_of_their_paths(grounded):
-    plain = flights(grounded, 0, 1.0)
-    priced = {f.positions_m.tobytes(): f for f in flights(grounded, 0, 1.0, blocks=(*OCP, Floor()))}
+    plain = construct(grounded, 0, 1.0)
+    priced = {
+        f.positions_m.tobytes(): f for f in construct(grounded, 0, 1.0, blocks=(*OCP, Floor()))
+    }
     assert set(priced) == {f.positions_m.tobytes() for f in plain}
     for one in plain:
         below_m = np.maximum(8.0 + one.positions_m[1:, 2], 0.0).sum()
@@ -194,8 +197,8 @@ def test_constructed_flights_are_ranked_by_what_blocks_say_of_their_paths(ground
 
 def test_a_block_about_two_uas_is_priced_for_the_team(grounded):
     blocks = (*OCP, Apart(60.0))
-    search = decision._Search(grounded, BY_NODES, time.perf_counter(), blocks)
-    plans = [standby_plans(grounded, uas, None, 1.0, blocks)[0] for uas in range(2)]
+    search = team_search.TeamSearch(grounded, BY_NODES, time.perf_counter(), blocks)
+    plans = [fallback_plans(grounded, uas, None, 1.0, blocks)[0] for uas in range(2)]
     joined = search._joined(plans)
     east = joined.x[:, 1:, 1]
     short_m = np.maximum(60.0 + east[0] - east[1], 0.0)

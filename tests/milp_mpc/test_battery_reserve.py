@@ -7,12 +7,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, box, feasible, flight, flown, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import BatteryReserve, Capabilities, Dynamics
-from uas_coverage_baselines.milp_mpc.blocks.battery_reserve import cost_per_s, short_s
-from uas_coverage_baselines.milp_mpc.braking import way_out
-from uas_coverage_baselines.milp_mpc.energy import dod_per_s, seconds_home
-from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.problem import Plan
+from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
+from uas_coverage_baselines.milp_mpc.model.blocks import BatteryReserve, Capabilities, Dynamics
+from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import cost_per_s, short_s
+from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -123,18 +123,18 @@ def planned(problem, commands):
     return Plan(("a",), x[None], u[None], np.zeros((1, len(u), 0), bool), 0.0, -np.inf)
 
 
-def test_a_way_out_turns_back_while_there_is_charge_to_come_home():
+def test_a_backup_trajectory_turns_back_while_there_is_charge_to_come_home():
     problem = with_seconds_to_spare(6.0)
     plan = planned(problem, [(12.0, 0.0, 0.0)] * 9)
-    out = way_out(problem, plan, 1.0)
+    out = backup_trajectory(problem, plan, 1.0)
     assert short_s(problem, 0, out.x[0, -1], allowance=False) <= 0.0
     assert out.x[0, -1, DOD] <= 0.75
     assert np.abs(out.x[0, 9, :3] - plan.x[0, 9, :3]).max() > 1.0
     enough = with_seconds_to_spare(100.0)
-    followed = way_out(enough, planned(enough, [(12.0, 0.0, 0.0)] * 9), 1.0)
+    followed = backup_trajectory(enough, planned(enough, [(12.0, 0.0, 0.0)] * 9), 1.0)
     assert followed.x[0, 9, 0] == pytest.approx(plan.x[0, 9, 0], abs=0.5)
 
 
 def test_who_is_too_late_is_not_kept_from_flying():
     problem = with_seconds_to_spare(-60.0)
-    assert way_out(problem, planned(problem, [(-10.0, 0.0, 0.0)] * 9), 1.0) is not None
+    assert backup_trajectory(problem, planned(problem, [(-10.0, 0.0, 0.0)] * 9), 1.0) is not None

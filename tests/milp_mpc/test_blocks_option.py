@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 from practice_missions import mission
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided, block_names
+from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc.model import named_blocks
+from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
-from uas_coverage_baselines.milp_mpc.problem import Weights
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.flight import Flight, load_planner
@@ -98,9 +99,9 @@ def test_a_block_that_cannot_be_had_is_one_line(given, said, capsys):
 
 def test_a_block_is_found_by_the_name_under_which_a_package_announces_it(folder, monkeypatch):
     monkeypatch.syspath_prepend(folder)
-    entry = EntryPoint("low", "my_own_blocks:Low", block_names.GROUP)
-    monkeypatch.setattr(block_names, "entry_points", lambda group: [entry])
-    assert block_names.block_names() == ("low",)
+    entry = EntryPoint("low", "my_own_blocks:Low", named_blocks.GROUP)
+    monkeypatch.setattr(named_blocks, "entry_points", lambda group: [entry])
+    assert named_blocks.block_names() == ("low",)
     planner = load_planner("milp-mpc-guided", {"blocks": "low"})
     assert type(planner.blocks[-1]).__name__ == "Low"
     with pytest.raises(InputError, match=r"unknown block 'hgih'.*low"):
@@ -116,8 +117,8 @@ def test_the_weights_are_options_and_what_is_not_given_stays():
     assert MilpMpc().options.weights == Weights()
     ours = Weights(lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03)
     assert MilpMpcGuided().options.weights == ours
-    planner = load_planner("milp-mpc", {"weight_energy": "0.5", "weight_homing": "4"})
-    assert planner.options.weights == Weights(energy=0.5, homing=4.0)
+    planner = load_planner("milp-mpc", {"weight_energy": "0.5", "weight_return_home": "4"})
+    assert planner.options.weights == Weights(energy=0.5, return_home=4.0)
     assert planner._weights == planner.options.weights
 
 

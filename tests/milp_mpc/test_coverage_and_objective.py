@@ -5,9 +5,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, feasible, flight, flown, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import Coverage, TargetDistance
-from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.problem import Target, Weights
+from uas_coverage_baselines.milp_mpc.model.blocks import Coverage, TargetDistance
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import cylinder_faces, inner_factor, sphere_faces

@@ -6,18 +6,19 @@ import time
 import numpy as np
 import pytest
 from toy_problems import S500, box, flight, flown, state, toy
-from uas_coverage_baselines.milp_mpc import decision
-from uas_coverage_baselines.milp_mpc.braking import way_out
-from uas_coverage_baselines.milp_mpc.construction import Flight, flights, teams
-from uas_coverage_baselines.milp_mpc.decision import Effort, decide
-from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.problem import NEVER, Plan, Target
-from uas_coverage_baselines.milp_mpc.program import NARROW, WIDE, Program
-from uas_coverage_baselines.milp_mpc.reasons import Reason
+from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
+from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, Target
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.search import team_search
+from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
+from uas_coverage_baselines.milp_mpc.search.heuristic import construct
+from uas_coverage_baselines.milp_mpc.search.restricted import NARROW, WIDE, RestrictedMilp
+from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory, teams
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
-from uas_coverage_baselines.milp_mpc.standby import standby_plans
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 from uas_coverage_env.geometry import sphere_faces
 
@@ -139,7 +140,7 @@ def test_several_uas_get_plans_by_nodes_where_every_flight_is_blocked():
         waypoints=[((59.9, 60.0, -6.0), 5.0), ((59.9, 110.0, -6.0), 5.0)],
     )
     for uas in range(2):
-        assert all((one.visit == NEVER).all() for one in flights(problem, uas, 1.0))
+        assert all((one.visit == NEVER).all() for one in construct(problem, uas, 1.0))
     plan = decide(problem, None, 1.0, BY_NODES)
     assert first_trouble(problem, plan) is None
 
@@ -152,12 +153,12 @@ def test_a_decision_whose_time_is_over_when_it_begins_says_so(problem):
 @pytest.fixture
 def nothing_for_b(monkeypatch):
     """No program gives the second UAS a plan."""
-    refined = decision._Search.refined
+    refined = team_search.TeamSearch.refined
 
     def for_a_alone(search, uas, *rest):
         return refined(search, uas, *rest) if uas == 0 else None
 
-    monkeypatch.setattr(decision._Search, "refined", for_a_alone)
+    monkeypatch.setattr(team_search.TeamSearch, "refined", for_a_alone)
 
 
 def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
@@ -165,20 +166,20 @@ def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
     assert first_trouble(problem, plan) is None
     assert plan.covers[0].any()
     assert not plan.covers[1].any()
-    braking = standby_plans(problem, 1, None, 1.0)[-1]
+    braking = fallback_plans(problem, 1, None, 1.0)[-1]
     assert plan.x[1] == pytest.approx(braking.x[0])
 
 
-def test_who_gets_no_plan_flies_the_rest_of_its_way_out(problem, by_nodes, nothing_for_b):
-    out = way_out(problem, by_nodes, 1.0)
-    plan = decide(problem, None, 1.0, BY_NODES, out=out)
+def test_who_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes, nothing_for_b):
+    out = backup_trajectory(problem, by_nodes, 1.0)
+    plan = decide(problem, None, 1.0, BY_NODES, backup=out)
     assert plan.x[1] == pytest.approx(out.x[1, :8])
     assert first_trouble(problem, plan) is None
 
 
-def test_where_no_team_holds_who_can_leaves_standby(problem, by_nodes, monkeypatch):
-    monkeypatch.setattr(decision, "teams", lambda problem, pools, keep: [])
-    search = decision._Search(problem, BY_NODES, time.perf_counter())
+def test_where_no_team_holds_a_uas_may_leave_its_fallback_plan(problem, by_nodes, monkeypatch):
+    monkeypatch.setattr(team_search, "teams", lambda problem, pools, keep: [])
+    search = team_search.TeamSearch(problem, BY_NODES, time.perf_counter())
     search.formulate(range(2))
     for uas in range(2):
         alone = dataclasses.replace(
@@ -187,21 +188,21 @@ def test_where_no_team_holds_who_can_leaves_standby(problem, by_nodes, monkeypat
             **{key: getattr(by_nodes, key)[uas : uas + 1] for key in ("x", "u", "covers")},
         )
         search.collect(uas, [alone])
-    search.combine([standby_plans(problem, uas, None, 1.0) for uas in range(2)])
+    search.combine([fallback_plans(problem, uas, None, 1.0) for uas in range(2)])
     assert search.outcome.x == pytest.approx(by_nodes.x)
 
 
 @pytest.mark.parametrize("uas", [0, 1])
-def test_a_plan_on_standby_has_the_objective_it_says(problem, uas):
+def test_a_fallback_plan_has_the_objective_it_says(problem, uas):
     alone = problem.only(uas)
-    (plan,) = standby_plans(problem, uas, None, 1.0)
+    (plan,) = fallback_plans(problem, uas, None, 1.0)
     assert first_trouble(alone, plan) is None
     assert objective_of(alone, plan) == pytest.approx(plan.objective, abs=2e-3)
 
 
-def test_the_rest_of_a_way_out_is_a_plan_with_the_objective_it_says(problem, by_nodes):
-    out = way_out(problem, by_nodes, 1.0)
-    plan, _ = standby_plans(problem, 0, out, 1.0)
+def test_the_rest_of_a_backup_is_a_plan_with_the_objective_it_says(problem, by_nodes):
+    out = backup_trajectory(problem, by_nodes, 1.0)
+    plan, _ = fallback_plans(problem, 0, out, 1.0)
     assert plan.covers.tolist() == by_nodes.covers[:1].tolist()
     assert objective_of(problem.only(0), plan) == pytest.approx(plan.objective, abs=2e-3)
 
@@ -241,8 +242,8 @@ def visits(problem, plan):
 
 
 def test_the_bounds_near_a_plan_leave_that_plan_possible(problem, by_nodes):
-    program = Program(problem)
-    lower, upper = program.near(by_nodes.x[:, :, :3], visits(problem, by_nodes))
+    program = RestrictedMilp(problem)
+    lower, upper = program.bounds_near(by_nodes.x[:, :, :3], visits(problem, by_nodes))
     assert (lower >= program.built.lower).all()
     assert (upper <= program.built.upper).all()
     assert (lower <= upper).all()
@@ -256,16 +257,16 @@ def test_the_bounds_near_a_flight_through_a_tower_widen_until_there_is_a_way_aro
     start = flight(S500, state((80.0, 86.0, -12.0)), [(6.0, 0.0, 0.0)] * 3)[-1]
     problem = toy(start, horizon=9, obstacles=[box((112.0, 80.0, -25.0), (122.0, 92.0, 0.0))])
     through = flight(S500, start, [(9.0, 0.0, 0.0)] * 9)[None, :, :3]
-    program, never = Program(problem), np.zeros((1, 0), np.int64)
+    program, never = RestrictedMilp(problem), np.zeros((1, 0), np.int64)
     found = []
-    for nearness in (NARROW, WIDE):
-        lower, upper = program.near(through, never, nearness)
+    for neighbourhood in (NARROW, WIDE):
+        lower, upper = program.bounds_near(through, never, neighbourhood)
         found.append(solve(program.built, OPTIMAL, lower=lower, upper=upper).values is not None)
     assert found == [False, True]
 
 
 def test_a_start_made_of_a_plan_can_be_completed_to_it(problem, by_nodes):
-    program = Program(problem)
+    program = RestrictedMilp(problem)
     columns, values = program.start(by_nodes.x[:, :, :3], visits(problem, by_nodes))
     assert set(values) <= {0.0, 1.0}
     lower, upper = program.built.lower.copy(), program.built.upper.copy()
@@ -277,7 +278,7 @@ def test_a_start_made_of_a_plan_can_be_completed_to_it(problem, by_nodes):
 
 def test_constructed_flights_start_here_cover_what_they_say_and_differ(problem):
     for uas in range(2):
-        found = flights(problem, uas, 1.0)
+        found = construct(problem, uas, 1.0)
         assert len({(f.visit < NEVER).tobytes() for f in found}) == len(found)
         for one in found:
             assert one.positions_m.shape == (8, 3)
@@ -289,12 +290,12 @@ def test_constructed_flights_start_here_cover_what_they_say_and_differ(problem):
 
 
 def test_a_flight_with_nothing_to_do_at_rest_stays_where_it_is():
-    (one,) = flights(toy(state((60.0, 60.0, -10.0)), horizon=8), 0, 1.0)
+    (one,) = construct(toy(state((60.0, 60.0, -10.0)), horizon=8), 0, 1.0)
     assert np.abs(one.positions_m - one.positions_m[0]).max() < 1e-6
 
 
 def test_a_flight_with_nothing_to_do_goes_straight_on():
-    (one,) = flights(toy(state((60.0, 60.0, -10.0), (5.0, 0.0, 0.0)), horizon=8), 0, 1.0)
+    (one,) = construct(toy(state((60.0, 60.0, -10.0), (5.0, 0.0, 0.0)), horizon=8), 0, 1.0)
     assert one.positions_m[-1, 0] > 100.0
     assert np.abs(one.positions_m[:, 1:] - (60.0, -10.0)).max() < 0.5
 
@@ -304,7 +305,7 @@ def test_flights_cover_within_the_waypoints_polyhedron_whatever_its_sides(sides)
     corner = ((85.0, 66.0, -10.0), 10.0)
     start = state((60.0, 60.0, -10.0), (8.0, 0.0, 0.0))
     problem = toy(start, horizon=8, waypoints=[corner], waypoint_sides=sides)
-    covering = [one for one in flights(problem, 0, 1.0) if one.visit[0] < NEVER]
+    covering = [one for one in construct(problem, 0, 1.0) if one.visit[0] < NEVER]
     assert covering
     for one in covering:
         out = ((one.positions_m - problem.waypoints_m[0]) @ sphere_faces(sides).T).max(axis=1)
@@ -314,7 +315,7 @@ def test_flights_cover_within_the_waypoints_polyhedron_whatever_its_sides(sides)
 def test_constructed_flights_can_be_flown(problem):
     reach = problem.reach.support(np.vstack([np.eye(3), -np.eye(3)]))
     for uas in range(2):
-        for one in flights(problem, uas, 1.0):
+        for one in construct(problem, uas, 1.0):
             sides = np.hstack([one.positions_m, -one.positions_m])
             assert (sides <= reach[uas] + 1e-9).all()
 
@@ -324,7 +325,7 @@ def test_how_deep_a_flight_enters_a_keep_out_zone_is_said():
     behind = [((95.0, 60.0, -10.0), 8.0)]
     wall = box((76.0, 40.0, -49.0), (80.0, 80.0, 0.0))
     free, walled = (
-        flights(toy(start, horizon=6, waypoints=behind, obstacles=hulls), 0, 1.0)
+        construct(toy(start, horizon=6, waypoints=behind, obstacles=hulls), 0, 1.0)
         for hulls in ([], [wall])
     )
     assert max(one.too_close_m for one in free) == 0.0
@@ -332,7 +333,7 @@ def test_how_deep_a_flight_enters_a_keep_out_zone_is_said():
 
 
 def test_a_team_has_one_flight_of_each_uas(problem):
-    pools = [flights(problem, uas, 1.0) for uas in range(2)]
+    pools = [construct(problem, uas, 1.0) for uas in range(2)]
     chosen = teams(problem, pools, keep=3)
     assert 1 <= len(chosen) <= 3
     for team in chosen:
@@ -344,7 +345,7 @@ def test_a_team_has_one_flight_of_each_uas(problem):
 def test_who_has_nothing_to_gain_flies_no_way_to_what_another_one_takes():
     starts = [state((60.0, 60.0, -10.0)), state((60.0, 35.0, -10.0))]
     problem = toy(*starts, horizon=9, waypoints=[((60.0, 72.0, -10.0), 8.0)])
-    pools = [flights(problem, uas, 1.0) for uas in range(2)]
+    pools = [construct(problem, uas, 1.0) for uas in range(2)]
     assert any((one.visit < NEVER).any() for one in pools[1])
     first, second = teams(problem, pools, keep=1)[0]
     assert (first.visit < NEVER).all()
@@ -364,7 +365,7 @@ def test_flights_that_come_too_close_make_no_good_team():
 
 
 def _as_flight(x):
-    return Flight(x[:, :3], np.zeros(0, np.int64), 0.0, 0.0)
+    return Trajectory(x[:, :3], np.zeros(0, np.int64), 0.0, 0.0)
 
 
 @pytest.mark.parametrize("sides", [0, 3, 6, 10])

@@ -11,18 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy
-from uas_coverage_baselines.milp_mpc.blocks import coverable
-from uas_coverage_baselines.milp_mpc.blocks.separation import from_obstacles
-from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.problem import Target, Tour, Weights
-from uas_coverage_baselines.milp_mpc.problem_file import read_problems, write_problems
-from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS, solve_lazily
-from uas_coverage_baselines.milp_mpc.reductions.bounds import rows_as_bounds
-from uas_coverage_baselines.milp_mpc.reductions.elimination import (
+from uas_coverage_baselines.milp_mpc.model.blocks import coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.separation import from_obstacles
+from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.problem import Target, Tour, Weights
+from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, solve_lazily
+from uas_coverage_baselines.milp_mpc.model.reductions.bounds import rows_as_bounds
+from uas_coverage_baselines.milp_mpc.model.reductions.elimination import (
     flown_states,
     motion_variables,
 )
-from uas_coverage_baselines.milp_mpc.reductions.travel import (
+from uas_coverage_baselines.milp_mpc.model.reductions.travel import (
     cliques,
     exclusive,
     partition,
@@ -264,7 +264,7 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         waypoint_sides=12,
         targets=[Target(np.array([80.0, 50.0, -5.0]), 0.2, 1), None],
         tours=(None, Tour(np.array([1]), np.eye(3)[:2], np.ones(2), 0.5, np.array([6.0]))),
-        weights=Weights(lift=0.3, homing=1.0),
+        weights=Weights(lift=0.3, return_home=1.0),
         dt_s=0.5,
         physical_sides=12,
         obstacle_sides=6,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from golden_lp import GOLDEN, compare, readable
 from toy_problems import box, moving, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import (
+from uas_coverage_baselines.milp_mpc.model.blocks import (
     Capabilities,
     Collision,
     CornerCutting,
@@ -16,7 +16,7 @@ from uas_coverage_baselines.milp_mpc.blocks import (
     Slack,
     TargetDistance,
 )
-from uas_coverage_baselines.milp_mpc.problem import Target
+from uas_coverage_baselines.milp_mpc.model.problem import Target
 
 CALM = state((50.0, 50.0, -10.0))
 NORTHBOUND = state((50.0, 50.0, -10.0), (6.0, 0.0, 0.0))

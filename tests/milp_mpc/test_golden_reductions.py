@@ -3,24 +3,24 @@
 import numpy as np
 from golden_lp import compare, readable
 from toy_problems import S500, box, state, toy
-from uas_coverage_baselines.milp_mpc.blocks import Obstacles, TargetDistance
-from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.ocp import shared_variables
-from uas_coverage_baselines.milp_mpc.problem import Target
-from uas_coverage_baselines.milp_mpc.reductions.aggregated import AggregatedBoxes
-from uas_coverage_baselines.milp_mpc.reductions.cliques import VisitCliques
-from uas_coverage_baselines.milp_mpc.reductions.elimination import (
+from uas_coverage_baselines.milp_mpc.model.blocks import Obstacles, TargetDistance
+from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.ocp import shared_variables
+from uas_coverage_baselines.milp_mpc.model.problem import Target
+from uas_coverage_baselines.milp_mpc.model.reductions.aggregated import AggregatedBoxes
+from uas_coverage_baselines.milp_mpc.model.reductions.cliques import VisitCliques
+from uas_coverage_baselines.milp_mpc.model.reductions.elimination import (
     BatteryFromThrust,
     MotionDynamics,
     motion_variables,
 )
-from uas_coverage_baselines.milp_mpc.reductions.first_visit import (
+from uas_coverage_baselines.milp_mpc.model.reductions.first_visit import (
     FirstVisit,
     without_coverage_state,
 )
-from uas_coverage_baselines.milp_mpc.reductions.lifted import LiftedBoxes
-from uas_coverage_baselines.milp_mpc.reductions.one_face import OneFacePerInterval
-from uas_coverage_baselines.milp_mpc.reductions.paper import PaperCornerCutting, PaperCoverage
+from uas_coverage_baselines.milp_mpc.model.reductions.lifted import LiftedBoxes
+from uas_coverage_baselines.milp_mpc.model.reductions.one_face import OneFacePerInterval
+from uas_coverage_baselines.milp_mpc.model.reductions.paper import PaperCornerCutting, PaperCoverage
 
 CALM = state((50.0, 50.0, -10.0))
 NORTHBOUND = state((50.0, 50.0, -10.0), (6.0, 0.0, 0.0))

@@ -6,7 +6,7 @@ import numpy as np
 from practice_missions import mission
 from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided, Options
 from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
-from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.order import Legs
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
@@ -34,7 +34,7 @@ def parked(leaves_at_s):
 
 
 def guide(scenario):
-    made = OrderGuide(scenario, Surroundings(scenario, REPEATABLE), TourShape())
+    made = OrderGuide(scenario, ProblemBuilder(scenario, REPEATABLE), TourShape())
     world = World(scenario)
     made.begin(world.swarm_state(), 0)
     return made, world
@@ -74,7 +74,7 @@ def test_a_lost_uass_waypoints_go_to_the_others():
 def test_a_blocked_place_is_left_aside_and_covered_once_it_opens():
     scenario = mission(PLACES, STARTS, moving_obstacles=[parked(25.0)])
     seen = World(scenario).swarm_state()
-    (blocked,) = Surroundings(scenario, REPEATABLE).blocked_waypoints(seen)
+    (blocked,) = ProblemBuilder(scenario, REPEATABLE).blocked_waypoints(seen)
     assert blocked == len(PLACES) - 1
     flight = rollout(scenario, MilpMpcGuided(REPEATABLE), seed=0)
     assert accomplished(flight)

@@ -3,7 +3,7 @@
 import highspy
 import numpy as np
 import pytest
-from uas_coverage_baselines.milp_mpc.milp import ABSENT, Milp
+from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 
 
 def dense(built):

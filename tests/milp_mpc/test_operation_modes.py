@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.modes import (
     Memory,
     Mode,
@@ -14,7 +15,6 @@ from uas_coverage_baselines.milp_mpc.modes import (
     target_of,
     update_modes,
 )
-from uas_coverage_baselines.milp_mpc.problem import Weights
 
 COVERING, TRANSIT, RETURN, LANDED = Mode
 WAYPOINTS = np.array(

@@ -37,7 +37,7 @@ def blocks():
     """Syntax tree of each block by module name."""
     return {
         path.stem: ast.parse(path.read_text(encoding="utf-8"))
-        for path in sorted((PACKAGE / "blocks").glob("*.py"))
+        for path in sorted((PACKAGE / "model" / "blocks").glob("*.py"))
         if path.stem != "__init__"
     }
 

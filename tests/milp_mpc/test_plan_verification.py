@@ -1,4 +1,4 @@
-"""What must not be flown is recognised, and every plan that is flown has a way out."""
+"""What must not be flown is recognised, and every plan that is flown has a backup trajectory."""
 
 import dataclasses
 
@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, box, flown, moving, state, toy
-from uas_coverage_baselines.milp_mpc.braking import BRAKING_S, way_out
-from uas_coverage_baselines.milp_mpc.problem import Plan
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, backup_trajectory
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
 from uas_coverage_env.vehicle import DOD, PHI, THETA, VX, VZ, WX, WZ, load_vehicle
 
@@ -168,58 +168,58 @@ commands = st.lists(
 @pytest.mark.parametrize(("vehicle", "dt_s"), [(S500, 1.0), (S500, 0.5), (HEXACOPTER, 1.0)])
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(commands=commands)
-def test_a_way_out_ends_in_a_hover_whatever_was_flown(vehicle, dt_s, commands):
+def test_a_backup_trajectory_ends_in_a_hover_whatever_was_flown(vehicle, dt_s, commands):
     sky = box((-500.0, -500.0, -500.0), (500.0, 500.0, 500.0))
     x, u = flown(vehicle, state((0.0, 0.0, 0.0)), np.array(commands), dt_s)
     problem = toy(x[0], horizon=len(u), vehicles=[vehicle], fence=sky, dt_s=dt_s)
-    out = way_out(problem, planned((x, u)), dt_s)
+    out = backup_trajectory(problem, planned((x, u)), dt_s)
     assert out.u.shape[1] == len(u) + np.ceil(BRAKING_S / dt_s)
     assert speeds_mps(out.x[:, -1]) < 0.1
     assert np.abs(out.x[:, -1, [PHI, THETA, WX, WX + 1, WZ]]).max() < 0.02
 
 
-def test_a_way_out_follows_a_plan_to_its_end_where_it_can():
+def test_a_backup_trajectory_follows_a_plan_to_its_end_where_it_can():
     plan = planned(ahead(), n_waypoints=2)
     plan.covers[0, 4, 1] = True
     problem = toy(START, horizon=8, waypoints=[(START[:3], 5.0)] * 2)
-    out = way_out(problem, plan, 1.0)
+    out = backup_trajectory(problem, plan, 1.0)
     assert out.x[:, :9] == pytest.approx(plan.x)
     assert out.u[:, :8] == pytest.approx(plan.u)
     assert np.argwhere(out.covers).tolist() == [[0, 4, 1]]
     assert first_trouble(problem, out) is None
 
 
-def test_a_way_out_leaves_the_plan_in_time_to_stop_before_the_wall():
+def test_a_backup_trajectory_leaves_the_plan_in_time_to_stop_before_the_wall():
     start = state((60.0, 60.0, -10.0), (8.0, 0.0, 0.0))
     plan = planned(ahead(start, [(8.0, 0.0, 0.0)] * 8), n_waypoints=1)
     plan.covers[0, 7, 0] = True
     wall = box((float(plan.x[0, 8, 0]) + 2.0, 0.0, -49.0), (150.0, 200.0, 0.0))
     problem = toy(start, horizon=8, obstacles=[wall], waypoints=[(start[:3], 5.0)])
     assert first_trouble(problem, plan) is None
-    out = way_out(problem, plan, 1.0)
+    out = backup_trajectory(problem, plan, 1.0)
     followed = int((np.abs(out.x[0, :9] - plan.x[0]).max(axis=1) < 1e-9).sum()) - 1
     assert 1 <= followed < 8
     assert not out.covers.any()
     assert first_trouble(problem, out) is None
     # to follow one step more would be one too many
     shorter = dataclasses.replace(plan, x=plan.x[:, : followed + 2], u=plan.u[:, : followed + 1])
-    longest = way_out(problem, shorter, 1.0)
+    longest = backup_trajectory(problem, shorter, 1.0)
     assert np.abs(longest.x[0, followed + 1, :3] - plan.x[0, followed + 1, :3]).max() > 1e-6
 
 
-def test_there_is_no_way_out_where_even_braking_after_the_first_step_hits():
+def test_there_is_no_backup_trajectory_where_even_braking_after_the_first_step_hits():
     start = state((60.0, 60.0, -10.0), (11.0, 0.0, 0.0))
     plan = planned(ahead(start, [(11.0, 0.0, 0.0)] * 2))
     wall = box((float(plan.x[0, 2, 0]) + 1.5, 0.0, -49.0), (150.0, 200.0, 0.0))
     problem = toy(start, horizon=2, obstacles=[wall])
     assert first_trouble(problem, plan) is None
-    assert way_out(problem, plan, 1.0) is None
+    assert backup_trajectory(problem, plan, 1.0) is None
 
 
 def test_moving_obstacles_fly_on_while_a_uas_brakes():
     plan = planned(ahead(commands=[(5.0, 0.0, 0.0)] * 4))
     problem = toy(START, horizon=4)
-    hover_m = way_out(problem, plan, 1.0).x[0, -1, :3]
+    hover_m = backup_trajectory(problem, plan, 1.0).x[0, -1, :3]
     # comes through the place of the hover 6 s after the plan's end
     approach = hover_m + (np.arange(5) - 10.0)[:, None] * np.array([0.0, 4.0, 0.0])
     problem = dataclasses.replace(
@@ -228,21 +228,21 @@ def test_moving_obstacles_fly_on_while_a_uas_brakes():
         moving_clearance_m=np.array([[1.0]]),
     )
     assert first_trouble(problem, plan) is None
-    out = way_out(problem, plan, 1.0)
+    out = backup_trajectory(problem, plan, 1.0)
     assert hover_m[0] - out.x[0, -1, 0] > 2.0  # it stops earlier, out of the way
 
 
-def test_a_way_out_is_made_for_those_that_fly():
+def test_a_backup_trajectory_is_made_for_those_that_fly():
     plan = planned(ahead(state((60.0, 61.0, -10.0))), ahead(), names="za")
-    out = way_out(toy(START, horizon=8), plan, 1.0)
+    out = backup_trajectory(toy(START, horizon=8), plan, 1.0)
     assert out.names == ("a",)
     assert out.x[0, :9] == pytest.approx(plan.x[1])
 
 
-def test_a_way_out_says_what_it_takes_from_the_battery():
+def test_a_backup_trajectory_says_what_it_takes_from_the_battery():
     plan = planned(ahead())
     problem = toy(START, horizon=8)
-    out = way_out(problem, plan, 1.0)
+    out = backup_trajectory(problem, plan, 1.0)
     taken = np.diff(out.x[0, 8:, DOD])
     hovering = problem.models[0].E[DOD]
     assert taken == pytest.approx(np.full(len(taken), hovering), rel=0.3)

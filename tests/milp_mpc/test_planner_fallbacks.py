@@ -1,4 +1,4 @@
-"""When no plan comes, the last one's way out is flown; nobody touches anything."""
+"""When no plan comes, the last one's backup trajectory is flown; nobody touches anything."""
 
 import dataclasses
 
@@ -7,9 +7,9 @@ import pytest
 from practice_missions import fly, mission, planner
 from toy_problems import flown
 from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
-from uas_coverage_baselines.milp_mpc.problem import Plan
-from uas_coverage_baselines.milp_mpc.reasons import Reason
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.world import Velocity, World, Wrench
@@ -123,7 +123,7 @@ def test_when_plans_stop_coming_the_nonlinear_plant_comes_to_a_hover_too(monkeyp
     assert np.abs(np.diff(positions[-5:], axis=0)).max() < 0.1
 
 
-def test_a_way_out_that_a_moving_obstacle_has_come_to_cross_is_not_flown(monkeypatch):
+def test_a_backup_trajectory_that_a_moving_obstacle_has_come_to_cross_is_not_flown(monkeypatch):
     balloon = {
         "name": "balloon",
         "radius_m": 5.0,
@@ -198,8 +198,8 @@ def test_a_hover_command_names_the_altitude_and_no_speed(monkeypatch):
     assert set(commands.values()) == {Velocity(0.0, 0.0, 1.0, mode="covering")}
 
 
-def test_a_plan_without_a_way_out_is_not_flown(monkeypatch):
-    monkeypatch.setattr(planner_module, "way_out", lambda *args, **rest: None)
+def test_a_plan_without_a_backup_trajectory_is_not_flown(monkeypatch):
+    monkeypatch.setattr(planner_module, "backup_trajectory", lambda *args, **rest: None)
     scenario = load_scenario("open_field")
     made = planner(scenario)
     commands = made.act(World(scenario).swarm_state())
@@ -255,14 +255,12 @@ def test_a_reset_forgets_the_last_mission(garden):
     assert made.act(world.swarm_state()) == first
 
 
-def test_a_decision_is_told_what_is_left_of_the_way_out_and_when_its_time_began(
-    monkeypatch, garden
-):
+def test_a_decision_is_told_what_is_left_of_the_backup_and_when_its_time_began(monkeypatch, garden):
     told = []
 
-    def decide(problem, *rest, out, began, **others):
-        told.append((problem, out, began))
-        return decide_in_earnest(problem, *rest, out=out, began=began, **others)
+    def decide(problem, *rest, backup, began, **others):
+        told.append((problem, backup, began))
+        return decide_in_earnest(problem, *rest, backup=backup, began=began, **others)
 
     monkeypatch.setattr(planner_module, "decide", decide)
     world, made = World(garden), planner(garden)

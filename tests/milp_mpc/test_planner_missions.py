@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from practice_missions import fly, mission, planner, with_uas
 from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.scenario import load_scenario

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
-from uas_coverage_baselines.milp_mpc.priority import seconds_saved
+from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
 
 from uas_coverage_env.scenario import load_scenario
 

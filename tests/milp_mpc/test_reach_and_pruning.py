@@ -5,9 +5,9 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import Capabilities, Dynamics, coverable
-from uas_coverage_baselines.milp_mpc.ocp import formulate
-from uas_coverage_baselines.milp_mpc.problem import Target
+from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics, coverable
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Target
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 

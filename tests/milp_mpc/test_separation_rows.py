@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, feasible, flight, moving, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import (
+from uas_coverage_baselines.milp_mpc.model.blocks import (
     Collision,
     CornerCutting,
     MovingObstacles,

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from toy_problems import S500, TO_OPTIMALITY, box, flight, state, toy
 from uas_coverage_baselines.milp_mpc import solvers
-from uas_coverage_baselines.milp_mpc.decision import Effort, decide
-from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.solvers import (
     SOLVERS,
     TOLERANCE,
@@ -22,7 +23,6 @@ from uas_coverage_baselines.milp_mpc.solvers import (
     interface,
     solver_named,
 )
-from uas_coverage_baselines.milp_mpc.verify import first_trouble
 
 from uas_coverage_env import InputError
 from uas_coverage_env.cli import main

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from golden_lp import compare, readable
 from toy_problems import FIELD, S500, TO_OPTIMALITY, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import TimeToGo
-from uas_coverage_baselines.milp_mpc.problem import Tour, Trajectories
-from uas_coverage_baselines.milp_mpc.reductions import FORMULATIONS
+from uas_coverage_baselines.milp_mpc.model.blocks import TimeToGo
+from uas_coverage_baselines.milp_mpc.model.problem import Tour, Trajectories
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 NORTHBOUND = state((50.0, 50.0, -10.0), (8.0, 0.0, 0.0))

@@ -3,9 +3,9 @@
 from itertools import product
 
 import numpy as np
-from uas_coverage_baselines.milp_mpc.milp import Milp
-from uas_coverage_baselines.milp_mpc.ocp import shared_variables
-from uas_coverage_baselines.milp_mpc.problem import MovingHull, PlanningProblem
+from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.ocp import shared_variables
+from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, PlanningProblem
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 

@@ -4,7 +4,7 @@ import independent_check
 import pytest
 from lively_missions import with_balloon
 from uas_coverage_baselines.milp_mpc import moving_horizon
-from uas_coverage_baselines.milp_mpc.reasons import Reason
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 

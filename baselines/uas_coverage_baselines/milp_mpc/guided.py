@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Target
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
-from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Target
-from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import Mode, SwarmState, World
 
@@ -64,9 +64,9 @@ class MilpMpcGuided(MovingHorizon[Options]):
             seed: of the search.
         """
         super().reset(scenario, seed)
-        self._around = Surroundings(scenario, self.options)
+        self._builder = ProblemBuilder(scenario, self.options)
         decision_s = self.options.threads * self.options.time_limit_s
-        self._guide = OrderGuide(scenario, self._around, TourShape(), decision_s)
+        self._guide = OrderGuide(scenario, self._builder, TourShape(), decision_s)
         world = World(scenario)
         world.reset()
         self._guide.begin(world.swarm_state(), seed)
@@ -77,18 +77,18 @@ class MilpMpcGuided(MovingHorizon[Options]):
         return "return" if name in self._returning else "covering"
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
-        """The OCP along everybody's order."""
+        """The OCP along the order of each UAS."""
         self._guide.update(swarm)
         ahead = self._guide.tours(swarm.active)
         index = np.concatenate(ahead).astype(np.int64)
         early = np.full(len(index), self.options.early_s)
-        problem = self._around.seen(swarm, self._weights, index, early)
+        problem = self._builder.seen(swarm, self._weights, index, early)
         rows = np.split(np.arange(len(index)), np.cumsum([len(a) for a in ahead])[:-1])
         tours = tuple(
             self._guide.tour(name, row) for name, row in zip(swarm.active, rows, strict=True)
         )
         targets = tuple(
-            Target(self._around.home_m[name], _HOMING_PER_M) if tour is None else None
+            Target(self._builder.home_m[name], _HOMING_PER_M) if tour is None else None
             for name, tour in zip(swarm.active, tours, strict=True)
         )
         self._returning = {n for n, t in zip(swarm.active, tours, strict=True) if t is None}

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.problem import Target, Weights
+from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 
 FloatArray = NDArray[np.float64]
 # distance counts at samples only: were it dearer than lift, a UAS would bob through its home
@@ -212,6 +212,6 @@ def target_of(
         distance = max(float(np.linalg.norm(home_m - now.position_m)), nearest)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
         growth = urgency / (1.0 - urgency) if now.uncovered.any() else 4.0
-        weight = min(weights.homing * growth / distance, _PER_METRE_MAX)
+        weight = min(weights.return_home * growth / distance, _PER_METRE_MAX)
         return Target(home_m, weight)
     return None

@@ -8,16 +8,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Generic, Self, TypeVar
 
-from uas_coverage_baselines.milp_mpc.block_names import block_named, checked
-from uas_coverage_baselines.milp_mpc.braking import still_holds, way_out
-from uas_coverage_baselines.milp_mpc.decision import Effort, decide
-from uas_coverage_baselines.milp_mpc.evasion import evasion
-from uas_coverage_baselines.milp_mpc.homing import WayHome
-from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
+from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.fallback.return_home import ReturnHome
+from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named, checked
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
-from uas_coverage_baselines.milp_mpc.problem import Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.reasons import Reason
-from uas_coverage_baselines.milp_mpc.turns import Turns
+from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
+from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
@@ -42,7 +42,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self.blocks = (*self._given, *(block_named(name) for name in options.blocks))
         self.last_decision: Decision | None = None
         self.plan: Plan | None = None  # what is left of the last plan, beginning now
-        self._way_out: Plan | None = None  # likewise, ending in a hover
+        self._backup: Plan | None = None  # likewise, ending in a hover
 
     @abstractmethod
     def problem(self, swarm: SwarmState) -> PlanningProblem:
@@ -67,50 +67,50 @@ class MovingHorizon(ABC, Generic[Chosen]):
         problem = rehearsal.problem(swarm)
         evasion(problem, scenario.dt_s)
         last = dataclasses.replace(swarm, step=scenario.max_steps)
-        rehearsal._way_home.turned_home(problem, last, None, ())
+        rehearsal._return_home.apply(problem, last, None, ())
 
     def reset(self, scenario: Scenario, seed: int) -> None:
         """Start a mission."""
         self.dt_s = scenario.dt_s
-        self.plan = self._way_out = None
-        self._turns = Turns()
-        self._way_home = WayHome(scenario, self.options.margin_m, self.blocks)
-        self._homing = frozenset[str]()  # UAS that fly home since their charge runs short
+        self.plan = self._backup = None
+        self._round_robin = RoundRobin()
+        self._return_home = ReturnHome(scenario, self.options.margin_m, self.blocks)
+        self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
         self.last_decision = None
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Decide for every active UAS: one step of Algorithm 1."""
         if not swarm.active:
             return {}
-        began, self._homing = time.perf_counter(), frozenset[str]()
+        began, self._returning_home = time.perf_counter(), frozenset[str]()
         problem = self.problem(swarm)
         found = decide(
             problem,
             self.plan,
             self.dt_s,
             self._effort(),
-            out=self._way_out,
+            backup=self._backup,
             began=began,
-            turns=self._turns,
+            round_robin=self._round_robin,
             blocks=self.blocks,
         )
-        plan = out = None
+        plan = backup = None
         if isinstance(found, Reason):
             reason = found
         else:
-            plan, out = found, way_out(problem, found, self.dt_s, self.blocks)
-            reason = Reason.NO_BACKUP if out is None else None
+            plan, backup = found, backup_trajectory(problem, found, self.dt_s, self.blocks)
+            reason = Reason.NO_BACKUP if backup is None else None
         if reason is not None:
-            plan = out = self._way_out
-            if out is None or not still_holds(problem, out, self.blocks):
-                plan = out = evasion(problem, self.dt_s)
+            plan = backup = self._backup
+            if backup is None or not still_holds(problem, backup, self.blocks):
+                plan = backup = evasion(problem, self.dt_s)
         renewed = () if reason or plan is None else plan.renewed
-        turned = self._way_home.turned_home(problem, swarm, out, renewed)
-        if turned is not None:
-            (plan, self._homing), out = turned, turned[0]
-        if plan is None or out is None:
+        returning = self._return_home.apply(problem, swarm, backup, renewed)
+        if returning is not None:
+            (plan, self._returning_home), backup = returning, returning[0]
+        if plan is None or backup is None:
             return self._hover(swarm, reason)
-        self.plan, self._way_out = plan.advanced(), out.advanced()
+        self.plan, self._backup = plan.advanced(), backup.advanced()
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
         self.last_decision = Decision(paths, reason is not None, gap, reason)
@@ -133,12 +133,12 @@ class MovingHorizon(ABC, Generic[Chosen]):
             float(wrench[TAU_X]),
             float(wrench[TAU_Y]),
             float(wrench[TAU_Z]),
-            mode="return" if name in self._homing else self.mode(name),
+            mode="return" if name in self._returning_home else self.mode(name),
         )
 
     def _hover(self, swarm: SwarmState, reason: Reason | None) -> dict[str, Command]:
-        """Brake and hold with the vehicle's inner loop: no plan has come, no way out holds."""
-        self.plan = self._way_out = None
+        """Brake and hold with the vehicle's inner loop: there is neither plan nor backup."""
+        self.plan = self._backup = None
         here = {name: swarm.x[swarm.names.index(name), 0:3] for name in swarm.active}
         paths = {name: position[None] for name, position in here.items()}
         self.last_decision = Decision(paths, fallback=True, reason=reason)

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
-from uas_coverage_baselines.milp_mpc.block_names import block_named
-from uas_coverage_baselines.milp_mpc.problem import Weights
+from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named
+from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.solvers import solver_named
 from uas_coverage_env.flight import PlannerOptions
 

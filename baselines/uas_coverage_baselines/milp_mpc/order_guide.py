@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.problem import Tour
-from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
+from uas_coverage_baselines.milp_mpc.model.problem import Tour
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.order import (
     Beginning,
     Effort,
@@ -63,11 +63,11 @@ class OrderGuide:
     def __init__(
         self,
         scenario: Scenario,
-        around: Surroundings,
+        builder: ProblemBuilder,
         shape: TourShape,
         decision_s: float = np.inf,
     ) -> None:
-        self._around, self._shape = around, shape
+        self._builder, self._shape = builder, shape
         self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(scenario)
         self._names = tuple(uas.name for uas in scenario.uas)
@@ -135,7 +135,7 @@ class OrderGuide:
         route = self._order.routes[uas]
         between = self._legs.between_s[self._legs.kind[uas]]
         until = np.concatenate([[0.0], np.cumsum(between[route[:-1], route[1:]])])
-        horizon_s = (1.0 + self._shape.beyond) * self._around.horizon_s
+        horizon_s = (1.0 + self._shape.beyond) * self._builder.horizon_s
         within = until[: len(route)] <= horizon_s
         return route[: min(int(within.sum()), self._shape.most)]
 
@@ -146,12 +146,12 @@ class OrderGuide:
         first_s = np.array([self._legs.from_here_s(u, x[u, 0:3]) for u in range(len(self._names))])
         idle_s = np.array([self._legs.way_home_s(u, x[u, 0:3]) for u in range(len(self._names))])
         left_s = np.array(
-            [self._around.seconds_left(n, x[u, DOD]) for u, n in enumerate(self._names)]
+            [self._builder.seconds_left(n, x[u, DOD]) for u, n in enumerate(self._names)]
         )
-        # nobody knows when a blocked waypoint opens: it is left aside as long as there is other
+        # when a blocked waypoint opens is not known: it is left aside as long as there is other
         # work, since an order that waits has no reason to be quick with the rest
         wanted, opens = swarm.uncovered.copy(), np.zeros(len(self._weight))
-        blocked = list(self._around.blocked_waypoints(swarm))
+        blocked = list(self._builder.blocked_waypoints(swarm))
         if self._order is not None and self._order.seconds.max() < _WAIT_WHEN_LEFT_S:
             self._waits = True
         if not self._waits:
@@ -178,6 +178,6 @@ class OrderGuide:
             neighbours=self._legs.neighbours,
             weight=self._weight,
             not_before_s=opens,
-            # who is not there any more can visit nothing
+            # a UAS that is not there any more can visit nothing
             budget_s=np.where(active, left_s - _RESERVE_S, -np.inf),
         )

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Target, Weights
 from uas_coverage_baselines.milp_mpc.modes import (
     Memory,
     Situation,
@@ -15,10 +17,8 @@ from uas_coverage_baselines.milp_mpc.modes import (
     update_modes,
 )
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
-from uas_coverage_baselines.milp_mpc.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
-from uas_coverage_baselines.milp_mpc.problem import PlanningProblem, Target, Weights
-from uas_coverage_baselines.milp_mpc.surroundings import Surroundings
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import Mode, SwarmState
@@ -40,7 +40,7 @@ class Options(MovingHorizonOptions):
         description="D_r,max over the distance from home to the fence's far corner",
     )
     weight_transit: float = weight(Weights.transit, "of the way to a transit target")
-    weight_homing: float = weight(Weights.homing, "of the way home")
+    weight_return_home: float = weight(Weights.return_home, "of the way home")
 
 
 class MilpMpc(MovingHorizon[Options]):
@@ -58,9 +58,9 @@ class MilpMpc(MovingHorizon[Options]):
         self._weights, self._choice = self.options.weights, TargetChoice()
 
     def reset(self, scenario: Scenario, seed: int) -> None:
-        """Start a mission; the planner draws no lots, so the seed changes nothing."""
+        """Start a mission; nothing is random in the planner, so the seed changes nothing."""
         super().reset(scenario, seed)
-        self._around = Surroundings(scenario, self.options)
+        self._builder = ProblemBuilder(scenario, self.options)
         self._memories = {uas.name: Memory() for uas in scenario.uas}
 
     def mode(self, name: str) -> Mode:
@@ -73,13 +73,13 @@ class MilpMpc(MovingHorizon[Options]):
         memories = update_modes(
             [self._memories[name] for name in swarm.active],
             situations,
-            self._around.waypoints_m,
+            self._builder.waypoints_m,
             self._planned_waypoints(),
-            self._around.blocked_waypoints(swarm),
+            self._builder.blocked_waypoints(swarm),
             self._choice,
         )
         self._memories.update(zip(swarm.active, memories, strict=True))
-        return self._around.problem(
+        return self._builder.problem(
             swarm,
             self._targets(swarm, situations),
             self._weights,
@@ -93,7 +93,7 @@ class MilpMpc(MovingHorizon[Options]):
             position_m=x[0:3],
             velocity_mps=x[3:6],
             dod=float(x[DOD]),
-            dod_return=self._around.dod_return(name, self.options.return_detour),
+            dod_return=self._builder.dod_return(name, self.options.return_detour),
             uncovered=swarm.uncovered,
             plans_coverage=covering or bool(self._still_planned(name)),
         )
@@ -114,11 +114,11 @@ class MilpMpc(MovingHorizon[Options]):
             name: target_of(
                 self._memories[name],
                 now,
-                self._around.home_m[name],
-                self._around.waypoints_m,
-                self._around.seconds_left(name, now.dod),
-                self._around.seconds_home(name, now.position_m),
-                self._around.horizon_m(name),
+                self._builder.home_m[name],
+                self._builder.waypoints_m,
+                self._builder.seconds_left(name, now.dod),
+                self._builder.seconds_home(name, now.position_m),
+                self._builder.horizon_m(name),
                 self._weights,
             )
             for name, now in zip(swarm.active, situations, strict=True)

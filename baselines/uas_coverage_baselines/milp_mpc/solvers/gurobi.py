@@ -16,7 +16,7 @@ import numpy as np
 from gurobipy import GRB
 from scipy import sparse
 
-from uas_coverage_baselines.milp_mpc.milp import BuiltMilp
+from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 from uas_coverage_baselines.milp_mpc.solvers.interface import (
     SOLVER_TOLERANCE,
     Claim,

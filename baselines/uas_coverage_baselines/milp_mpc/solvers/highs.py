@@ -11,7 +11,7 @@ import time
 import highspy
 import numpy as np
 
-from uas_coverage_baselines.milp_mpc.milp import BuiltMilp
+from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 from uas_coverage_baselines.milp_mpc.solvers.interface import (
     SOLVER_TOLERANCE,
     Claim,

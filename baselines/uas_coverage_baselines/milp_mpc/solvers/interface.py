@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.milp import BuiltMilp
+from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 
 FloatArray = NDArray[np.float64]
 Start = tuple[NDArray[np.int64], FloatArray]

@@ -12,7 +12,7 @@ import numpy as np
 import pyscipopt
 from pyscipopt.scip import PY_SCIP_PARAMSETTING, ExprCons
 
-from uas_coverage_baselines.milp_mpc.milp import BuiltMilp
+from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 from uas_coverage_baselines.milp_mpc.solvers.interface import (
     SOLVER_TOLERANCE,
     Claim,

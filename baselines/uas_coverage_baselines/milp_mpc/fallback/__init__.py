@@ -1,0 +1,1 @@
+"""What is flown when no plan comes, and what keeps a plan safe to the end."""

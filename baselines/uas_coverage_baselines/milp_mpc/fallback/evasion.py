@@ -1,0 +1,127 @@
+"""Getting out of the way: what is flown when no plan has come and hovering would end in harm.
+
+A backup trajectory ends in a hover, and it is verified for as long as it lasts. Something that
+moves may come to a UAS that hovers longer than that, or change its velocity towards it. Then each
+UAS, in turn, flies some seconds in one of a few directions and brakes, with the vehicle's inner
+loop; of these flights it takes the shortest that is clear of everything, or else the one that comes
+least too close. No solver is asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
+from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.vehicle import (
+    compile_vehicle,
+    lpv_step,
+    reseed_reference,
+    velocity_climb_wrench,
+)
+
+FloatArray = NDArray[np.float64]
+_PUSHES_S = (2.0, 5.0, 10.0)  # how long a direction is held
+_HEADINGS = 12
+_BETWEEN = np.linspace(0.0, 1.0, 4, endpoint=False)[:, None]  # points measured of each step
+
+
+def evasion(problem: PlanningProblem, dt_s: float) -> Plan | None:
+    """A flight of all UAS out of the way of everything, or as far as that is possible.
+
+    None where no UAS can do better than to brake at once.
+
+    Args:
+        problem: the decision; moving obstacles keep their velocities.
+        dt_s: sampling time.
+    """
+    steps = int(np.ceil((max(_PUSHES_S) + BRAKING_S) / dt_s))
+    ahead = replace(problem, moving=prolonged(problem, steps))
+    flights = [_flights(problem, uas, steps, dt_s) for uas in range(problem.n_uas)]
+    # the first flight of each is braking at once, which is kept where it is clear
+    chosen = [0] * problem.n_uas
+    alone = [_too_close(ahead, uas, x) for uas, (x, _) in enumerate(flights)]
+    for uas in np.argsort([cost[0] for cost in alone], kind="stable"):
+        x, _ = flights[uas]
+        cost = alone[uas].copy()
+        for other in range(problem.n_uas):
+            if other != uas:
+                apart = _dense(x[..., :3] - flights[other][0][chosen[other], :, :3])
+                away = np.maximum(np.hypot(apart[..., 0], apart[..., 1]), np.abs(apart[..., 2]))
+                cost += _squared(problem.separation_m[uas, other] - away)
+        moved_m = np.linalg.norm(x[:, -1, :3] - x[0, -1, :3], axis=1)
+        chosen[uas] = int(np.lexsort((moved_m, cost.round(6)))[0])
+    if not any(chosen):
+        return None
+    rows = [flights[uas][0][chosen[uas]] for uas in range(problem.n_uas)]
+    inputs = [flights[uas][1][chosen[uas]] for uas in range(problem.n_uas)]
+    covers = np.zeros((problem.n_uas, steps, problem.n_scenario_waypoints), bool)
+    return Plan(problem.names, np.array(rows), np.array(inputs), covers, 0.0, -np.inf)
+
+
+def _flights(
+    problem: PlanningProblem, uas: int, steps: int, dt_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """States (C, steps+1, 14) and inputs (C, steps, 5): braking, then the other directions."""
+    limits = problem.vehicles[uas].limits
+    record = compile_vehicle(problem.vehicles[uas], dt_s)[()]
+    angles = 2.0 * np.pi * np.arange(_HEADINGS) / _HEADINGS
+    level = [(0.0, 0.0)]
+    level += [(limits.v_xy_max_mps * np.cos(a), limits.v_xy_max_mps * np.sin(a)) for a in angles]
+    down = (0.0, -limits.v_up_max_mps, limits.v_down_max_mps)
+    pushes = [int(np.ceil(push_s / dt_s)) for push_s in _PUSHES_S]
+    ways = [(0.0, 0.0, 0.0, 0)]
+    ways += [(*a, d, push) for a, d, push in product(level, down, pushes) if (*a, d) != (0, 0, 0)]
+    flown = [_pushed(record, problem.x0[uas], *way, steps) for way in ways]
+    return np.array([x for x, _ in flown]), np.array([u for _, u in flown])
+
+
+def _too_close(problem: PlanningProblem, uas: int, x: FloatArray) -> FloatArray:
+    """(C,) how far flights are too close to obstacles, moving ones and the fence, squared, summed.
+
+    Where a UAS is too close already, getting out sooner is better.
+    """
+    path = _dense(x[..., :3])
+    cost = _squared(problem.fence.signed_distance(path) + problem.fence_margin_m)
+    for (_, hull), clearance in zip(
+        problem.obstacles, problem.obstacle_clearance_m[uas], strict=True
+    ):
+        cost += _squared(clearance - hull.signed_distance(path))
+    for moving, clearance in zip(problem.moving, problem.moving_clearance_m[uas], strict=True):
+        away = np.abs(path - _dense(moving.position_m[None, : x.shape[1]]))
+        level = np.hypot(away[..., 0], away[..., 1]) - moving.radius_m
+        cost += _squared(clearance - np.maximum(level, away[..., 2] - moving.half_height_m))
+    return cost
+
+
+def _dense(path: FloatArray) -> FloatArray:
+    """(C, 4 steps + 1, 3) points of straight segments; the path's own among them."""
+    start, way = path[:, :-1, None], np.diff(path, axis=1)[:, :, None]
+    between = (start + _BETWEEN * way).reshape(len(path), -1, 3)
+    return np.concatenate([between, path[:, -1:]], axis=1)
+
+
+def _squared(short_m: FloatArray) -> FloatArray:
+    return (np.maximum(short_m, 0.0) ** 2).sum(axis=1)
+
+
+@allocating_kernel
+def _pushed(vehicle, start, north_mps, east_mps, down_mps, push, steps):
+    """States (steps+1, 14) and inputs (steps, 5): a velocity for some steps, then braking."""
+    states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
+    x, reference = start.copy(), np.empty(2)
+    reseed_reference(x, reference)
+    states[0] = x
+    for step in range(steps):
+        go = 1.0 if step < push else 0.0
+        velocity_climb_wrench(
+            vehicle, x, reference, go * north_mps, go * east_mps, go * down_mps, inputs[step]
+        )
+        lpv_step(vehicle, x, inputs[step], x)
+        states[step + 1] = x
+    return states, inputs

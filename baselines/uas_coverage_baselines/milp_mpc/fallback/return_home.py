@@ -1,0 +1,169 @@
+"""Coming home without a solver: what a UAS flies whose charge runs short while no plan comes.
+
+A backup trajectory ends in a hover, which uses up the battery. Where a UAS has had no new plan and
+could soon not come home any more, it takes the way home that the world's guidance would fly (`GoTo`
+home), some steps of it and then the brakes, verified like any other backup trajectory. So at every
+later decision there is either more of the way home or the rest of this one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, brake, prolonged
+from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
+from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
+from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import (
+    DOD,
+    VX,
+    VZ,
+    compile_vehicle,
+    lpv_step,
+    reseed_reference,
+    velocity_climb_wrench,
+)
+from uas_coverage_env.world import COMMAND_DTYPE, SwarmState, build_arena, guide
+from uas_coverage_env.world.control import command_wrench
+
+FloatArray = NDArray[np.float64]
+_RESERVE_S = 30.0  # what is to be left at home, since other UAS may be in the way
+_PURSUED_S = (8.0, 4.0, 2.0, 1.0)  # how long the way home is followed before the brakes
+_LONGEST_WAY_S = 900.0
+
+
+class ReturnHome:
+    """The guidance's ways home in a scenario.
+
+    Args:
+        scenario: the mission; what its moving obstacles are going to do is not looked at.
+        margin_m: kept in addition to every safe distance.
+        blocks: of the OCP; what of their rows the guidance breaks is not flown.
+    """
+
+    def __init__(self, scenario: Scenario, margin_m: float, blocks: Sequence[Block] = OCP) -> None:
+        self._blocks = blocks
+        wider = [
+            obstacle.model_copy(update={"safe_distance_m": obstacle.safe_distance_m + margin_m})
+            for obstacle in scenario.obstacles
+        ]
+        fence = scenario.geofence
+        fence = fence.model_copy(update={"margin_m": fence.margin_m + margin_m})
+        self._arena = build_arena(
+            scenario.model_copy(
+                update={"obstacles": tuple(wider), "geofence": fence, "moving_obstacles": ()}
+            )
+        )
+        self._scenario = scenario
+        self._row = {uas.name: row for row, uas in enumerate(scenario.uas)}
+
+    def apply(
+        self,
+        problem: PlanningProblem,
+        swarm: SwarmState,
+        backup: Plan | None,
+        planned: Collection[str],
+    ) -> tuple[Plan, frozenset[str]] | None:
+        """The backup trajectories, some of them replaced by ways home; None where none is.
+
+        Args:
+            problem: the decision.
+            swarm: what is seen.
+            backup: what is flown otherwise; None: every UAS brakes.
+            planned: names of the UAS with a new plan, which sees to it itself.
+
+        Returns:
+            The backup trajectories, and the names of the UAS on their way home.
+        """
+        left_s = {
+            uas: self._left_at_home_s(problem, swarm, uas)
+            for uas, name in enumerate(problem.names)
+            if name not in planned
+        }
+        returning: list[str] = []
+        for uas in sorted(left_s, key=lambda uas: left_s[uas]):
+            if left_s[uas] >= _RESERVE_S:
+                break
+            for pursued_s in _PURSUED_S:
+                trial = self._replaced(problem, backup, uas, pursued_s)
+                moving = prolonged(problem, trial.u.shape[1])
+                if trouble(replace(problem, moving=moving), trial, self._blocks) is None:
+                    backup = trial
+                    returning.append(problem.names[uas])
+                    break
+        return None if backup is None or not returning else (backup, frozenset(returning))
+
+    def _left_at_home_s(self, problem: PlanningProblem, swarm: SwarmState, uas: int) -> float:
+        """Flight time that battery and mission still give once it is home; -inf: never there."""
+        rules, x = self._scenario, problem.x0[uas]
+        per_s, most = dod_per_s(problem.vehicles[uas]), float(problem.dod_max[uas])
+        clock_s = (rules.max_steps - swarm.step) * rules.dt_s
+        roughly_s = 3.0 * seconds_home(problem.vehicles[uas], problem.home_m[uas] - x[:3])
+        left_s = min((most - float(x[DOD])) / per_s, clock_s) - roughly_s
+        if left_s > _RESERVE_S:
+            return left_s
+        steps = int(np.ceil(_LONGEST_WAY_S / rules.dt_s))
+        states, _ = self._flown(problem, uas, steps, steps)
+        away_m = np.linalg.norm(states[:, :3] - problem.home_m[uas], axis=1)
+        slow = np.linalg.norm(states[:, VX : VZ + 1], axis=1) < rules.landing_speed_mps
+        there = np.flatnonzero((away_m <= rules.landing_distance_m) & slow)
+        if not len(there):
+            return -np.inf
+        battery_s = (most - float(states[there[0], DOD])) / per_s
+        return min(battery_s, clock_s - int(there[0]) * rules.dt_s)
+
+    def _replaced(
+        self, problem: PlanningProblem, backup: Plan | None, uas: int, pursued_s: float
+    ) -> Plan:
+        """The backup trajectories with that of one UAS replaced by its way home."""
+        dt_s = self._scenario.dt_s
+        pursued = max(round(pursued_s / dt_s), 1)
+        steps = pursued + int(np.ceil(BRAKING_S / dt_s))
+        steps = steps if backup is None else max(steps, backup.u.shape[1])
+        flown = []
+        for row, name in enumerate(problem.names):
+            if row == uas:
+                flown.append(self._flown(problem, row, pursued, steps))
+                continue
+            x, u = problem.x0[row, None], np.zeros((0, 5))
+            if backup is not None:
+                x, u = backup.x[backup.of(name)], backup.u[backup.of(name)]
+            record = compile_vehicle(problem.vehicles[row], dt_s)[()]
+            states, inputs = brake(record, x[-1], steps - len(u))
+            flown.append((np.vstack([x, states]), np.vstack([u, inputs])))
+        x, u = (np.array([flight[k] for flight in flown]) for k in range(2))
+        covers = np.zeros((problem.n_uas, steps, problem.n_scenario_waypoints), bool)
+        return Plan(problem.names, x, u, covers, 0.0, -np.inf)
+
+    def _flown(
+        self, problem: PlanningProblem, uas: int, pursued: int, steps: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """States (steps+1, 14) and inputs (steps, 5) of the way home, then the brakes."""
+        command = np.zeros(1, COMMAND_DTYPE)
+        row = self._row[problem.names[uas]]
+        return _homeward(self._arena, row, problem.x0[uas], pursued, steps, command)
+
+
+@allocating_kernel
+def _homeward(arena, i, start, pursued, steps, commands):
+    states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
+    x, reference = start.copy(), np.empty(2)
+    vehicle, command = arena.vehicles[i], commands[0]
+    reseed_reference(x, reference)
+    states[0] = x
+    for step in range(steps):
+        if step < pursued:
+            guide(arena, i, x, reference, -1, True, False, command)
+            command_wrench(vehicle, x, reference, command, inputs[step])
+        else:
+            velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[step])
+        lpv_step(vehicle, x, inputs[step], x)
+        states[step + 1] = x
+    return states, inputs

@@ -1,0 +1,120 @@
+"""Coming home with charge left: DoD_max as a constraint of the plan's end."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.model.energy import DETOUR, LANDING_S, SPEED_SHARE, dod_per_s
+from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
+from uas_coverage_env.geometry import cylinder_faces
+from uas_coverage_env.vehicle import DELTA_THRUST, DOD, U_TH, LinearModel
+
+FloatArray = NDArray[np.float64]
+_BATTERY = [DOD, U_TH]
+_ALLOWANCE_S = 16.0  # braking to a hover where the plan ends, and turning
+
+
+class BatteryReserve:
+    """DoD(N) + what flying home from p(N) takes <= DoD_max, per UAS.
+
+    The paper bounds DoD by the cutoff and leaves coming home to the return mode's threshold
+    (Sec. III-C.6); this is the terminal set that makes DoD_max a constraint. The flight home is
+    timed at nearly full speed with a detour, the descent and the landing one after the other
+    (`energy`), the horizontal norm from above by H_P faces (eq. (const_Vec_ub)): a row per face and
+    sense of the climb,
+
+        DoD(N) / rate + f · (p(N) - p_home) <= DoD_max / rate - landing - allowance + short,
+
+    in seconds of cruising. DoD(N) is written in Delta T, which the dynamics make it a function of,
+    so that the rows are the same whether the battery's states have columns or not.
+
+    It never makes the OCP infeasible: short >= 0 is bounded by what the left side exceeds the right
+    one by at most, over all reachable p(N) and all Delta T within its limits, so that every point
+    of the other rows has a `short` that fits. It is zero wherever it can be: a second of it costs
+    more than all coverage that is left to gain and all distance from home together. So a plan that
+    comes home in time is preferred to any that does not, and a UAS that is too late already flies
+    home as well as it can. Where nothing reachable is too far there are no rows at all.
+    """
+
+    def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
+        """Add the rows and the cost of each UAS whose reserve could fall short."""
+        for uas, name in enumerate(problem.names):
+            vehicle, model = problem.vehicles[uas], problem.models[uas]
+            faces, rate = _time_faces(problem, uas), dod_per_s(vehicle)
+            start, gain = _last_dod(model, problem.x0[uas, _BATTERY], problem.horizon)
+            room = _room_s(problem, uas) - start / rate + faces @ problem.home_m[uas]
+            thrust = vehicle.limits.delta_thrust_max_N, vehicle.limits.delta_thrust_min_N
+            most = np.maximum(gain * thrust[0], gain * thrust[1]).sum() / rate
+            excess = problem.reach.support(faces)[uas, -1] + most - room
+            if (excess <= 0.0).all():
+                continue
+            short = milp.variables(f"reserve.{name}.short", (1,), lower=0.0, upper=excess.max())
+            milp.subject_to(
+                f"reserve.{name}",
+                (faces, v.position[uas, -1][None, :]),
+                (gain / rate, v.u[uas, :, DELTA_THRUST][None, :]),
+                (-1.0, short[None, :]),
+                upper=room,
+                where=excess > 0.0,
+            )
+            milp.minimize(cost_per_s(problem), short)
+
+    def cost_along(self, problem: PlanningProblem, uas: int, flights: Trajectories) -> FloatArray:
+        """(S,) what falls short costs, 0 where states are not known."""
+        cost = np.zeros(len(flights.positions_m))
+        if flights.x is None:
+            return cost
+        for row, x in enumerate(flights.x):
+            cost[row] = cost_per_s(problem.only(uas)) * max(short_s(problem, uas, x[-1]), 0.0)
+        return cost
+
+
+def cost_per_s(problem: PlanningProblem) -> float:
+    """Cost of a second by which the reserve falls short; more than a plan can gain otherwise."""
+    distance = sum(target.weight * 100.0 for target in problem.targets if target is not None)
+    return 10.0 + problem.horizon * (float(problem.waypoint_weight.sum()) + distance)
+
+
+def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool = True) -> float:
+    """By how much charge falls short of the way home from a state; negative where some is left [s].
+
+    Args:
+        problem: the decision.
+        uas: row of the UAS.
+        x: (14,) the state.
+        allowance: whether it still has to brake to a hover.
+    """
+    way_s = float((_time_faces(problem, uas) @ (x[:3] - problem.home_m[uas])).max())
+    spent_s = float(x[DOD]) / dod_per_s(problem.vehicles[uas])
+    result = spent_s + way_s - _room_s(problem, uas)
+    return result if allowance else result - _ALLOWANCE_S
+
+
+def _room_s(problem: PlanningProblem, uas: int) -> float:
+    """Seconds of cruising in a battery that is full, less landing and allowance."""
+    full_s = float(problem.dod_max[uas]) / dod_per_s(problem.vehicles[uas])
+    return full_s - LANDING_S - _ALLOWANCE_S
+
+
+def _time_faces(problem: PlanningProblem, uas: int) -> FloatArray:
+    """(2 H_P, 3) rows whose largest value along the way from home is the time it takes [s/m]."""
+    limits = problem.vehicles[uas].limits
+    # the faces measure the norm from below by at most this factor
+    level = cylinder_faces(problem.physical_sides) / np.cos(np.pi / problem.physical_sides)
+    level = level * DETOUR / (SPEED_SHARE * limits.v_xy_max_mps)
+    down = np.array([0.0, 0.0, 1.0 / limits.v_down_max_mps])
+    return np.vstack([level + down, level - down])
+
+
+def _last_dod(model: LinearModel, battery: FloatArray, horizon: int) -> tuple[float, FloatArray]:
+    """DoD(N) = start + gain · Delta T, from the battery's rows of the dynamics; gain (N,)."""
+    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, DELTA_THRUST], model.E
+    gain, later = np.empty(horizon), np.eye(2)
+    start = battery
+    for n in range(horizon):
+        start = A @ start + E[_BATTERY]
+        gain[horizon - 1 - n] = later[0] @ B
+        later = later @ A
+    return float(start[0]), gain

@@ -1,0 +1,29 @@
+"""System dynamics (OCP_1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
+
+
+class Dynamics:
+    """x(n+1) = A x(n) + B u(n) + E with x(0) measured (Sec. III-C.1, eq. (OCP_1)).
+
+    The matrices are those of the measured depth of discharge, held over the horizon.
+    """
+
+    def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
+        """Add the rows; x(0) is fixed by the bounds of its columns."""
+        A = np.array([model.A for model in problem.models])
+        B = np.array([model.B for model in problem.models])
+        E = np.array([model.E for model in problem.models])
+        milp.subject_to(
+            "dynamics",
+            (1.0, v.x[:, 1:, :, None]),
+            (-A[:, None], v.x[:, :-1, None, :]),
+            (-B[:, None], v.u[:, :, None, :]),
+            lower=E[:, None, :],
+            upper=E[:, None, :],
+        )

@@ -1,0 +1,92 @@
+"""Blocks from outside the package: by the name of an entry point, or as MODULE:CLASS."""
+
+import importlib
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import entry_points
+from typing import Any
+
+from uas_coverage_baselines.milp_mpc.model.ocp import Block
+from uas_coverage_env.strict_toml import InputError
+
+GROUP = "uas_coverage.blocks"
+"""The entry-point group in which packages announce blocks by name."""
+
+
+def block_names() -> tuple[str, ...]:
+    """The names of the blocks that installed packages announce."""
+    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
+
+
+def block_named(name: str) -> Block:
+    """Make a block.
+
+    Args:
+        name: of an entry point in `GROUP`, or MODULE:OBJECT with a module that is installed or
+            lies in the current folder. The object is a block, or makes one without arguments.
+
+    Raises:
+        InputError: there is no such block; one line.
+    """
+    try:
+        found = _loaded(name)
+        block = found() if isinstance(found, type) or not hasattr(found, "add_to") else found
+    except InputError:
+        raise
+    except Exception as error:  # whatever a foreign module raises is one line for its user
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"block {name!r} cannot be made: {reason}") from error
+    return checked(block, name)
+
+
+def checked(block: Any, name: str = "") -> Block:
+    """The block, if it is one.
+
+    Raises:
+        InputError: it is a class, or has no method `add_to`.
+    """
+    if isinstance(block, type) or not callable(getattr(block, "add_to", None)):
+        raise InputError(
+            f"block {name or block!r} is no object with a method add_to(milp, variables, problem)"
+        )
+    return block
+
+
+def _loaded(name: str) -> Any:
+    module_name, colon, attribute = name.partition(":")
+    if not colon:
+        for entry in entry_points(group=GROUP):
+            if entry.name == name:
+                return entry.load()
+        known = ", ".join(block_names()) or "none is installed"
+        raise InputError(f"unknown block {name!r}; give MODULE:CLASS or a name ({known})")
+    if not module_name or not attribute:
+        raise InputError(f"block {name!r}: should be MODULE:CLASS, as in my_module:Ceiling")
+    with _current_folder():
+        try:
+            module = importlib.import_module(module_name)
+        except ModuleNotFoundError as error:
+            if error.name != module_name:
+                raise
+            raise InputError(
+                f"block {name!r}: there is no module {module_name!r}, neither installed nor in "
+                "the current folder"
+            ) from error
+    try:
+        return getattr(module, attribute)
+    except AttributeError as error:
+        raise InputError(f"block {name!r}: {module_name!r} has no {attribute!r}") from error
+
+
+@contextmanager
+def _current_folder() -> Iterator[None]:
+    """Modules of the current folder can be imported, after those that are installed."""
+    folder = os.getcwd()
+    importlib.invalidate_caches()
+    sys.path.append(folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)

@@ -1,0 +1,214 @@
+"""From the scenario and what is seen now to the `PlanningProblem` of one decision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
+from uas_coverage_baselines.milp_mpc.model.blocks import coverable
+from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
+from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
+from uas_coverage_baselines.milp_mpc.model.problem import (
+    MovingHull,
+    PlanningProblem,
+    Target,
+    Weights,
+)
+from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
+from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model, return_threshold
+from uas_coverage_env.world import SwarmState
+
+FloatArray = NDArray[np.float64]
+
+
+class ProblemBuilder:
+    """What stays the same over a mission, and the view of it at one sample."""
+
+    def __init__(self, scenario: Scenario, options: MovingHorizonOptions) -> None:
+        self.scenario, self._options = scenario, options
+        self.dt_s = scenario.dt_s
+        self.waypoints_m = np.array([w.position_m for w in scenario.waypoints], float)
+        self.home_m = {uas.name: np.array(uas.start_m, float) for uas in scenario.uas}
+        self._vehicles = dict(zip((u.name for u in scenario.uas), scenario.vehicles, strict=True))
+        self._uas = {uas.name: uas for uas in scenario.uas}
+        self._obstacles = tuple(
+            (obstacle.name, hull)
+            for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+        )
+        factor = inner_factor(options.waypoint_sides, 3)
+        self._waypoint_reach_m = np.array([w.radius_m * factor for w in scenario.waypoints])
+        self._waypoint_weight = np.array([w.weight for w in scenario.waypoints], float)
+
+    def vehicle(self, name: str) -> VehicleParams:
+        """Parameters of a UAS's vehicle."""
+        return self._vehicles[name]
+
+    def dod_return(self, name: str, detour: float) -> float:
+        """DoD_r (Sec. III-C.6, return mode).
+
+        D_r,max, the overestimated way home, is `detour` times the way to the fence's far corner.
+        """
+        vehicle, uas = self._vehicles[name], self._uas[name]
+        corners = self.scenario.fence.vertices_m - self.home_m[name]
+        farthest_m = float(np.linalg.norm(corners, axis=1).max())
+        way_s = detour * farthest_m / vehicle.limits.v_cruise_mps
+        return return_threshold(vehicle, uas.dod_max, way_s)
+
+    def seconds_left(self, name: str, dod: float) -> float:
+        """Flight time until DoD_max, at the pace of cruising."""
+        return (self._uas[name].dod_max - dod) / dod_per_s(self._vehicles[name])
+
+    def seconds_home(self, name: str, position_m: FloatArray) -> float:
+        """Flight time home, with a detour and the landing, see `energy`."""
+        return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
+
+    @property
+    def horizon_s(self) -> float:
+        """How long a plan lasts."""
+        return self._options.horizon * self.dt_s
+
+    def horizon_m(self, name: str) -> float:
+        """How far a UAS cruises within the horizon."""
+        return self._options.horizon * self.dt_s * self._vehicles[name].limits.v_cruise_mps
+
+    def blocked_waypoints(self, swarm: SwarmState) -> set[int]:
+        """Waypoints whose whole inner polyhedron lies in a moving obstacle's keep-out, now."""
+        blocked: set[int] = set()
+        for row, obstacle in enumerate(self.scenario.moving_obstacles):
+            keep_out = obstacle.safe_distance_m + max(u.radius_m for u in self.scenario.uas)
+            away = np.abs(self.waypoints_m - swarm.moving_position_m[row])
+            reach = self._waypoint_reach_m
+            level = np.hypot(away[:, 0] + reach, away[:, 1] + reach)
+            inside = level < obstacle.radius_m + keep_out
+            inside &= away[:, 2] + reach < 0.5 * obstacle.height_m + keep_out
+            blocked |= set(np.flatnonzero(inside).tolist())
+        return blocked
+
+    def problem(
+        self,
+        swarm: SwarmState,
+        targets: Mapping[str, Target | None],
+        weights: Weights,
+        priority_per_s: float,
+    ) -> PlanningProblem:
+        """The paper's decision: open waypoints, but those that no UAS can reach in time.
+
+        Args:
+            swarm: what is seen.
+            targets: of each active UAS; waypoints are the scenario's rows.
+            weights: cost coefficients.
+            priority_per_s: added to W_Phi per second saved, see `priority`.
+        """
+        open_now = np.flatnonzero(swarm.uncovered)
+        problem = self.seen(swarm, weights, open_now, self._waypoint_weight[open_now])
+        near = np.flatnonzero(coverable(problem).any(axis=(0, 1)))
+        index = open_now[near]
+        weight = self._waypoint_weight[index]
+        if priority_per_s > 0.0:
+            speed = min(vehicle.limits.v_xy_max_mps for vehicle in problem.vehicles)
+            saved = seconds_saved(self.waypoints_m[open_now], speed, near)
+            weight = weight + priority_per_s * saved
+        return replace(
+            problem,
+            waypoints_m=self.waypoints_m[index],
+            waypoint_reach_m=self._waypoint_reach_m[index],
+            waypoint_weight=weight,
+            waypoint_index=index,
+            targets=tuple(_in_rows(targets[name], index) for name in problem.names),
+        )
+
+    def seen(
+        self,
+        swarm: SwarmState,
+        weights: Weights,
+        waypoints: NDArray[np.int64],
+        waypoint_weight: FloatArray,
+    ) -> PlanningProblem:
+        """What is seen now, about the given waypoints, which are the scenario's rows."""
+        options, names = self._options, swarm.active
+        obstacles = self._within_reach(swarm)
+        rows = [swarm.names.index(name) for name in names]
+        x0 = swarm.x[rows]
+        uas = [self._uas[name] for name in names]
+        radius = np.array([u.radius_m for u in uas])
+        fixed = np.array([self.scenario.obstacles[o].safe_distance_m for o in obstacles])
+        moving = np.array([o.safe_distance_m for o in self.scenario.moving_obstacles])
+        vehicles = tuple(self._vehicles[name] for name in names)
+        return PlanningProblem(
+            names=names,
+            vehicles=vehicles,
+            models=tuple(
+                linear_model(vehicle, float(x[DOD]), self.dt_s)
+                for vehicle, x in zip(vehicles, x0, strict=True)
+            ),
+            x0=x0,
+            horizon=options.horizon,
+            fence=self.scenario.fence,
+            fence_margin_m=self.scenario.geofence.margin_m + min(options.margin_m, 0.1),
+            obstacles=tuple(self._obstacles[o] for o in obstacles),
+            obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
+            moving=self._predicted(swarm),
+            moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
+            separation_m=(
+                radius[:, None] + radius + self.scenario.uas_safe_distance_m + options.margin_m
+            ),
+            waypoints_m=self.waypoints_m[waypoints],
+            waypoint_reach_m=self._waypoint_reach_m[waypoints],
+            waypoint_weight=waypoint_weight,
+            waypoint_index=waypoints,
+            n_scenario_waypoints=len(self.waypoints_m),
+            home_m=np.array([self.home_m[name] for name in names]),
+            dod_max=np.array([u.dod_max for u in uas]),
+            targets=(None,) * len(names),
+            dt_s=self.dt_s,
+            weights=weights,
+            obstacle_sides=options.obstacle_sides,
+            waypoint_sides=options.waypoint_sides,
+        )
+
+    def _within_reach(self, swarm: SwarmState) -> list[int]:
+        """Obstacles that some UAS could come near, within the horizon or braking after it.
+
+        By boxes: a UAS that flies straight at full speed all the time does not get to the others.
+        """
+        near_m = max(u.radius_m for u in self.scenario.uas) + self._options.margin_m
+        result = []
+        rows = [swarm.names.index(name) for name in swarm.active]
+        speed = [self._vehicles[name].limits.v_xy_max_mps for name in swarm.active]
+        # at most: the corners of the speed's polygon, and what a UAS flies while it brakes
+        way_m = 1.1 * np.array(speed) * (self.horizon_s + BRAKING_S)
+        for o, (obstacle, (_, hull)) in enumerate(
+            zip(self.scenario.obstacles, self._obstacles, strict=True)
+        ):
+            low, high = hull.vertices_m.min(axis=0)[:2], hull.vertices_m.max(axis=0)[:2]
+            here = swarm.x[rows, 0:2]
+            apart = np.linalg.norm(np.maximum(np.maximum(low - here, here - high), 0.0), axis=1)
+            if (apart <= way_m + near_m + obstacle.safe_distance_m).any():
+                result.append(o)
+        return result
+
+    def _predicted(self, swarm: SwarmState) -> tuple[MovingHull, ...]:
+        steps = np.arange(self._options.horizon + 1)[:, None] * self.dt_s
+        return tuple(
+            MovingHull(
+                obstacle.name,
+                swarm.moving_position_m[row] + steps * swarm.moving_velocity_mps[row],
+                obstacle.radius_m,
+                0.5 * obstacle.height_m,
+            )
+            for row, obstacle in enumerate(self.scenario.moving_obstacles)
+        )
+
+
+def _in_rows(target: Target | None, index: NDArray[np.int64]) -> Target | None:
+    """The target with its waypoint as a row of the problem; one out of reach relaxes nothing."""
+    if target is None or target.waypoint is None:
+        return target
+    rows = np.flatnonzero(index == target.waypoint)
+    return replace(target, waypoint=int(rows[0]) if len(rows) else None)

@@ -1,0 +1,121 @@
+"""What the planner makes of a scenario and of what it sees."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from practice_missions import mission, obstacle, with_uas
+from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
+from uas_coverage_baselines.milp_mpc.planner import Options
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+
+from uas_coverage_env.world import LANDED, Velocity, World
+
+PLACES = [((60.0, 50.0, -6.0), 8.0), ((50.0, 75.0, -6.0), 8.0), ((190.0, 190.0, -20.0), 8.0)]
+STARTS = [(50.0, 50.0, -1.0), (50.0, 90.0, -1.0)]
+BALLOON = {
+    "name": "balloon",
+    "radius_m": 10.0,
+    "height_m": 20.0,
+    "safe_distance_m": 3.0,
+    "start_m": (60.0, 20.0, -6.0),
+    "schedule": [{"from_s": 0.0, "velocity_mps": (0.0, 2.0, -0.5)}],
+}
+
+
+@pytest.fixture
+def scenario():
+    shed = obstacle((80.0, 40.0, -12.0), (90.0, 50.0, 0.0))
+    made = mission(PLACES, STARTS, obstacles=[shed], moving_obstacles=[BALLOON])
+    return with_uas(made, 1, vehicle="hexacopter", radius_m=0.5, soc_0=0.6)
+
+
+@pytest.fixture
+def around(scenario):
+    return ProblemBuilder(scenario, Options(horizon=9))
+
+
+def seen(scenario, **changes):
+    world = World(scenario)
+    world.step({name: Velocity(0.0, 0.0, 3.0) for name in world.names})
+    return dataclasses.replace(world.swarm_state(), **changes)
+
+
+def without_targets(scenario):
+    return dict.fromkeys(uas.name for uas in scenario.uas)
+
+
+def test_clearances_are_the_sums_that_the_paper_writes_and_the_margins(scenario, around):
+    problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
+    options = Options()
+    assert problem.obstacle_clearance_m == pytest.approx(
+        np.array([[0.36 + 2.0], [0.5 + 2.0]]) + options.margin_m
+    )
+    assert problem.moving_clearance_m == pytest.approx(
+        np.array([[0.36 + 3.0], [0.5 + 3.0]]) + options.moving_margin_m
+    )
+    assert problem.separation_m[0, 1] == pytest.approx(0.36 + 0.5 + 5.0 + options.margin_m)
+    assert 0.5 <= problem.fence_margin_m <= 0.5 + options.margin_m
+
+
+def test_each_uas_is_planned_with_its_own_vehicle_and_its_own_battery(scenario, around):
+    problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
+    assert [vehicle.airframe.n_motors for vehicle in problem.vehicles] == [4, 6]
+    assert not np.array_equal(problem.models[0].B, problem.models[1].B)
+    assert problem.horizon == 9
+
+
+def test_moving_obstacles_are_predicted_at_the_velocity_that_is_seen(scenario, around):
+    swarm = seen(scenario)
+    (balloon,) = around.problem(swarm, without_targets(scenario), Weights(), 0.15).moving
+    assert balloon.position_m.shape == (10, 3)
+    assert balloon.position_m[0] == pytest.approx([60.0, 22.0, -6.5])
+    assert np.diff(balloon.position_m, axis=0) == pytest.approx(np.tile([0.0, 2.0, -0.5], (9, 1)))
+    assert (balloon.radius_m, balloon.half_height_m) == (10.0, 10.0)
+
+
+def test_waypoints_that_nobody_reaches_within_the_horizon_are_left_out(scenario, around):
+    problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
+    assert problem.waypoint_index.tolist() == [0, 1]
+    assert problem.n_scenario_waypoints == 3
+    assert problem.waypoint_reach_m == pytest.approx([4.0, 4.0])
+
+
+def test_covered_waypoints_are_left_out_and_targets_follow_the_new_rows(scenario, around):
+    swarm = seen(scenario, uncovered=np.array([False, True, True]))
+    targets = {
+        "uas_1": Target(np.array(PLACES[1][0]), 0.1, waypoint=1),
+        "uas_2": Target(np.array(PLACES[2][0]), 0.2, waypoint=2),
+    }
+    problem = around.problem(swarm, targets, Weights(), 0.15)
+    assert problem.waypoint_index.tolist() == [1]
+    near, far = problem.targets
+    assert near == dataclasses.replace(targets["uas_1"], waypoint=0)
+    # out of reach it cannot be covered within the horizon: nothing relaxes the distance
+    assert far == dataclasses.replace(targets["uas_2"], waypoint=None)
+
+
+def test_landed_uas_are_no_part_of_the_problem(scenario, around):
+    swarm = seen(scenario, status=np.array([LANDED, 0]))
+    problem = around.problem(swarm, without_targets(scenario), Weights(), 0.15)
+    assert problem.names == ("uas_2",)
+    assert problem.x0 == pytest.approx(swarm.x[1:])
+    assert problem.separation_m.shape == (1, 1)
+
+
+def test_a_waypoint_wholly_inside_a_moving_obstacles_keep_out_is_blocked(scenario, around):
+    inside = seen(scenario, moving_position_m=np.array([[60.0, 50.0, -6.0]]))
+    beside = seen(scenario, moving_position_m=np.array([[60.0, 62.0, -6.0]]))
+    above = seen(scenario, moving_position_m=np.array([[60.0, 50.0, -25.0]]))
+    assert around.blocked_waypoints(inside) == {0}
+    assert around.blocked_waypoints(beside) == set()
+    assert around.blocked_waypoints(above) == set()
+
+
+def test_the_battery_gives_less_time_and_the_way_home_takes_more_the_farther_out(around):
+    left = [around.seconds_left("uas_1", dod) for dod in (0.0, 0.3, 0.6, 0.75)]
+    assert (np.diff(left) < 0.0).all()
+    assert left[-1] == pytest.approx(0.0)
+    away = [around.seconds_home("uas_1", np.array([50.0 + d, 50.0, -1.0])) for d in (0, 50, 100)]
+    assert (np.diff(away) > 0.0).all()
+    assert 0.0 < around.dod_return("uas_1", 2.5) < 0.75
