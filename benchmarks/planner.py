@@ -195,9 +195,9 @@ def restricted(
             best_teams = teams(problem, pools, 3)
             for uas in range(problem.n_uas):
                 own = problem.only(uas)
-                RestrictedMilp(own, FORMULATIONS[name])  # compile and warm up
+                RestrictedMilp(own, formulation=FORMULATIONS[name])  # compile and warm up
                 began = time.process_time()
-                program = RestrictedMilp(replace(own), FORMULATIONS[name])
+                program = RestrictedMilp(replace(own), formulation=FORMULATIONS[name])
                 build_s.append(time.process_time() - began)
                 paths = {team[uas].visit.tobytes(): team[uas] for team in best_teams}
                 for flight in paths.values():
