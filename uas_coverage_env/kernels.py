@@ -72,6 +72,15 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     return function.compile(tuple(typeof(argument) for argument in arguments))
 
 
+def interpreted(kernel: Any) -> Callable[..., Any]:
+    """The Python function of a kernel: for the few calls that are not worth compiling.
+
+    It reads its first argument by name, so that any object with those attributes will do, but the
+    kernels that it calls are compiled.
+    """
+    return getattr(kernel, "py_func", kernel)
+
+
 def room(size: int) -> NDArray[np.float64]:
     """An array for the time of one call, in a kernel on the stack.
 

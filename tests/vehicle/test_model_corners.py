@@ -21,8 +21,7 @@ from uas_coverage_env.vehicle import (
 
 def changed(name, section, **values):
     """A shipped vehicle with some values of a section replaced."""
-    vehicle = load(name)
-    return vehicle.model_copy(update={section: getattr(vehicle, section).model_copy(update=values)})
+    return load(name).with_changes(**{section: values})
 
 
 def test_a_replay_that_empties_the_battery_says_at_which_sample():
@@ -77,13 +76,7 @@ def test_an_order_that_is_no_whole_number_is_refused(order):
 def test_a_step_too_long_for_the_drag_is_refused():
     body = {"drag_kgps": 4.5}
     slow = {"v_xy_max_mps": 1.0, "v_cruise_mps": 1.0}
-    vehicle = load("s500_v2")
-    kite = vehicle.model_copy(
-        update={
-            "airframe": vehicle.airframe.model_copy(update=body),
-            "limits": vehicle.limits.model_copy(update=slow),
-        }
-    )
+    kite = load("s500_v2").with_changes(airframe=body, limits=slow)
     assert 0.0 < linear_model(kite, 0.1, 0.25).A[VX, VX] < 1.0
     with pytest.raises(ValueError, match=r"dt_s is 2\.0.*drag"):
         linear_model(kite, 0.1, 2.0)

@@ -327,9 +327,7 @@ def test_a_battery_flown_beyond_empty_stays_the_battery_it_was(dt_s):
 def test_a_battery_at_its_limit_delivers_less_than_is_asked():
     """R_0 so high that hover is just possible: a climb draws the current of the most power."""
     vehicle = load("s500_v2")
-    weak = vehicle.model_copy(
-        update={"battery": vehicle.battery.model_copy(update={"resistance_0_ohm": 0.2})}
-    )
+    weak = vehicle.with_changes(battery={"resistance_0_ohm": 0.2, "voltage_min_V": 10.0})
     record = compile_vehicle(weak, 1.0)[()]
     x, u = at(50.0, dod=0.9), np.zeros(N_INPUTS)
     u[LIFT] = vehicle.limits.lift_max_N
@@ -342,12 +340,7 @@ def test_a_battery_at_its_limit_delivers_less_than_is_asked():
 
 
 def rotors(name, n_motors):
-    vehicle = load(name)
-    body = vehicle.airframe.model_copy(update={"n_motors": n_motors})
-    lift = {"lift_max_N": 1.0}
-    return vehicle.model_copy(
-        update={"airframe": body, "limits": vehicle.limits.model_copy(update=lift)}
-    )
+    return load(name).with_changes(airframe={"n_motors": n_motors}, limits={"lift_max_N": 1.0})
 
 
 @pytest.mark.parametrize("n_motors", [4, 5, 6, 7, 8, 12])

@@ -37,9 +37,9 @@ def test_the_shipped_vehicles_load_by_name(name):
 
 @pytest.mark.parametrize("as_type", [str, Path])
 def test_a_vehicle_loads_by_path(tmp_path, as_type):
-    path = changed_file(tmp_path, "mass_kg", "mass_kg = 2")
+    path = changed_file(tmp_path, "mass_kg", "mass_kg = 1.6")
     vehicle = load_vehicle(as_type(path))
-    assert vehicle.airframe.mass_kg == 2.0
+    assert vehicle.airframe.mass_kg == 1.6
     assert vehicle.battery == load_vehicle("s500_v2").battery
 
 

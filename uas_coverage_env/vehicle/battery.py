@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uas_coverage_env.vehicle.params import VehicleParams
+from uas_coverage_env.kernels import interpreted
+from uas_coverage_env.vehicle.parts import Battery, Parts, Power
+from uas_coverage_env.vehicle.powertrain import battery_current_A
 
 _SERIES_HOLDS = 2.0  # steps longer than this many time constants need the exponential itself
 _SOC_ROUNDING = 1e-9
@@ -30,15 +32,20 @@ class BatterySegment(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def battery_segments(vehicle: VehicleParams) -> tuple[BatterySegment, ...]:
+def battery_segments(vehicle: Parts) -> tuple[BatterySegment, ...]:
+    """The straight pieces of the discharge curve of a vehicle, see `segments_of`."""
+    return segments_of(vehicle.battery, vehicle.power)
+
+
+def segments_of(battery: Battery, power: Power) -> tuple[BatterySegment, ...]:
     """The straight pieces of the discharge curve, by depth of discharge.
 
     The current at constant power P, i = (E - sqrt(E² - 4 R_0 P)) / (2 R_0) with E the voltage
     behind R_0, is linearised at hover power, at the segment's own linearisation point and a fixed
     polarisation: the only choice that fits the published hover currents (docs/deviations.md).
     """
-    battery, power = vehicle.battery, vehicle.power
     R0 = battery.resistance_0_ohm
+    current_A = interpreted(battery_current_A)
     segments = []
     points = list(zip(battery.ocv_dod, battery.ocv_V, strict=True))
     for (dod, volt), (dod_end, volt_end), E in zip(
@@ -46,7 +53,7 @@ def battery_segments(vehicle: VehicleParams) -> tuple[BatterySegment, ...]:
     ):
         slope = (volt - volt_end) / (dod_end - dod)
         ocv = volt + slope * dod
-        current = (E - math.sqrt(E * E - 4.0 * R0 * power.hover_W)) / (2.0 * R0)
+        current = current_A(E, R0, power.hover_W)
         stiffness = E - 2.0 * R0 * current
         segments.append(
             BatterySegment(
@@ -62,13 +69,13 @@ def battery_segments(vehicle: VehicleParams) -> tuple[BatterySegment, ...]:
     return tuple(segments)
 
 
-def segment_at(vehicle: VehicleParams, dod: float) -> BatterySegment:
+def segment_at(vehicle: Parts, dod: float) -> BatterySegment:
     """The segment that holds at a depth of discharge; the last one beyond its end."""
     segments = battery_segments(vehicle)
     return next((s for s in segments if dod < s.dod_end), segments[-1])
 
 
-def open_circuit_voltage(vehicle: VehicleParams, dod: ArrayLike) -> NDArray[np.float64]:
+def open_circuit_voltage(vehicle: Parts, dod: ArrayLike) -> NDArray[np.float64]:
     """OCV(DoD), the discharge curve [V].
 
     Args:
@@ -82,7 +89,7 @@ def open_circuit_voltage(vehicle: VehicleParams, dod: ArrayLike) -> NDArray[np.f
     return np.asarray(np.interp(np.asarray(dod, float), battery.ocv_dod, battery.ocv_V))
 
 
-def polarisation_decay(vehicle: VehicleParams, dt_s: float, order: int = 4) -> float:
+def polarisation_decay(vehicle: Parts, dt_s: float, order: int = 4) -> float:
     """What a step leaves of u_th when no current flows: the series of exp(-dt/tau_th).
 
     The series of a pole that is fast for the step is no contraction any more; there the
@@ -94,7 +101,7 @@ def polarisation_decay(vehicle: VehicleParams, dt_s: float, order: int = 4) -> f
 
 
 def simulate_battery(
-    vehicle: VehicleParams, current_A: ArrayLike, soc_0: float, dt_s: float = 1.0
+    vehicle: Parts, current_A: ArrayLike, soc_0: float, dt_s: float = 1.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Replay a current through the battery (Gasche et al., Sec. II, Thevenin model).
 

@@ -126,15 +126,16 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     if dt_s < _DT_MIN_S:
         raise ValueError(f"dt_s is {dt_s}; the vehicle's inner loop needs {_DT_MIN_S} s at least")
     record = np.zeros(1, VEHICLE_DTYPE)
-    body, battery, limits = vehicle.airframe, vehicle.battery, vehicle.limits
+    battery, limits = vehicle.battery, vehicle.limits
     A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
     record["dt_s"] = dt_s
     record["axis_A"], record["axis_B"] = horizontal_axis(vehicle, dt_s)
     record["vertical_A"] = A[np.ix_([Z, VZ], [Z, VZ])]
     record["vertical_B"] = B[[Z, VZ], LIFT]
     record["yaw_B"] = 0.5 * dt_s * dt_s, dt_s
-    record["mass_kg"], record["weight_N"] = body.mass_kg, vehicle.weight_N
-    record["inertia_kgm2"] = body.inertia_kgm2
+    for name, value in vehicle.kernel_scalars().items():
+        record[name] = value
+    record["inertia_kgm2"] = vehicle.airframe.inertia_kgm2
     segments = battery_segments(vehicle)
     record["n_segments"] = len(segments)
     for row, segment in enumerate(segments):
@@ -169,34 +170,10 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     record["gain"] = gain
     record["n_governor_rows"] = len(rows)
     record["governor_rows"][0, :, : len(rows)] = rows.T
-    for name in (
-        "n_motors",
-        "drag_kgps",
-        "drag_vertical_kgps",
-        "gravity_mps2",
-        "arm_m",
-    ):
-        record[name] = getattr(body, name)
-    rotor, motor = vehicle.rotor, vehicle.motor
-    for name in (
-        "thrust_N_per_radps2",
-        "torque_Nm_per_radps2",
-        "propeller_radius_m",
-        "induced_power_factor",
-        "profile_power_advance_factor",
-        "air_density_kgpm3",
-    ):
-        record[name] = getattr(rotor, name)
     torques = _rotor_map(vehicle)
     record["rotor_map"][0, : len(torques)] = torques
     record["mixer"][0, : len(torques)] = _mixer(torques)
-    record["motor_speed_max_radps"] = rotor.speed_max_radps
-    record["back_emf_Vs_per_rad"] = motor.back_emf_Vs_per_rad
-    record["motor_resistance_ohm"] = motor.resistance_ohm
-    record["no_load_current_A"] = motor.no_load_current_A
-    record["esc_loss_W"] = vehicle.esc.constant_loss_W
-    record["esc_efficiency"] = vehicle.esc.efficiency
-    record["auxiliary_W"], record["hover_W"] = vehicle.power.auxiliary_W, vehicle.power.hover_W
+    record["hover_W"] = vehicle.power.hover_W
     return record.reshape(())
 
 

@@ -23,13 +23,22 @@ def electrical_power_W(vehicle, thrust_N):
 
 
 @kernel
+def battery_current_A(voltage_V, resistance_ohm, power_W):
+    """Current at which a voltage behind a resistance delivers a power: (E - √(E² - 4RP)) / 2R.
+
+    More power than there is is not delivered: then the current of the largest power flows, E / 2R.
+    """
+    root = math.sqrt(max(voltage_V * voltage_V - 4.0 * resistance_ohm * power_W, 0.0))
+    return (voltage_V - root) / (2.0 * resistance_ohm)
+
+
+@kernel
 def battery_operating_point(vehicle, dod, u_th_V, power_W):
     """Voltage and current at which the Thevenin battery delivers a power.
 
-    u_b i = P with u_b = OCV - u_th - R_0 i. More power than the battery has is not delivered: then
-    the current of its largest power flows, and the product of the two is less than was asked for.
+    u_b i = P with u_b = OCV - u_th - R_0 i; where the battery has less power than is asked for, the
+    product of the two is what it has.
     """
     E = open_circuit_V(vehicle, dod) - u_th_V
-    R0 = vehicle.resistance_0_ohm
-    current = (E - math.sqrt(max(E * E - 4.0 * R0 * power_W, 0.0))) / (2.0 * R0)
-    return E - R0 * current, current
+    current = battery_current_A(E, vehicle.resistance_0_ohm, power_W)
+    return E - vehicle.resistance_0_ohm * current, current

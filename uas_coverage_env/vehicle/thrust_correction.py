@@ -5,33 +5,72 @@ by the LPV model and the planner are fitted to it.
 """
 
 import math
+from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uas_coverage_env.kernels import kernel
-from uas_coverage_env.vehicle.compiled import compile_vehicle
-from uas_coverage_env.vehicle.params import ThrustCorrection, VehicleParams
+from uas_coverage_env.kernels import interpreted, kernel
+from uas_coverage_env.vehicle.parts import Parts, ThrustCorrection
 
 _NEWTON_STEPS = 8
 _IDLE = 0.05  # of the weight: rotors never stop
 _COSINE_MIN = 0.3  # beyond a tilt of 70 degrees the vertical thrust no longer grows
 
+MOST_BEYOND_TRIM_RAD = 0.25
+"""Tilts up to here beyond trim are what the tilt coefficient is fitted to."""
+
 
 @kernel
-def _induced_mps(hover_mps, across_mps, climb_mps):
-    """Induced velocity v_i of v_i sqrt(v_t² + (v_c + v_i)²) = v_h² (Glauert), climb not negative.
+def flow(phi, theta, psi, vx, vy, vz):
+    """Speed across the rotor disc and climb along its axis [m/s], of an attitude and a velocity."""
+    # the rotor axis, pointing down, in NED
+    ax = math.cos(phi) * math.sin(theta) * math.cos(psi) + math.sin(phi) * math.sin(psi)
+    ay = math.cos(phi) * math.sin(theta) * math.sin(psi) - math.sin(phi) * math.cos(psi)
+    az = math.cos(phi) * math.cos(theta)
+    climb = -(ax * vx + ay * vy + az * vz)
+    across = math.sqrt(max(vx * vx + vy * vy + vz * vz - climb * climb, 0.0))
+    return across, climb
 
-    The left side is convex and rises, so Newton's method from v_h, where it is too large, comes
-    down to the root without passing it; it has converged to the last digits after six steps.
+
+@kernel
+def static_thrust_in_flow(vehicle, thrust_N, across_mps, climb_mps):
+    """Thrust of a hovering rotor set that needs the same power as this thrust in this flow [N].
+
+    The induced velocity v_i solves v_i sqrt(v_t² + (v_c + v_i)²) = v_h² (Glauert), climb not
+    negative. The left side is convex and rises, so Newton's method from v_h, where it is too large,
+    comes down to the root without passing it; it has converged to the last digits after six steps.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        thrust_N: [N] of all rotors.
+        across_mps: [m/s] in the plane of the rotors.
+        climb_mps: [m/s] along their axis.
     """
-    induced = hover_mps
+    thrust = max(thrust_N, _IDLE * vehicle.weight_N)
+    n = vehicle.n_motors
+    radius = vehicle.propeller_radius_m
+    area = math.pi * radius * radius
+    hover = math.sqrt(thrust / (2.0 * vehicle.air_density_kgpm3 * n * area))
+    # shaft power of a static rotor set: c T^1.5
+    k_T = vehicle.thrust_N_per_radps2
+    c = vehicle.torque_Nm_per_radps2 / (k_T * math.sqrt(k_T * n))
+    root = math.sqrt(thrust)
+    kappa = vehicle.induced_power_factor
+    profile = c * thrust * root - kappa * thrust * hover
+    advance = across_mps / (root / math.sqrt(n * k_T) * radius)
+    # momentum theory fails in the vortex ring state: a descent is credited with half its power
+    axial = climb_mps if climb_mps >= 0.0 else 0.5 * climb_mps
+    ascent = max(climb_mps, 0.0)
+    induced = hover
     for _ in range(_NEWTON_STEPS):
-        axial = climb_mps + induced
-        through = math.sqrt(across_mps * across_mps + axial * axial)
-        slope = through + induced * axial / through
-        induced -= (induced * through - hover_mps * hover_mps) / slope
-    return induced
+        along = ascent + induced
+        through = math.sqrt(across_mps * across_mps + along * along)
+        slope = through + induced * along / through
+        induced -= (induced * through - hover * hover) / slope
+    power = kappa * thrust * induced + thrust * axial
+    power += profile * (1.0 + vehicle.profile_power_advance_factor * advance * advance)
+    return (max(power, 0.0) / c) ** (2.0 / 3.0)
 
 
 @kernel
@@ -48,30 +87,8 @@ def static_thrust(vehicle, thrust_N, phi, theta, psi, vx, vy, vz):
         vy: [m/s] east.
         vz: [m/s] down.
     """
-    thrust = max(thrust_N, _IDLE * vehicle.weight_N)
-    # the rotor axis, pointing down, in NED
-    ax = math.cos(phi) * math.sin(theta) * math.cos(psi) + math.sin(phi) * math.sin(psi)
-    ay = math.cos(phi) * math.sin(theta) * math.sin(psi) - math.sin(phi) * math.cos(psi)
-    az = math.cos(phi) * math.cos(theta)
-    climb = -(ax * vx + ay * vy + az * vz)
-    across = math.sqrt(max(vx * vx + vy * vy + vz * vz - climb * climb, 0.0))
-    n = vehicle.n_motors
-    radius = vehicle.propeller_radius_m
-    area = math.pi * radius * radius
-    hover = math.sqrt(thrust / (2.0 * vehicle.air_density_kgpm3 * n * area))
-    # shaft power of a static rotor set: c T^1.5
-    k_T = vehicle.thrust_N_per_radps2
-    c = vehicle.torque_Nm_per_radps2 / (k_T * math.sqrt(k_T * n))
-    root = math.sqrt(thrust)
-    kappa = vehicle.induced_power_factor
-    profile = c * thrust * root - kappa * thrust * hover
-    advance = across / (root / math.sqrt(n * k_T) * radius)
-    # momentum theory fails in the vortex ring state: a descent is credited with half its power
-    axial = climb if climb >= 0.0 else 0.5 * climb
-    induced = _induced_mps(hover, across, max(climb, 0.0))
-    power = kappa * thrust * induced + thrust * axial
-    power += profile * (1.0 + vehicle.profile_power_advance_factor * advance * advance)
-    return (max(power, 0.0) / c) ** (2.0 / 3.0)
+    across, climb = flow(phi, theta, psi, vx, vy, vz)
+    return static_thrust_in_flow(vehicle, thrust_N, across, climb)
 
 
 @kernel
@@ -85,44 +102,55 @@ def exact_delta_thrust(vehicle, lift_N, phi, theta, psi, vx, vy, vz):
     return static_thrust(vehicle, thrust, phi, theta, psi, vx, vy, vz) - vehicle.weight_N
 
 
-def fit_thrust_correction(vehicle: VehicleParams) -> ThrustCorrection:
+def fit_thrust_correction(vehicle: Parts, samples: int = 24) -> ThrustCorrection:
     """The coefficients of the piecewise-linear form, from the exact one.
 
-    Speed, climb and descent match the exact form at the vehicle's limits; the tilt coefficient is
-    a least-squares fit over accelerating and turning flight (braking is over-estimated: the
-    published power rises when braking, too).
+    Speed, climb and descent match the exact form at the vehicle's limits, and credit no flight
+    with less than hover power; the tilt coefficient is a least-squares fit over accelerating and
+    turning flight (braking is over-estimated: the published power rises when braking, too).
+
+    Args:
+        vehicle: parameters; thrust correction, power and battery are not read.
+        samples: speeds, tilts and directions of the least-squares fit; 12 come to 1 % of 24.
     """
-    record = compile_vehicle(vehicle, 1.0)[()]
-    limits, trim = vehicle.limits, vehicle.trim_tilt_rad_per_mps
-
-    def level(speed: float) -> float:
-        return exact_delta_thrust(record, 0.0, 0.0, -math.atan(trim * speed), 0.0, speed, 0.0, 0.0)
-
-    hover = level(0.0)
-    up, down = limits.v_up_max_mps, limits.v_down_max_mps
-    climb = exact_delta_thrust(record, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -up) - hover
-    descent = exact_delta_thrust(record, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, down) - hover
-    excess, extra = _tilted_flights(vehicle, record, level)
-    return ThrustCorrection(
-        speed_N_per_mps=level(limits.v_xy_max_mps) / limits.v_xy_max_mps,
-        climb_N_per_mps=climb / up,
-        descent_N_per_mps=-descent / down,
-        tilt_N_per_rad=float(excess @ extra / (excess @ excess)),
-    )
+    scalars, limits = vehicle.kernel_scalars(), vehicle.limits.model_dump()
+    return _fitted(tuple(scalars.items()), tuple(limits.items()), samples)
 
 
-def _tilted_flights(vehicle, record, level) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Tilt beyond trim and the thrust it costs, over a grid of accelerating and turning flight."""
-    limits, trim = vehicle.limits, vehicle.trim_tilt_rad_per_mps
+# a fleet asks for the same vehicle several times
+@lru_cache(maxsize=64)
+def _fitted(
+    scalars: tuple[tuple[str, float], ...], bounds: tuple[tuple[str, float], ...], samples: int
+) -> ThrustCorrection:
+    rotors, limits = SimpleNamespace(**dict(scalars)), SimpleNamespace(**dict(bounds))
+    weight_N = rotors.weight_N
+    trim = rotors.drag_kgps / weight_N
+
+    # not compiled: a vehicle that is only looked at would wait for it
+    def extra_N(phi: float, theta: float, vx: float, vz: float) -> float:
+        thrust_N = weight_N / (math.cos(phi) * math.cos(theta))
+        through = interpreted(flow)(phi, theta, 0.0, vx, 0.0, vz)
+        return interpreted(static_thrust_in_flow)(rotors, thrust_N, *through) - weight_N
+
+    def level_N(speed: float) -> float:
+        return extra_N(0.0, -math.atan(trim * speed), speed, 0.0)
+
+    fastest, up, down = limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps
     tilts, costs = [], []
-    middles = (np.arange(24) + 0.5) / 24
-    for speed in limits.v_xy_max_mps * middles:
-        for beyond in 0.25 * middles:
-            for direction in np.pi * (middles - 0.5):
+    middles = (np.arange(samples) + 0.5) / samples
+    for speed in (fastest * middles).tolist():
+        level = level_N(speed)
+        for beyond in (min(MOST_BEYOND_TRIM_RAD, limits.tilt_max_rad) * middles).tolist():
+            for direction in (np.pi * (middles - 0.5)).tolist():
                 theta = -math.atan(trim * speed) - beyond * math.cos(direction)
                 phi = beyond * math.sin(direction)
                 if math.hypot(theta, phi) <= limits.tilt_max_rad:
-                    cost = exact_delta_thrust(record, 0.0, phi, theta, 0.0, speed, 0.0, 0.0)
                     tilts.append(beyond)
-                    costs.append(cost - level(float(speed)))
-    return np.array(tilts), np.array(costs)
+                    costs.append(extra_N(phi, theta, speed, 0.0) - level)
+    excess, extra = np.array(tilts), np.array(costs)
+    return ThrustCorrection(
+        speed_N_per_mps=max(level_N(fastest) / fastest, 0.0),
+        climb_N_per_mps=max(extra_N(0.0, 0.0, 0.0, -up) / up, 0.0),
+        descent_N_per_mps=max(-extra_N(0.0, 0.0, 0.0, down) / down, 0.0),
+        tilt_N_per_rad=max(float(excess @ extra / (excess @ excess)), 0.0),
+    )

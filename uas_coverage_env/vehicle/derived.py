@@ -1,0 +1,81 @@
+"""What follows from the parts of a vehicle: hover power, nominal voltage, full throttle."""
+
+import math
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from uas_coverage_env.kernels import interpreted
+from uas_coverage_env.vehicle.parts import Parts
+from uas_coverage_env.vehicle.powertrain import battery_current_A, electrical_power_W
+
+_SMALL = 1e-4  # of the weight, for a difference quotient
+_DOD_POINTS = 201
+
+
+def power_W(vehicle: Parts, thrust_N: float) -> float:
+    """Battery power at a static thrust of all rotors, by the power train [W]."""
+    parts = SimpleNamespace(**vehicle.kernel_scalars())
+    return interpreted(electrical_power_W)(parts, thrust_N)
+
+
+def hover_power(vehicle: Parts) -> dict[str, float]:
+    """Power of the power train at the weight, and its slope there."""
+    weight_N, step_N = vehicle.weight_N, _SMALL * vehicle.weight_N
+    rise_W = power_W(vehicle, weight_N + step_N) - power_W(vehicle, weight_N - step_N)
+    return {"hover_W": power_W(vehicle, weight_N), "slope_W_per_N": rise_W / (2.0 * step_N)}
+
+
+def steady_current_A(vehicle: Parts, dod: float, power_W: float) -> float:
+    """Current of a power that has been drawn for a while, polarisation settled [A]."""
+    battery = vehicle.battery
+    voltage_V = float(np.interp(dod, battery.ocv_dod, battery.ocv_V))
+    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
+    return interpreted(battery_current_A)(voltage_V, resistance_ohm, power_W)
+
+
+def mean_voltage_V(vehicle: Parts, power_W: float) -> float:
+    """Mean voltage while a power is drawn from full to empty, by charge [V]."""
+    battery = vehicle.battery
+    dod = np.linspace(0.0, 1.0, _DOD_POINTS)
+    current = np.array([steady_current_A(vehicle, depth, power_W) for depth in dod.tolist()])
+    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
+    voltage = np.interp(dod, battery.ocv_dod, battery.ocv_V) - resistance_ohm * current
+    return float(np.trapezoid(voltage, dod))
+
+
+def full_throttle_radps(vehicle: Parts, voltage_V: float) -> float:
+    """Speed at which a motor under its propeller takes a voltage: K_e Ω + R k_Q Ω² / K_e + R i_0.
+
+    0 where the voltage does not turn it.
+    """
+    motor = vehicle.motor
+    load = motor.resistance_ohm * vehicle.rotor.torque_Nm_per_radps2 / motor.back_emf_Vs_per_rad
+    left_V = max(voltage_V - motor.resistance_ohm * motor.no_load_current_A, 0.0)
+    root = math.sqrt(motor.back_emf_Vs_per_rad**2 + 4.0 * load * left_V)
+    return (root - motor.back_emf_Vs_per_rad) / (2.0 * load)
+
+
+def figure_of_merit(vehicle: Parts) -> float:
+    """Power of an ideal hover, by momentum theory, over the shaft power of the rotors."""
+    rotor, n = vehicle.rotor, vehicle.airframe.n_motors
+    area_m2 = n * math.pi * rotor.propeller_radius_m**2
+    ideal = 1.0 / math.sqrt(2.0 * rotor.air_density_kgpm3 * area_m2)
+    shaft = rotor.torque_Nm_per_radps2 / rotor.thrust_N_per_radps2**1.5 / math.sqrt(n)
+    return ideal / shaft
+
+
+def around_hover(vehicle: Parts) -> dict[str, Any]:
+    """Nominal voltage of the battery, and where the current is linearised for hover.
+
+    In the middle of each segment of the discharge curve, with the polarisation of a hover.
+    """
+    battery, hover_W = vehicle.battery, vehicle.power.hover_W
+    voltage_V = mean_voltage_V(vehicle, hover_W)
+    return {
+        "voltage_nominal_V": voltage_V,
+        "polarisation_linearised_V": battery.resistance_th_ohm * hover_W / voltage_V,
+        "ocv_dod_linearised": tuple(0.5 * (a + b) for a, b in pairwise(battery.ocv_dod)),
+    }

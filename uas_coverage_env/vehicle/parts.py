@@ -1,0 +1,265 @@
+"""The parts of a vehicle as a file gives them: each field checked, alone and within its part."""
+
+import math
+from functools import cached_property
+from itertools import pairwise
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from uas_coverage_env.strict_toml import StrictModel
+
+ABSENT = math.nan
+"""Stands for a value that a file leaves out and `VehicleParams` computes."""
+
+
+def _within(low: float, high: float) -> Any:
+    """Bounds that no multicopter goes beyond; within them nothing that is computed overflows."""
+    return Field(ge=low, le=high)
+
+
+Force_N = Annotated[float, _within(1e-6, 1e6)]
+Inertia_kgm2 = Annotated[float, _within(1e-8, 1e5)]
+Length_m = Annotated[float, _within(1e-3, 100.0)]
+Speed_mps = Annotated[float, _within(0.01, 1000.0)]
+Rate = Annotated[float, _within(1e-3, 1000.0)]
+Resistance_ohm = Annotated[float, _within(1e-6, 100.0)]
+Voltage_V = Annotated[float, _within(0.1, 10_000.0)]
+Current_A = Annotated[float, _within(1e-3, 100_000.0)]
+Slope = Annotated[float, _within(0.0, 1000.0)]
+DodPoint = Annotated[float, _within(0.0, 1.0)]
+Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+def _computed(low: float, high: float) -> Any:
+    """Bounds of a value that may be left out, because it follows from the parts."""
+    return Field(ge=low, le=high, validate_default=False)
+
+
+class Airframe(StrictModel):
+    """Rigid body and rotor arrangement (the paper's Assumption 1: rotors equally spaced).
+
+    Neighbouring rotors turn against each other. Three rotors cannot balance their yaw torque that
+    way: of a tricopter, one rotor is taken to be tilted for it.
+    """
+
+    n_motors: Annotated[int, Field(ge=3, le=32)]
+    mass_kg: Annotated[float, _within(1e-3, 10_000.0)]
+    gravity_mps2: Annotated[float, _within(0.1, 100.0)]
+    arm_m: Length_m
+    first_arm_angle_rad: Annotated[float, _within(-10.0, 10.0)]
+    inertia_kgm2: tuple[Inertia_kgm2, Inertia_kgm2, Inertia_kgm2]
+    drag_kgps: Slope
+    drag_vertical_kgps: Slope
+
+
+class Rotor(StrictModel):
+    """One rotor with its propeller; full throttle is computed where it is left out."""
+
+    thrust_N_per_radps2: Annotated[float, _within(1e-12, 1.0)]
+    torque_Nm_per_radps2: Annotated[float, _within(1e-14, 1.0)]
+    propeller_radius_m: Length_m
+    induced_power_factor: Annotated[float, _within(1.0, 10.0)]
+    profile_power_advance_factor: Slope
+    air_density_kgpm3: Annotated[float, _within(1e-3, 100.0)]
+    speed_max_radps: Annotated[float, _computed(1.0, 100_000.0)] = ABSENT
+
+
+class Motor(StrictModel):
+    """One brushless motor, its speed controller's resistance included."""
+
+    back_emf_Vs_per_rad: Annotated[float, _within(1e-6, 10.0)]
+    resistance_ohm: Resistance_ohm
+    no_load_current_A: Annotated[float, _within(0.0, 1000.0)]
+
+
+class Esc(StrictModel):
+    """One electronic speed controller."""
+
+    constant_loss_W: Annotated[float, _within(0.0, 1e5)]
+    efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class Power(StrictModel):
+    """Battery power around hover; what the power train gives is computed where it is left out."""
+
+    auxiliary_W: Annotated[float, _within(0.0, 1e5)]
+    hover_W: Annotated[float, _computed(1e-3, 1e6)] = ABSENT
+    slope_W_per_N: Annotated[float, _computed(1e-3, 1e4)] = ABSENT
+
+
+class Battery(StrictModel):
+    """Thevenin battery with a piecewise-linear discharge curve.
+
+    Nominal voltage and linearisation points are computed where they are left out.
+    """
+
+    capacity_Ah: Annotated[float, _within(1e-3, 10_000.0)]
+    resistance_0_ohm: Resistance_ohm
+    resistance_th_ohm: Resistance_ohm
+    time_constant_th_s: Annotated[float, _within(0.01, 1e5)]
+    polarisation_linearised_V: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
+    ocv_dod: tuple[DodPoint, ...]
+    ocv_V: tuple[Voltage_V, ...]
+    ocv_dod_linearised: tuple[DodPoint, ...] = ()
+    voltage_nominal_V: Annotated[float, _computed(0.1, 10_000.0)] = ABSENT
+    voltage_min_V: Voltage_V
+    current_max_A: Current_A
+    dod_max: Fraction
+    dod_cutoff: Fraction
+
+    @model_validator(mode="after")
+    def _curve_falls(self) -> Self:
+        dod, volt = self.ocv_dod, self.ocv_V
+        if len(dod) != len(volt) or len(dod) < 2:
+            raise ValueError("ocv_dod and ocv_V need the same number of points, two at least")
+        if len(dod) > 9:
+            raise ValueError(f"ocv_dod has {len(dod)} points; give at most 9 (8 segments)")
+        if dod[0] != 0.0 or dod[-1] != 1.0:
+            raise ValueError(f"ocv_dod runs from {dod[0]} to {dod[-1]}; it must run from 0 to 1")
+        if any(b <= a for a, b in pairwise(dod)):
+            raise ValueError(f"ocv_dod is {list(dod)}; it must increase from point to point")
+        if any(b >= a for a, b in pairwise(volt)):
+            raise ValueError(f"ocv_V is {list(volt)}; it must fall from point to point")
+        if self.ocv_dod_linearised and len(self.ocv_dod_linearised) != len(dod) - 1:
+            raise ValueError(
+                f"ocv_dod_linearised has {len(self.ocv_dod_linearised)} values; "
+                f"give one for each of the {len(dod) - 1} segments"
+            )
+        if self.dod_max > self.dod_cutoff:
+            raise ValueError(
+                f"dod_max {self.dod_max} exceeds dod_cutoff {self.dod_cutoff}; lower it"
+            )
+        if self.voltage_min_V >= volt[0]:
+            raise ValueError(
+                f"voltage_min_V {self.voltage_min_V} exceeds the full battery's {volt[0]} V; "
+                "lower it"
+            )
+        return self
+
+    @property
+    def voltages_linearised_V(self) -> tuple[float, ...]:
+        """Voltage behind R_0 at which the current is linearised, for each piece of the curve [V].
+
+        The piece's straight line, extrapolated where need be, less the polarisation.
+        """
+        points = list(zip(self.ocv_dod, self.ocv_V, strict=True))
+        return tuple(
+            volt
+            + (volt - volt_end) / (dod_end - dod) * (dod - dod_linearised)
+            - self.polarisation_linearised_V
+            for (dod, volt), (dod_end, volt_end), dod_linearised in zip(
+                points, points[1:], self.ocv_dod_linearised, strict=False
+            )
+        )
+
+
+class Limits(StrictModel):
+    """Bounds of states and inputs (the paper's sets X and U)."""
+
+    v_xy_max_mps: Speed_mps
+    v_cruise_mps: Speed_mps
+    v_up_max_mps: Speed_mps
+    v_down_max_mps: Speed_mps
+    tilt_max_rad: Annotated[float, Field(gt=0.0, lt=1.2)]
+    yaw_max_rad: Annotated[float, _within(1e-3, 10.0)]
+    rate_max_radps: Rate
+    yaw_rate_max_radps: Rate
+    angular_acceleration_xy_max_radps2: Rate
+    angular_acceleration_z_max_radps2: Rate
+    delta_thrust_min_N: Annotated[float, _within(-1e6, -1e-6)]
+    delta_thrust_max_N: Force_N
+    lift_min_N: Annotated[float, _within(-1e6, -1e-6)]
+    lift_max_N: Force_N
+
+    @model_validator(mode="after")
+    def _cruise_below_maximum(self) -> Self:
+        if self.v_cruise_mps > self.v_xy_max_mps:
+            raise ValueError(
+                f"v_cruise_mps {self.v_cruise_mps} exceeds v_xy_max_mps {self.v_xy_max_mps}; "
+                "lower it"
+            )
+        return self
+
+
+class ThrustCorrection(StrictModel):
+    """Slopes of the piecewise-linear thrust correction f_T, see `thrust_correction`.
+
+    Those that are left out are fitted to the exact form.
+    """
+
+    speed_N_per_mps: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
+    climb_N_per_mps: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
+    descent_N_per_mps: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
+    tilt_N_per_rad: Annotated[float, _computed(0.0, 1e5)] = ABSENT
+
+
+class ReturnRule(StrictModel):
+    """The overestimated way home of the return threshold DoD_r."""
+
+    distance_over_speed_s: Annotated[float, _within(1e-3, 1e6)]
+
+
+class Parts(StrictModel):
+    """What a vehicle file holds; a value that it leaves out to be computed is `ABSENT`."""
+
+    name: str
+    airframe: Airframe
+    rotor: Rotor
+    motor: Motor
+    esc: Esc
+    power: Power
+    battery: Battery
+    limits: Limits
+    thrust_correction: ThrustCorrection = ThrustCorrection()
+    return_rule: ReturnRule
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.__dict__[name] for name in type(self).model_fields))
+
+    @property
+    def weight_N(self) -> float:
+        """M g [N]."""
+        return self.airframe.mass_kg * self.airframe.gravity_mps2
+
+    @property
+    def trim_tilt_rad_per_mps(self) -> float:
+        """Tilt that holds a horizontal speed in the linear model [rad per m/s]."""
+        return self.airframe.drag_kgps / self.weight_N
+
+    @property
+    def thrust_max_N(self) -> float:
+        """Static thrust of all rotors at full throttle [N]."""
+        rotor = self.rotor
+        return self.airframe.n_motors * rotor.thrust_N_per_radps2 * rotor.speed_max_radps**2
+
+    def kernel_scalars(self) -> dict[str, float]:
+        """Body, rotors, motors and speed controllers under the names that the kernels read."""
+        renamed = {
+            "speed_max_radps": "motor_speed_max_radps",
+            "resistance_ohm": "motor_resistance_ohm",
+            "constant_loss_W": "esc_loss_W",
+            "efficiency": "esc_efficiency",
+        }
+        left_out = {"first_arm_angle_rad", "inertia_kgm2"}
+        return {
+            "weight_N": self.weight_N,
+            "auxiliary_W": self.power.auxiliary_W,
+            **{
+                renamed.get(name, name): value
+                for section in (self.airframe, self.rotor, self.motor, self.esc)
+                for name, value in section
+                if name not in left_out
+            },
+        }
+
+    @cached_property
+    def torque_max_Nm(self) -> tuple[float, float, float]:
+        """Largest torques: inertia times largest angular acceleration [N m]."""
+        inertia, limits = self.airframe.inertia_kgm2, self.limits
+        sideways = limits.angular_acceleration_xy_max_radps2
+        return (
+            inertia[0] * sideways,
+            inertia[1] * sideways,
+            inertia[2] * limits.angular_acceleration_z_max_radps2,
+        )
