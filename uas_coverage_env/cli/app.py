@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios
+from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.outside import add_outside_commands
 from uas_coverage_env.flight import PlannerError
@@ -52,6 +52,7 @@ app.command("planners")(planners.planners)
 app.command("replay")(replay.replay)
 app.command("figure")(figure.figure)
 app.add_typer(scenarios.app, name="scenarios")
+app.add_typer(vehicle.app, name="vehicle")
 add_outside_commands(app)
 
 

@@ -1,11 +1,14 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
 from uas_coverage_env.vehicle.battery import (
+    battery_current_A,
     battery_segments,
     open_circuit_voltage,
     simulate_battery,
 )
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE, compile_vehicle
+from uas_coverage_env.vehicle.data_sheet import DataSheet
+from uas_coverage_env.vehicle.endurance import Endurance, endurance, flight_time_s
 from uas_coverage_env.vehicle.inner_loop import (
     acceleration_wrench,
     reseed_reference,
@@ -50,6 +53,7 @@ from uas_coverage_env.vehicle.params import (
     vehicle_names,
 )
 from uas_coverage_env.vehicle.plant import plant_step
+from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
 
 __all__ = [
@@ -72,22 +76,29 @@ __all__ = [
     "WX",
     "WY",
     "WZ",
+    "DataSheet",
+    "Endurance",
     "LinearModel",
+    "MadeVehicle",
     "VehicleParams",
     "X",
     "Y",
     "Z",
     "acceleration_wrench",
+    "battery_current_A",
     "battery_segments",
     "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
+    "endurance",
     "exact_delta_thrust",
     "fit_thrust_correction",
+    "flight_time_s",
     "fly_kinematics",
     "linear_model",
     "load_vehicle",
     "lpv_step",
+    "make_vehicle",
     "open_circuit_V",
     "open_circuit_voltage",
     "plant_step",

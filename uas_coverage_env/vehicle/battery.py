@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uas_coverage_env.kernels import interpreted
 from uas_coverage_env.vehicle.parts import Battery, Parts, Power
-from uas_coverage_env.vehicle.powertrain import battery_current_A
 
 _SERIES_HOLDS = 2.0  # steps longer than this many time constants need the exponential itself
 _SOC_ROUNDING = 1e-9
@@ -31,6 +29,16 @@ class BatterySegment(NamedTuple):
     drop_V: float
 
 
+def battery_current_A(voltage_V: float, resistance_ohm: float, power_W: float) -> float:
+    """Current at which a voltage behind a resistance delivers a power: (E - √(E² - 4RP)) / 2R [A].
+
+    More power than it has is not delivered: then the current of its largest power flows, E / 2R.
+    Also compiled, as part of the power train.
+    """
+    root = math.sqrt(max(voltage_V * voltage_V - 4.0 * resistance_ohm * power_W, 0.0))
+    return (voltage_V - root) / (2.0 * resistance_ohm)
+
+
 @lru_cache(maxsize=64)
 def battery_segments(vehicle: Parts) -> tuple[BatterySegment, ...]:
     """The straight pieces of the discharge curve of a vehicle, see `segments_of`."""
@@ -45,7 +53,6 @@ def segments_of(battery: Battery, power: Power) -> tuple[BatterySegment, ...]:
     polarisation: the only choice that fits the published hover currents (docs/deviations.md).
     """
     R0 = battery.resistance_0_ohm
-    current_A = interpreted(battery_current_A)
     segments = []
     points = list(zip(battery.ocv_dod, battery.ocv_V, strict=True))
     for (dod, volt), (dod_end, volt_end), E in zip(
@@ -53,7 +60,7 @@ def segments_of(battery: Battery, power: Power) -> tuple[BatterySegment, ...]:
     ):
         slope = (volt - volt_end) / (dod_end - dod)
         ocv = volt + slope * dod
-        current = current_A(E, R0, power.hover_W)
+        current = battery_current_A(E, R0, power.hover_W)
         stiffness = E - 2.0 * R0 * current
         segments.append(
             BatterySegment(

@@ -182,7 +182,7 @@ def _check_supply(vehicle: Parts) -> None:
         ("a hover", vehicle.power.hover_W),
         ("limits.v_xy_max_mps", vehicle.power.hover_W + vehicle.power.slope_W_per_N * extra_N),
     ):
-        current_A = derived.steady_current_A(vehicle, battery.dod_max, power_W)
+        current_A = derived.steady_current_A(battery, battery.dod_max, power_W)
         voltage_V = open_V - resistance_ohm * current_A
         if current_A > battery.current_max_A:
             raise ValueError(
@@ -202,7 +202,7 @@ def _linearisation_error(vehicle: Parts, battery: Battery) -> float:
     for segment in segments_of(battery, vehicle.power):
         for dod in (start, min(segment.dod_end, battery.dod_cutoff)):
             if dod >= start:
-                exact_A = derived.steady_current_A(vehicle, dod, vehicle.power.hover_W)
+                exact_A = derived.steady_current_A(battery, dod, vehicle.power.hover_W)
                 drop_V = segment.ocv_slope_V * dod + battery.resistance_th_ohm * exact_A
                 linear_A = segment.current_A + segment.current_A_per_V * (drop_V - segment.drop_V)
                 worst = max(worst, abs(linear_A / exact_A - 1.0))

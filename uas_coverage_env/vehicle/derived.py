@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.kernels import interpreted
-from uas_coverage_env.vehicle.parts import Parts
-from uas_coverage_env.vehicle.powertrain import battery_current_A, electrical_power_W
+from uas_coverage_env.vehicle.battery import battery_current_A
+from uas_coverage_env.vehicle.parts import Battery, Parts
+from uas_coverage_env.vehicle.powertrain import electrical_power_W
 
 _SMALL = 1e-4  # of the weight, for a difference quotient
 _DOD_POINTS = 201
@@ -28,22 +29,20 @@ def hover_power(vehicle: Parts) -> dict[str, float]:
     return {"hover_W": power_W(vehicle, weight_N), "slope_W_per_N": rise_W / (2.0 * step_N)}
 
 
-def steady_current_A(vehicle: Parts, dod: float, power_W: float) -> float:
+def steady_current_A(battery: Battery, dod: float, power_W: float) -> float:
     """Current of a power that has been drawn for a while, polarisation settled [A]."""
-    battery = vehicle.battery
     voltage_V = float(np.interp(dod, battery.ocv_dod, battery.ocv_V))
     resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    return interpreted(battery_current_A)(voltage_V, resistance_ohm, power_W)
+    return battery_current_A(voltage_V, resistance_ohm, power_W)
 
 
-def mean_voltage_V(vehicle: Parts, power_W: float) -> float:
-    """Mean voltage while a power is drawn from full to empty, by charge [V]."""
-    battery = vehicle.battery
-    dod = np.linspace(0.0, 1.0, _DOD_POINTS)
-    current = np.array([steady_current_A(vehicle, depth, power_W) for depth in dod.tolist()])
+def mean_voltage_V(battery: Battery, power_W: float, dod_end: float = 1.0) -> float:
+    """Mean voltage, by charge, while a power is drawn from a full battery until dod_end [V]."""
+    dod = np.linspace(0.0, dod_end, _DOD_POINTS)
+    current = np.array([steady_current_A(battery, depth, power_W) for depth in dod.tolist()])
     resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
     voltage = np.interp(dod, battery.ocv_dod, battery.ocv_V) - resistance_ohm * current
-    return float(np.trapezoid(voltage, dod))
+    return float(np.trapezoid(voltage, dod)) / dod_end
 
 
 def full_throttle_radps(vehicle: Parts, voltage_V: float) -> float:
@@ -73,7 +72,7 @@ def around_hover(vehicle: Parts) -> dict[str, Any]:
     In the middle of each segment of the discharge curve, with the polarisation of a hover.
     """
     battery, hover_W = vehicle.battery, vehicle.power.hover_W
-    voltage_V = mean_voltage_V(vehicle, hover_W)
+    voltage_V = mean_voltage_V(battery, hover_W)
     return {
         "voltage_nominal_V": voltage_V,
         "polarisation_linearised_V": battery.resistance_th_ohm * hover_W / voltage_V,

@@ -3,7 +3,10 @@
 import math
 
 from uas_coverage_env.kernels import kernel
+from uas_coverage_env.vehicle.battery import battery_current_A
 from uas_coverage_env.vehicle.lpv import open_circuit_V
+
+_current = kernel(battery_current_A)
 
 
 @kernel
@@ -23,16 +26,6 @@ def electrical_power_W(vehicle, thrust_N):
 
 
 @kernel
-def battery_current_A(voltage_V, resistance_ohm, power_W):
-    """Current at which a voltage behind a resistance delivers a power: (E - √(E² - 4RP)) / 2R.
-
-    More power than there is is not delivered: then the current of the largest power flows, E / 2R.
-    """
-    root = math.sqrt(max(voltage_V * voltage_V - 4.0 * resistance_ohm * power_W, 0.0))
-    return (voltage_V - root) / (2.0 * resistance_ohm)
-
-
-@kernel
 def battery_operating_point(vehicle, dod, u_th_V, power_W):
     """Voltage and current at which the Thevenin battery delivers a power.
 
@@ -40,5 +33,5 @@ def battery_operating_point(vehicle, dod, u_th_V, power_W):
     product of the two is what it has.
     """
     E = open_circuit_V(vehicle, dod) - u_th_V
-    current = battery_current_A(E, vehicle.resistance_0_ohm, power_W)
+    current = _current(E, vehicle.resistance_0_ohm, power_W)
     return E - vehicle.resistance_0_ohm * current, current

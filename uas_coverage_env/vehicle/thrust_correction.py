@@ -123,34 +123,45 @@ def _fitted(
     scalars: tuple[tuple[str, float], ...], bounds: tuple[tuple[str, float], ...], samples: int
 ) -> ThrustCorrection:
     rotors, limits = SimpleNamespace(**dict(scalars)), SimpleNamespace(**dict(bounds))
-    weight_N = rotors.weight_N
-    trim = rotors.drag_kgps / weight_N
-
-    # not compiled: a vehicle that is only looked at would wait for it
-    def extra_N(phi: float, theta: float, vx: float, vz: float) -> float:
-        thrust_N = weight_N / (math.cos(phi) * math.cos(theta))
-        through = interpreted(flow)(phi, theta, 0.0, vx, 0.0, vz)
-        return interpreted(static_thrust_in_flow)(rotors, thrust_N, *through) - weight_N
-
-    def level_N(speed: float) -> float:
-        return extra_N(0.0, -math.atan(trim * speed), speed, 0.0)
-
+    trim = rotors.drag_kgps / rotors.weight_N
     fastest, up, down = limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps
     tilts, costs = [], []
     middles = (np.arange(samples) + 0.5) / samples
     for speed in (fastest * middles).tolist():
-        level = level_N(speed)
+        level = _level_N(rotors, speed)
         for beyond in (min(MOST_BEYOND_TRIM_RAD, limits.tilt_max_rad) * middles).tolist():
             for direction in (np.pi * (middles - 0.5)).tolist():
                 theta = -math.atan(trim * speed) - beyond * math.cos(direction)
                 phi = beyond * math.sin(direction)
                 if math.hypot(theta, phi) <= limits.tilt_max_rad:
                     tilts.append(beyond)
-                    costs.append(extra_N(phi, theta, speed, 0.0) - level)
+                    costs.append(_extra_N(rotors, phi, theta, speed, 0.0) - level)
     excess, extra = np.array(tilts), np.array(costs)
     return ThrustCorrection(
-        speed_N_per_mps=max(level_N(fastest) / fastest, 0.0),
-        climb_N_per_mps=max(extra_N(0.0, 0.0, 0.0, -up) / up, 0.0),
-        descent_N_per_mps=max(-extra_N(0.0, 0.0, 0.0, down) / down, 0.0),
+        speed_N_per_mps=max(_level_N(rotors, fastest) / fastest, 0.0),
+        climb_N_per_mps=max(_extra_N(rotors, 0.0, 0.0, 0.0, -up) / up, 0.0),
+        descent_N_per_mps=max(-_extra_N(rotors, 0.0, 0.0, 0.0, down) / down, 0.0),
         tilt_N_per_rad=max(float(excess @ extra / (excess @ excess)), 0.0),
     )
+
+
+def level_flight_N(vehicle: Parts, speed_mps: float) -> float:
+    """The exact thrust correction of level flight, in trim [N].
+
+    Args:
+        vehicle: parameters; thrust correction, power and battery are not read.
+        speed_mps: [m/s] horizontal.
+    """
+    return _level_N(SimpleNamespace(**vehicle.kernel_scalars()), speed_mps)
+
+
+def _level_N(rotors: SimpleNamespace, speed_mps: float) -> float:
+    tilt_rad = math.atan(rotors.drag_kgps / rotors.weight_N * speed_mps)
+    return _extra_N(rotors, 0.0, -tilt_rad, speed_mps, 0.0)
+
+
+def _extra_N(rotors: SimpleNamespace, phi: float, theta: float, vx: float, vz: float) -> float:
+    """`exact_delta_thrust` without lift, not compiled: reading a vehicle waits for nothing."""
+    thrust_N = rotors.weight_N / (math.cos(phi) * math.cos(theta))
+    through = interpreted(flow)(phi, theta, 0.0, vx, 0.0, vz)
+    return interpreted(static_thrust_in_flow)(rotors, thrust_N, *through) - rotors.weight_N

@@ -1,0 +1,185 @@
+"""`uas-coverage vehicle`: the vehicles that are shipped, a check of one's own, and a new one."""
+
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from uas_coverage_env.cli.output import console
+from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.vehicle import (
+    DataSheet,
+    VehicleParams,
+    endurance,
+    load_vehicle,
+    make_vehicle,
+    vehicle_names,
+)
+
+_PROPELLER = re.compile(r"(\d+(?:\.\d+)?)(?:\s*[xX]\s*(\d+(?:\.\d+)?))?")
+_USUAL_PITCH = 0.45  # of the diameter
+
+app = typer.Typer(
+    invoke_without_command=True, help="List the shipped vehicles, check one, or make one."
+)
+
+
+@app.callback()
+def vehicle(context: typer.Context) -> None:
+    """List the shipped vehicles; `check FILE` validates one, `new` makes one."""
+    if context.invoked_subcommand is None:
+        list_vehicles()
+
+
+@app.command("list")
+def list_vehicles() -> None:
+    """List the shipped vehicles."""
+    table = Table(
+        "name", "motors", "mass, kg", "battery, Ah", "hover, W", "hover, min", "range, km", box=None
+    )
+    for name in vehicle_names():
+        params = load_vehicle(name)
+        flown = endurance(params)
+        table.add_row(
+            name,
+            str(params.airframe.n_motors),
+            f"{params.airframe.mass_kg:g}",
+            f"{params.battery.capacity_Ah:g}",
+            f"{params.power.hover_W:.4g}",
+            f"{flown.hover_min:.1f}",
+            f"{flown.cruise_lpv.range_km:.1f}",
+        )
+    console().print(table)
+
+
+@app.command()
+def check(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="Vehicle file, or the name of a shipped one.")
+    ],
+) -> None:
+    """Validate a vehicle, and say what follows from its parts."""
+    params = load_vehicle(file)
+    out = console()
+    out.print(f"{params.name} is valid", style="bold", markup=False)
+    for line in _lines(params):
+        out.print(line, markup=False)
+
+
+@app.command()
+def new(
+    mass_kg: Annotated[float, typer.Option("--mass-kg", help="Ready to fly, battery included.")],
+    motors: Annotated[int, typer.Option(help="How many, equally spaced.")],
+    propeller_in: Annotated[
+        str,
+        typer.Option(
+            "--propeller-in", metavar="DIAMETERxPITCH", help="Inches, as 10x4.5; or the diameter."
+        ),
+    ],
+    cells: Annotated[int, typer.Option(help="LiPo cells in series.")],
+    capacity_Ah: Annotated[float, typer.Option("--capacity-Ah", help="Of the whole battery.")],
+    hover_minutes: Annotated[
+        float, typer.Option("--hover-minutes", help="From full until --charge-left is left.")
+    ],
+    top_speed_mps: Annotated[float, typer.Option("--top-speed-mps", help="In still air.")],
+    out: Annotated[Path, typer.Option(help="Vehicle file to write.")],
+    charge_left: Annotated[
+        float, typer.Option("--charge-left", help="Share of the charge left after that hover.")
+    ] = 0.0,
+    arm_m: Annotated[float | None, typer.Option("--arm-m", help="Centre to rotor axis.")] = None,
+    tilt_deg: Annotated[float | None, typer.Option("--tilt-deg", help="Largest tilt.")] = None,
+    thrust_to_weight: Annotated[
+        float | None, typer.Option("--thrust-to-weight", help="At full throttle.")
+    ] = None,
+    auxiliary_W: Annotated[
+        float | None, typer.Option("--auxiliary-W", help="Avionics and payload.")
+    ] = None,
+    resistance_mohm: Annotated[
+        float | None, typer.Option("--resistance-mohm", help="Of the battery.")
+    ] = None,
+    climb_mps: Annotated[float | None, typer.Option("--climb-mps", help="Fastest climb.")] = None,
+    descent_mps: Annotated[
+        float | None, typer.Option("--descent-mps", help="Fastest descent.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Of the vehicle; default: the file's.")] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the file where it exists.")
+    ] = False,
+) -> None:
+    """Make a vehicle file from what is known of a vehicle, and say what was assumed."""
+    if out.suffix != ".toml":
+        raise InputError(f"--out {out}: should end in .toml")
+    if out.exists() and not overwrite:
+        raise InputError(f"{out}: exists; give another --out or add --overwrite")
+    diameter_in, pitch_in = _propeller(propeller_in)
+    known: dict[str, Any] = {
+        "name": name or out.stem,
+        "mass_kg": mass_kg,
+        "motors": motors,
+        "diameter_in": diameter_in,
+        "pitch_in": pitch_in,
+        "cells": cells,
+        "capacity_Ah": capacity_Ah,
+        "hover_minutes": hover_minutes,
+        "top_speed_mps": top_speed_mps,
+        "charge_left": charge_left,
+        "arm_m": arm_m,
+        "tilt_deg": tilt_deg,
+        "thrust_to_weight": thrust_to_weight,
+        "auxiliary_W": auxiliary_W,
+        "resistance_mohm": resistance_mohm,
+        "climb_mps": climb_mps,
+        "descent_mps": descent_mps,
+    }
+    made = make_vehicle(parse(known, DataSheet, "vehicle new"))
+    out.write_text(made.file_text(), encoding="utf-8")
+    screen = console()
+    for origin in ("given", "computed", "assumed"):
+        screen.print(origin, style="bold")
+        for section, values in made.sections.items():
+            for key, value in values.items():
+                if value.origin == origin:
+                    text = f"{section}.{key} = {value.text()}"
+                    screen.print(f"  {text:<46} {value.source}", markup=False)
+    screen.print("as it flies", style="bold")
+    for line in _lines(made.vehicle):
+        screen.print(line, markup=False)
+    exact, linear = made.hover_minutes
+    screen.print(
+        f"asked for  {hover_minutes:g} min of hover down to {charge_left:.0%} charge: "
+        f"{exact:.1f} nonlinear, {linear:.1f} lpv",
+        markup=False,
+    )
+    screen.print(f"vehicle in {out}", markup=False)
+
+
+def _propeller(text: str) -> tuple[float, float]:
+    """Diameter and pitch in inches."""
+    match = _PROPELLER.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f"--propeller-in {text!r}: should be DIAMETERxPITCH, as in 10x4.5")
+    diameter_in = float(match[1])
+    return diameter_in, float(match[2]) if match[2] else _USUAL_PITCH * diameter_in
+
+
+def _lines(params: VehicleParams) -> list[str]:
+    """What follows from the parts of a vehicle."""
+    battery, power = params.battery, params.power
+    flown = endurance(params)
+    left = f"{1 - battery.dod_max:.0%}"
+    lines = [
+        f"weight     {params.weight_N:.4g} N, full throttle lifts {flown.thrust_to_weight:.2f} "
+        "times as much",
+        f"battery    {battery.capacity_Ah:g} Ah at {battery.voltage_nominal_V:.4g} V; hover takes "
+        f"{flown.hover_current_A:.3g} of {battery.current_max_A:.3g} A at {left} charge",
+        f"hover      {power.hover_W:.4g} W, {flown.hover_min:.1f} min to empty, "
+        f"{flown.hover_usable_min:.1f} min to {left}",
+    ]
+    for dynamics, cruise in (("lpv", flown.cruise_lpv), ("nonlinear", flown.cruise_nonlinear)):
+        lines.append(
+            f"cruise     {params.limits.v_cruise_mps:.3g} m/s, {dynamics}: {cruise.power_W:.4g} W, "
+            f"{cruise.time_min:.1f} min and {cruise.range_km:.1f} km to {left}"
+        )
+    return lines
