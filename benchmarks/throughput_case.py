@@ -126,7 +126,8 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
     rng = np.random.default_rng(0)
     # actions lie on the GPU already, as those of a learner there would
     drawn = [
-        cuda.to_device(rng.uniform(-1, 1, flown.missions.asked.shape)) for _ in range(N_ON_GPU)
+        cuda.to_device(rng.uniform(-1, 1, flown.missions.learners.asked.shape))
+        for _ in range(N_ON_GPU)
     ]
 
     def steps(n_steps: int) -> Callable[[], tuple[float, float]]:

@@ -17,11 +17,12 @@ from rich.table import Table
 from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions import write_commands
-from uas_coverage_env.env.kernel import REPORT_SIZE, step_learners
-from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
+from uas_coverage_env.env.kernel import Rules, step_learners
+from uas_coverage_env.env.layout import OBSERVATION_SIZE
+from uas_coverage_env.env.memory import Learners, Scratch
 from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
 from uas_coverage_env.env.observation import look
-from uas_coverage_env.env.pool import tables_of
+from uas_coverage_env.env.pool import learners_of, tables_at
 from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.env.surroundings import surroundings
 from uas_coverage_env.vehicle import lpv_step
@@ -49,23 +50,16 @@ NOBODY = np.zeros(0, np.int64)
 class View(NamedTuple):
     """What `step_learners` needs of one lane."""
 
-    asked: NDArray[np.float64]
-    targets: NDArray[np.int64]
-    candidates: NDArray[np.int64]
-    company: NDArray[np.float64]
+    learners: Learners
     commands: NDArray[np.void]
     outcome: NDArray[np.void]
-    report: NDArray[np.float64]
 
 
 @compiled
 def _whole(arena, state, tables, view, weights, spare, row):
-    ranges, scales, neighbours = tables
     step_learners(
-        arena, state, VELOCITY, ranges, scales, neighbours, weights, False, NOBODY,
-        view.asked, view.targets, view.candidates, view.company,
-        view.commands, view.outcome, view.report,
-        arena.rules[0].max_steps, row,
+        arena, state, tables, view.learners, Scratch(view.commands, view.outcome),
+        Rules(VELOCITY, weights, False, NOBODY), arena.rules[0].max_steps, row,
     )  # fmt: skip
 
 
@@ -79,16 +73,16 @@ def _observation(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             look(
-                arena, state, tables[1][i], view.company, i, view.targets,
-                arena.rules[0].max_steps, view.candidates[i], row[i],
+                arena, state, tables.scales[i], view.learners.company, i, view.learners.targets,
+                arena.rules[0].max_steps, view.learners.candidates[i], row[i],
             )  # fmt: skip
 
 
 @compiled
 def _actions(arena, state, tables, view, weights, spare, row):
     write_commands(
-        state, VELOCITY, tables[0], view.asked, view.candidates, view.targets,
-        view.commands,
+        state, VELOCITY, tables.ranges, view.learners.asked, view.learners.candidates,
+        view.learners.targets, view.commands,
     )  # fmt: skip
 
 
@@ -128,14 +122,14 @@ def _coverage(arena, state, tables, view, weights, spare, row):
 
 @compiled
 def _reward(arena, state, tables, view, weights, spare, row):
-    pay(arena, state, view.commands, view.outcome, weights, False, view.report)
+    pay(arena, state, view.commands, view.outcome, weights, False, view.learners.report)
 
 
 @compiled
 def _nearest(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            nearest_waypoints(arena, state, i, view.candidates[i])
+            nearest_waypoints(arena, state, i, view.learners.candidates[i])
 
 
 @compiled
@@ -143,8 +137,8 @@ def _waypoints(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             waypoints(
-                arena, state, tables[1][i], view.company, i, view.targets,
-                view.candidates[i], row[i], 0,
+                arena, state, tables.scales[i], view.learners.company, i, view.learners.targets,
+                view.learners.candidates[i], row[i], 0,
             )  # fmt: skip
 
 
@@ -159,8 +153,8 @@ def _surroundings(arena, state, tables, view, weights, spare, row):
 def _movers(arena, state, tables, view, weights, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            k = others(arena, state, tables[1][i], i, row[i], 0)
-            moving_obstacles(arena, state, tables[1][i], i, row[i], k)
+            k = others(arena, state, tables.scales[i], i, row[i], 0)
+            moving_obstacles(arena, state, tables.scales[i], i, row[i], k)
 
 
 PARTS: dict[str, Callable[..., None]] = {
@@ -187,24 +181,20 @@ def _over_lanes(part: Any) -> Callable[..., None]:
     part = njit(error_model="numpy", forceinline=True)(part.py_func)
 
     @compiled
-    def run(arenas, tables, worlds, lanes, commands, outcome, weights, spare, observation):
-        arena = arena_of(arenas, 0)
-        scales = tables_of(tables, 0)
-        n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
+    def run(pool, missions, commands, outcome, weights, spare, observation):
+        arena = arena_of(pool.arenas, 0)
+        tables = tables_at(pool.tables, 0)
+        n_uas = arena.uas.shape[0]
         for lane in range(observation.shape[0]):
-            state = state_of(worlds, lane, n_uas, n_waypoints)
+            state = state_of(missions.worlds, lane, pool.arenas, 0)
             # views that count no references, as in the batch
             view = View(
-                borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
-                borrow(lanes.targets, lane, (n_uas,)),
-                borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
-                borrow(lanes.company, lane, (n_waypoints, 2)),
+                learners_of(missions.learners, lane, pool.arenas, 0),
                 borrow(commands, lane, (n_uas,)),
                 borrow(outcome, lane, (n_uas,)),
-                borrow(lanes.report, lane, (n_uas, REPORT_SIZE)),
             )
             row = borrow(observation, lane, (n_uas, OBSERVATION_SIZE))
-            part(arena, state, scales, view, weights, spare, row)
+            part(arena, state, tables, view, weights, spare, row)
 
     return run
 
@@ -214,12 +204,12 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     batch = CoverageBatch(n_lanes)
     batch.reset(0)
     rng = np.random.default_rng(0)
-    shape = batch.lanes.asked.shape
+    shape = batch.learners.asked.shape
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
     fleet = batch.worlds.status.shape
     arguments: tuple[Any, ...] = (
-        batch.pool.arenas, batch.pool.tables, batch.worlds, batch.lanes,
+        batch.pool.arrays, batch.missions,
         np.zeros(fleet, COMMAND_DTYPE), np.zeros(fleet, OUTCOME_DTYPE),
         np.ones(len(REWARD_TERMS)), np.zeros(14), batch.observation,
     )  # fmt: skip

@@ -54,7 +54,7 @@ def lend(address: int, dtype: np.dtype, shape: tuple[int, ...]) -> Any:
     return np.ndarray(shape, dtype, memory)
 
 
-def _view(builder, context, view_type, start, shape, itemsize):
+def view_of(builder, context, view_type, start, shape, itemsize):
     """An array that owns nothing, of the sizes `shape`, at a pointer."""
     strides = [itemsize]
     for size in reversed(shape[1:]):
@@ -100,7 +100,7 @@ def _borrowed(context, builder, signature, arguments):
     start = builder.gep(builder.bitcast(whole.data, ir.IntType(8).as_pointer()), [first])
     sizes = _sizes(builder, context, arguments[2], shape_type)
     start = builder.bitcast(start, whole.data.type)
-    return _view(builder, context, signature.return_type, start, sizes, whole.itemsize)
+    return view_of(builder, context, signature.return_type, start, sizes, whole.itemsize)
 
 
 @type_callable(part)
@@ -120,7 +120,7 @@ def _parted(context, builder, signature, arguments):
     first = context.cast(builder, arguments[1], first_type, types.intp)
     size = context.cast(builder, arguments[2], n_type, types.intp)
     start = builder.gep(whole.data, [first])
-    return _view(builder, context, signature.return_type, start, [size], whole.itemsize)
+    return view_of(builder, context, signature.return_type, start, [size], whole.itemsize)
 
 
 @type_callable(lend)
@@ -139,4 +139,4 @@ def _lent(context, builder, signature, arguments):
     start = builder.inttoptr(number, element.as_pointer())
     itemsize = context.get_constant(types.intp, context.get_abi_sizeof(element))
     sizes = _sizes(builder, context, arguments[2], shape_type)
-    return _view(builder, context, signature.return_type, start, sizes, itemsize)
+    return view_of(builder, context, signature.return_type, start, sizes, itemsize)

@@ -15,7 +15,7 @@ from waypoint_missions import PRIOR, tensors, town, with_something_parked
 from uas_coverage_env import rollout
 from uas_coverage_env.flight import Assistants, coverage, energy_Wh, home
 from uas_coverage_env.world import assistants
-from uas_coverage_env.world.pool import pool_arenas
+from uas_coverage_env.world.pool import pool_worlds
 
 BOTH = Assistants(return_mode=True, safety_filter=True)
 
@@ -32,7 +32,7 @@ def flown(scenario, weights, simulations=0, seed=0):
 
 def in_training(scenario, weights):
     """The account of the mission, flown by the task with the NumPy network."""
-    arenas, legs = pool_arenas([scenario]), pool_legs([scenario])
+    arenas, legs = pool_worlds([scenario]), pool_legs([scenario])
     lanes, states = make_lanes(1, arenas)
     begin_lanes(
         arenas, legs, lanes, states, np.array([0]), np.array([0]),

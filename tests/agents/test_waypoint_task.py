@@ -29,7 +29,7 @@ from waypoint_missions import town, with_something_parked
 
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import assistants, build_arena, initial_state
-from uas_coverage_env.world.pool import pool_arenas
+from uas_coverage_env.world.pool import pool_worlds
 
 SCENARIOS = [
     town(1, n_uas=1, n_waypoints=5),
@@ -45,7 +45,7 @@ class Teams:
 
     def __init__(self, order=(0, 1, 2, 3, 4), covered=0.0, seed=0):
         scenarios = [SCENARIOS[s] for s in order]
-        self.arenas, self.legs = pool_arenas(scenarios), pool_legs(scenarios)
+        self.arenas, self.legs = pool_worlds(scenarios), pool_legs(scenarios)
         n = len(scenarios)
         self.lanes, self.states = make_lanes(n, self.arenas)
         shape = self.states.uncovered.shape
@@ -134,7 +134,7 @@ def test_a_uas_goes_home_when_it_chooses_to_and_the_others_finish():
 
 def test_a_uas_without_charge_for_the_way_is_not_sent():
     scenario = SCENARIOS[1]
-    arenas, legs = pool_arenas([scenario]), pool_legs([scenario])
+    arenas, legs = pool_worlds([scenario]), pool_legs([scenario])
     lanes, states = make_lanes(1, arenas)
     discharged = np.zeros(states.status.shape)
     discharged[0, 0] = scenario.uas[0].dod_max - (1 - scenario.uas[0].soc_0) - 0.03
@@ -190,7 +190,7 @@ def test_places_and_directions_do_not_matter():
     mirrored = type(scenario).model_validate(data)
     rows = []
     for each in (scenario, mirrored):
-        arenas, legs = pool_arenas([each]), pool_legs([each])
+        arenas, legs = pool_worlds([each]), pool_legs([each])
         lanes, states = make_lanes(1, arenas)
         begin_lanes(
             arenas, legs, lanes, states, np.array([0]), np.array([0]),

@@ -10,7 +10,7 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.kernel import REWARD
+from uas_coverage_env.env.memory import REWARD
 
 N_LANES, N_STEPS = 2, 25
 
@@ -50,11 +50,11 @@ def compare():
                 report = np.array(episode.step())
                 different += int((seen.rewards[lane] != report[:, REWARD]).sum())
                 ended[lane] = bool(seen.ended[lane])
-            different += int((seen.observation[lane] != episode.observation).sum())
+            different += int((seen.looks.observation[lane] != episode.observation).sum())
     asked[0, 1, 2] = np.nan
-    before = missions.missions.x.copy()
+    before = missions.missions.worlds.x.copy()
     missions.step(asked)
-    changed = (missions.missions.x != before).any(axis=(1, 2)).tolist()
+    changed = (missions.missions.worlds.x != before).any(axis=(1, 2)).tolist()
     return {
         "different": different,
         "restarts": restarts,

@@ -25,7 +25,7 @@ def commands_after(env, action):
     """Values of the command that uas_1 gets."""
     hover = {"waypoint": HOME_CHOICE}.get(env_kind(env), np.zeros_like(np.asarray(action)))
     env.step({"uas_1": action, "uas_2": hover})
-    return env._episode._commands[0]["values"].tolist()
+    return env._episode._scratch.commands[0]["values"].tolist()
 
 
 def env_kind(env):
@@ -179,7 +179,9 @@ def test_a_choice_that_does_not_exist_is_refused(choice):
 def test_any_whole_number_is_a_choice(choice):
     env = env_of("waypoint")
     env.step({"uas_1": choice, "uas_2": 0})
-    assert env._episode._targets[0] == env_of("waypoint")._episode._candidates[0, 1]
+    assert (
+        env._episode._learners.targets[0] == env_of("waypoint")._episode._learners.candidates[0, 1]
+    )
 
 
 def test_the_mask_allows_open_waypoints_and_home():
@@ -193,10 +195,10 @@ def test_the_mask_allows_open_waypoints_and_home():
 def test_a_masked_choice_keeps_the_former_target():
     env = env_of("waypoint")
     env.step({"uas_1": 1, "uas_2": 0})
-    target = int(env._episode._targets[0])
+    target = int(env._episode._learners.targets[0])
     for _ in range(3):
         env.step({"uas_1": 7, "uas_2": 0})
-    assert int(env._episode._targets[0]) == target
+    assert int(env._episode._learners.targets[0]) == target
 
 
 def test_a_masked_choice_without_a_target_stays_in_place():

@@ -8,11 +8,12 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
 from uas_coverage_env.env.batch_kernel import ABSENT, drawn
-from uas_coverage_env.env.kernel import ENERGY, STATUS
+from uas_coverage_env.env.memory import ENERGY, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.world import FLYING, LOST, STATUS_NAMES, build_arena
-from uas_coverage_env.world.pool import arena_of, pool_arenas
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.pool import pool_worlds
 
 MIXED = (
     practice_ground(n_uas=3, tower=True, n_moving=2, max_steps=25),
@@ -39,7 +40,7 @@ def assert_is(batch, lane, env, observations, rewards=None, infos=None):
             assert batch.lanes.rewards[lane, i] == 0.0
             continue
         np.testing.assert_array_equal(batch.observation[lane, i], observations[agent])
-        report = batch.lanes.report[lane, i]
+        report = batch.learners.report[lane, i]
         if rewards is not None:
             assert batch.lanes.rewards[lane, i] == pytest.approx(rewards[agent], abs=1e-12)
         if infos is not None:
@@ -138,18 +139,18 @@ def test_all_scenarios_are_drawn_about_equally_often():
 
 
 def test_a_pool_holds_every_arena_as_it_is_built():
-    pool = pool_arenas(MIXED)
+    pool = pool_worlds(MIXED).arenas
     for s, scenario in enumerate(MIXED):
-        for mine, its in zip(arena_of.py_func(pool, s), build_arena(scenario), strict=True):
+        for mine, its in zip(ARENA.mission(pool, s), build_arena(scenario), strict=True):
             assert mine.dtype == its.dtype
             np.testing.assert_array_equal(mine, its)
 
 
 def test_equal_vehicles_are_stored_once():
     grounds = [practice_ground(size_m=size_m) for size_m in (180.0, 200.0, 220.0)]
-    pool = pool_arenas([*grounds, practice_ground(vehicles=("hexacopter",))])
-    assert pool.spans["vehicles"].tolist() == [[0, 2], [0, 2], [0, 2], [2, 4]]
-    assert len(pool.vehicles) == 4
+    pool = pool_worlds([*grounds, practice_ground(vehicles=("hexacopter",))]).arenas
+    assert pool.first[:, ARENA.declaration._fields.index("vehicles")].tolist() == [0, 0, 0, 2]
+    assert len(pool.arrays.vehicles) == 4
 
 
 def test_what_a_lost_uas_saw_last_stays_also_after_going_on_from_a_state():

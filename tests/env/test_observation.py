@@ -155,7 +155,7 @@ def test_the_nearest_open_waypoints_come_first():
         to = places - state.x[i, :3]
         away_m = np.linalg.norm(to, axis=1)
         order = np.argsort(away_m)[:K_WAYPOINTS]
-        assert env._episode._candidates[i].tolist() == order.tolist()
+        assert env._episode._learners.candidates[i].tolist() == order.tolist()
         np.testing.assert_array_equal(feature(seen, "waypoints", "valid"), np.ones((12, 1)))
         columns = {
             "closeness": close(away_m[order]),
@@ -202,12 +202,12 @@ def test_a_waypoint_that_another_flies_to_is_taken():
     env = uas_coverage_v0.parallel_env(practice_ground(), action="waypoint")
     env.reset()
     observations, *_ = env.step({"uas_1": 0, "uas_2": 12})
-    target = int(env._episode._targets[0])
+    target = int(env._episode._learners.targets[0])
     own, other = (
         feature(observations[a], "waypoints", "taken")[:3, 0] for a in env.possible_agents
     )
     assert not own.any()
-    assert other.tolist() == (env._episode._candidates[1, :3] == target).tolist()
+    assert other.tolist() == (env._episode._learners.candidates[1, :3] == target).tolist()
 
 
 def test_sectors_and_centre_describe_all_that_is_open():

@@ -11,43 +11,40 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import HOME_CHOICE, as_array
 from uas_coverage_env.env.batch_kernel import (
-    ABSENT,
-    ACCEPTED,
     DISABLED,
     DRAW,
-    FLY,
+    LANES,
     NEXT_STEP,
     REST,
     SAME_STEP,
-    SWARM_SIZE,
+    SEEDS,
+    BatchRules,
     Lanes,
+    new_missions,
     step_batch,
     step_batch_in_threads,
 )
-from uas_coverage_env.env.kernel import REPORT_SIZE
-from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
-from uas_coverage_env.env.nearest import NO_TARGET
+from uas_coverage_env.env.kernel import ACCEPTED, Rules
+from uas_coverage_env.env.layout import OBSERVATION_SIZE
+from uas_coverage_env.env.memory import LEARNERS, Learners
 from uas_coverage_env.env.pool import ScenarioPool
-from uas_coverage_env.env.put_aside import Limits, check_like, check_values
+from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.env.rewards import weights_of
 from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import (
-    COMMAND_DTYPE,
     FLYING,
-    OUTCOME_DTYPE,
-    STATUS_NAMES,
     AssistantCode,
     SwarmState,
+    WorldState,
     assistants,
 )
-from uas_coverage_env.world.pool import lanes_of
+from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
 """When a mission that has ended begins anew."""
 
 _MOST_LANES = 2**20
-_SEEDS = 2**64
 
 
 class CoverageBatch:
@@ -75,8 +72,7 @@ class CoverageBatch:
         num_lanes: L.
         n_uas: U, of the largest scenario.
         pool: The scenarios.
-        lanes: What happened, see `Lanes`; the arrays are written by every step.
-        worlds: The states of the world, with an axis of lanes in front; written likewise.
+        missions: What happened, see `Missions`; the arrays are written by every step.
         autoreset: As in `batch_kernel`.
 
     Raises:
@@ -114,8 +110,7 @@ class CoverageBatch:
         self.chooses = action == "waypoint"
         self.filters = bool(safety_filter)
         self.autoreset = AUTORESET[autoreset]
-        self.worlds = lanes_of(self.num_lanes, self.pool.arenas)
-        self.lanes = _empty_lanes(self.pool, self.num_lanes, int(threads))
+        self.missions = new_missions(self.pool, self.num_lanes, int(threads))
         self._settings = (self.actions.kind, weights_of(reward_weights), dynamics == "nonlinear")
         self._brings_home = bool(return_mode)
         shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)
@@ -123,11 +118,26 @@ class CoverageBatch:
         self._threads = int(threads)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
-        self._aboard: AssistantCode = ()
+        self._assistants: AssistantCode = ()
 
     def __getstate__(self) -> dict[str, Any]:
         # machine code does not travel
-        return {**self.__dict__, "_kernel": None, "_aboard": ()}
+        return {**self.__dict__, "_kernel": None, "_assistants": ()}
+
+    @property
+    def worlds(self) -> WorldState:
+        """The states of the world, with an axis of lanes in front."""
+        return self.missions.worlds
+
+    @property
+    def learners(self) -> Learners:
+        """What learners add to them, likewise."""
+        return self.missions.learners
+
+    @property
+    def lanes(self) -> Lanes:
+        """What the lanes are doing."""
+        return self.missions.lanes
 
     @property
     def observation(self) -> NDArray[np.float32]:
@@ -141,7 +151,7 @@ class CoverageBatch:
 
     def action_masks(self) -> NDArray[np.bool_]:
         """(L, U, K_WAYPOINTS + 1) choices that name a waypoint, and home."""
-        return masks_of(self.lanes.candidates)
+        return masks_of(self.learners.candidates)
 
     def seed(self, seed: int | Sequence[int | None]) -> None:
         """Seed the lanes, each of which counts its missions from 0 again.
@@ -165,7 +175,7 @@ class CoverageBatch:
             if value is None:
                 continue
             whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-            if not whole or not 0 <= value < _SEEDS:
+            if not whole or not 0 <= value < SEEDS:
                 raise ValueError(
                     f"seed of lane {lane} is {value!r}; give a whole number from 0 to 2**64 - 1"
                 )
@@ -237,7 +247,7 @@ class CoverageBatch:
         if refused != ACCEPTED:
             lane, i = divmod(refused, self.n_uas)
             raise ValueError(
-                f"action of UAS {i} in lane {lane} is {lanes.asked[lane, i].tolist()}; "
+                f"action of UAS {i} in lane {lane} is {self.learners.asked[lane, i].tolist()}; "
                 f"give finite numbers"
             )
         return self.observation
@@ -255,33 +265,25 @@ class CoverageBatch:
         """
         own = self._changing()
         check_like(state, own)
-        check_values(state, self._limits(state["scenario"]))
+        last = len(self.pool) - 1
+        longest = max(scenario.max_steps for scenario in self.pool.scenarios)
+        n_waypoints = self.pool.n_waypoints[state["scenario"].clip(0, last)]
+        limits = {
+            **LANES.limits({"S": last + 1}, lanes=False),
+            **STATE.limits({"samples": longest + 1}, lanes=True),
+            **LEARNERS.limits({"W": n_waypoints}, lanes=True),
+        }
+        check_values(state, limits)
         for name, array in own.items():
             array[...] = state[name]
         # the other array of observations is not what it was
-        self.lanes.settled[:] = False
+        self.missions.settled[:] = False
         self._begun = bool((self.lanes.mission >= 0).all())
 
-    def _limits(self, scenario: NDArray[np.int64]) -> Limits:
-        """What the indices of a batch may be that flies these scenarios."""
-        last = len(self.pool) - 1
-        last_waypoint = self.pool.n_waypoints[scenario.clip(0, last)] - 1
-        return {
-            "scenario": (0, last),
-            "mission": (-1, np.iinfo(np.int64).max - 1),
-            "orders": (FLY, DRAW),
-            "step": (0, max(scenario.max_steps for scenario in self.pool.scenarios)),
-            "status": (ABSENT, len(STATUS_NAMES) - 1),
-            "targets": (NO_TARGET, last_waypoint[:, None]),
-            "candidates": (-1, last_waypoint[:, None, None]),
-        }
-
     def _changing(self) -> dict[str, NDArray[Any]]:
-        # commands and outcomes are written anew in every step
-        lanes = {k: v for k, v in self.lanes._asdict().items() if v.dtype.names is None}
-        arrays = {**self.worlds._asdict(), **lanes, "observation": self.observation}
-        own = ("final_", "settled")
-        return {name: array for name, array in arrays.items() if not name.startswith(own)}
+        parts = (self.worlds, self.learners, self.lanes)
+        arrays = {k: v for part in parts for k, v in part._asdict().items()}
+        return {**arrays, "observation": self.observation}
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a player of this lane sees now, in arrays of their own."""
@@ -306,12 +308,11 @@ class CoverageBatch:
         return self.pool.scenarios[self.lanes.scenario[lane]]
 
     def _run(self, orders: NDArray[np.int64]) -> int:
-        arenas, tables = self.pool.arenas, self.pool.tables
         if self._kernel is None:
-            self._aboard = assistants(self._brings_home, self.filters, goes_to=self.chooses)
-        settings = (*self._settings, self._aboard, self.autoreset)
+            self._assistants = assistants(self._brings_home, self.filters, goes_to=self.chooses)
+        rules = BatchRules(Rules(*self._settings, self._assistants), self.autoreset)
         before, free = self._observations
-        given = (arenas, tables, self.worlds, self.lanes, orders, *settings, before, free)
+        given = (self.pool.arrays, self.missions, orders, rules, before, free)
         if self._kernel is None:
             kernel = step_batch if self._threads == 1 else step_batch_in_threads
             self._kernel = machine_code(kernel, given)
@@ -343,7 +344,7 @@ class CoverageBatch:
 
     def _ask(self, actions: Any) -> None:
         actions = as_array("the swarms", actions)
-        asked = self.lanes.asked
+        asked = self.learners.asked
         if len(actions.shape) < 2 or len(actions) != len(asked) or actions.size != asked.size:
             raise ValueError(
                 f"actions have shape {actions.shape}; give {self.actions.size} for each of "
@@ -371,29 +372,3 @@ def masks_of(candidates: NDArray[np.int64]) -> NDArray[np.bool_]:
     masks = np.ones((*candidates.shape[:-1], HOME_CHOICE + 1), dtype=np.bool_)
     np.greater_equal(candidates, 0, out=masks[..., :HOME_CHOICE])
     return masks
-
-
-def _empty_lanes(pool: ScenarioPool, n: int, threads: int) -> Lanes:
-    n_uas, n_waypoints = int(pool.n_uas.max()), int(pool.n_waypoints.max())
-    return Lanes(
-        seed=np.random.default_rng().integers(_SEEDS, size=n, dtype=np.uint64),
-        mission=np.full(n, -1),
-        scenario=np.zeros(n, dtype=np.int64),
-        orders=np.full(n, FLY),
-        asked=np.zeros((n, n_uas, pool.actions.size)),
-        targets=np.zeros((n, n_uas), dtype=np.int64),
-        candidates=np.zeros((n, n_uas, K_WAYPOINTS), dtype=np.int64),
-        company=np.zeros((n, n_waypoints, 2), np.float32),
-        commands=np.zeros((threads, n_uas), dtype=COMMAND_DTYPE),
-        outcome=np.zeros((threads, n_uas), dtype=OUTCOME_DTYPE),
-        report=np.zeros((n, n_uas, REPORT_SIZE)),
-        rewards=np.zeros((n, n_uas)),
-        swarm=np.zeros((n, SWARM_SIZE)),
-        terminated=np.zeros(n, dtype=np.bool_),
-        truncated=np.zeros(n, dtype=np.bool_),
-        settled=np.zeros((n, n_uas), dtype=np.bool_),
-        final_observation=np.zeros((n, n_uas, OBSERVATION_SIZE), np.float32),
-        final_report=np.zeros((n, n_uas, REPORT_SIZE)),
-        final_swarm=np.zeros((n, SWARM_SIZE)),
-        final_candidates=np.zeros((n, n_uas, K_WAYPOINTS), dtype=np.int64),
-    )

@@ -1,7 +1,7 @@
 """One step of many missions, compiled: every lane is flown by `step_learners`, as a single one."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numba import prange
@@ -10,33 +10,44 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.actions import first_not_finite
-from uas_coverage_env.env.kernel import (
-    ACCEPTED,
+from uas_coverage_env.env.kernel import ACCEPTED, Rules, step_learners
+from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
+from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
     ENERGY,
+    LEARNERS,
     REPORT_SIZE,
     REWARD,
+    SCRATCH,
     STATUS,
-    step_learners,
+    Learners,
+    Scratch,
 )
-from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NO_TARGET
-from uas_coverage_env.env.pool import first_look_of, tables_of
+from uas_coverage_env.env.pool import (
+    ScenarioPool,
+    first_learners_at,
+    first_look_at,
+    learners_of,
+    tables_at,
+)
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
-from uas_coverage_env.world import FLYING
-from uas_coverage_env.world.pool import arena_of, begin, state_of
+from uas_coverage_env.memory import Memory, Values, copy_arrays, lane_view
+from uas_coverage_env.world import ABSENT, FLYING, WorldState
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.pool import arena_of, lanes_of, start_of, state_of
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
 """When a mission that has ended begins anew: in the next step, in the same, or never by itself."""
 
+SEEDS = 2**64
+"""Seeds of lanes are below."""
+
 FLY, REST, DRAW = -3, -2, -1
 """What a lane does in the coming step: fly, nothing, or begin a mission that is drawn; a number
 from 0 on begins a mission of that scenario."""
-
-ABSENT = -1
-"""Status of a UAS that the scenario of a lane does not have."""
 
 N_TERMS = len(REWARD_TERMS)
 
@@ -48,53 +59,80 @@ SWARM_SIZE = SWARM_REWARD + 1
 
 
 class Lanes(NamedTuple):
-    """All missions, a lane each; the arrays are as large as the largest scenario needs.
+    """What L lanes are doing, with room for U UAS."""
 
-    L lanes, U UAS and W waypoints at most. Rows of UAS that a lane's scenario does not have are
-    zero, with status ABSENT.
+    seed: Annotated[NDArray[np.uint64], "L"]
+    """From which the scenarios are drawn."""
+    mission: Annotated[NDArray[np.int64], "L", Values(-1, np.iinfo(np.int64).max - 1)]
+    """Number of the mission since the lane was seeded, from 0 on."""
+    scenario: Annotated[NDArray[np.int64], "L", Values(0, "S")]
+    """Index in the pool."""
+    orders: Annotated[NDArray[np.int64], "L", Values(FLY, DRAW)]
+    """What it does in the coming step: FLY, or DRAW after an end (NEXT_STEP)."""
+    rewards: Annotated[NDArray[np.float64], "L", "U"]
+    """Of each UAS for the latest step."""
+    swarm: Annotated[NDArray[np.float64], "L", SWARM_SIZE]
+    """Sums over the UAS, see SWARM_COVERED."""
+    terminated: Annotated[NDArray[np.bool_], "L"]
+    """No UAS flies any more."""
+    truncated: Annotated[NDArray[np.bool_], "L"]
+    """One still flies after the last step allowed."""
+
+
+LANES = Memory(Lanes)
+
+
+class Final(NamedTuple):
+    """The end of the last mission that ended in a lane; SAME_STEP only."""
+
+    observation: Annotated[NDArray[np.float32], "L", "U", OBSERVATION_SIZE]
+    report: Annotated[NDArray[np.float64], "L", "U", REPORT_SIZE]
+    swarm: Annotated[NDArray[np.float64], "L", SWARM_SIZE]
+    candidates: Annotated[NDArray[np.int64], "L", "U", K_WAYPOINTS]
+
+
+FINAL = Memory(Final)
+
+
+class Missions(NamedTuple):
+    """All missions, a lane each.
+
+    The arrays are as large as the largest scenario needs. Rows of UAS that a lane's scenario does
+    not have are zero, with status ABSENT.
     """
 
-    seed: NDArray[np.uint64]
-    """(L,) from which the scenarios are drawn."""
-    mission: NDArray[np.int64]
-    """(L,) number of the mission since the lane was seeded, from 0 on."""
-    scenario: NDArray[np.int64]
-    """(L,) index in the pool."""
-    orders: NDArray[np.int64]
-    """(L,) what it does in the coming step: FLY, or DRAW after an end (NEXT_STEP)."""
-    asked: NDArray[np.float64]
-    """(L, U, size) actions."""
-    targets: NDArray[np.int64]
-    """(L, U) see `step_learners`, also the next two."""
-    candidates: NDArray[np.int64]
-    """(L, U, K_WAYPOINTS)."""
-    company: NDArray[np.float32]
-    """(L, W, 2)."""
-    commands: NDArray[np.void]
-    """(threads, U) of the lane that a thread flew last: all lanes share them, so they stay in its
-    cache."""
-    outcome: NDArray[np.void]
-    """(threads, U), likewise."""
-    report: NDArray[np.float64]
-    """(L, U, REPORT_SIZE)."""
-    rewards: NDArray[np.float64]
-    """(L, U) of each UAS for the latest step."""
-    swarm: NDArray[np.float64]
-    """(L, SWARM_SIZE) sums over the UAS, see SWARM_COVERED."""
-    terminated: NDArray[np.bool_]
-    """(L,) no UAS flies any more."""
-    truncated: NDArray[np.bool_]
-    """(L,) one still flies after the last step allowed."""
+    worlds: WorldState
+    """With an axis of lanes in front."""
+    learners: Learners
+    """Likewise."""
+    lanes: Lanes
+    final: Final
+    scratch: Scratch
+    """With an axis of threads in front: all lanes that a thread flies share them, so they stay in
+    its cache."""
     settled: NDArray[np.bool_]
     """(L, U) it does not fly, and what it saw last lies in both arrays of observations."""
-    final_observation: NDArray[np.float32]
-    """(L, U, OBSERVATION_SIZE) of the last mission that ended in a lane; SAME_STEP only."""
-    final_report: NDArray[np.float64]
-    """(L, U, REPORT_SIZE), likewise."""
-    final_swarm: NDArray[np.float64]
-    """(L, SWARM_SIZE), likewise."""
-    final_candidates: NDArray[np.int64]
-    """(L, U, K_WAYPOINTS), likewise."""
+
+
+def new_missions(pool: ScenarioPool, num_envs: int, threads: int) -> Missions:
+    """Missions of which none has begun, seeded with numbers of no meaning."""
+    sizes = {**pool.sizes, "L": num_envs}
+    missions = Missions(
+        lanes_of(num_envs, pool.arrays.starts),
+        LEARNERS.zeros(sizes, lanes=num_envs),
+        LANES.zeros(sizes),
+        FINAL.zeros(sizes),
+        SCRATCH.zeros(sizes, lanes=threads),
+        np.zeros((num_envs, sizes["U"]), dtype=np.bool_),
+    )
+    seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
+    missions.lanes.seed[:] = seeds
+    missions.lanes.mission[:] = -1
+    missions.lanes.orders[:] = FLY
+    return missions
+
+
+_scratch_of = lane_view(SCRATCH, sized_by=ARENA)
 
 
 @kernel
@@ -129,50 +167,50 @@ def _copy(source, target):
 
 
 @inlined_kernel
-def _begin_lane(pool, tables, worlds, lanes, lane, order, observation):
+def _begin_lane(pool, missions, lane, order, observation):
     """Begin a mission in a lane, as `Episode.reset` does for a single one."""
+    lanes = missions.lanes
     s = order
     if order == DRAW:
-        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.spans.shape[0])
-    candidates, company, seen = first_look_of(tables, s)
-    n_uas, n_waypoints = candidates.shape[0], company.shape[0]
-    state = state_of(worlds, lane, n_uas, n_waypoints)
-    begin(pool, s, state)
+        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.arenas.sizes.shape[0])
     lanes.scenario[lane] = s
     lanes.mission[lane] += 1
     lanes.orders[lane] = FLY
-    n_covered = 0
-    for w in range(n_waypoints):
-        n_covered += not state.uncovered[w]
-    for i in range(lanes.report.shape[1]):
-        if i >= n_uas:
-            worlds.status[lane, i] = ABSENT
-            for k in range(K_WAYPOINTS):
-                lanes.candidates[lane, i, k] = -1
-            for k in range(OBSERVATION_SIZE):
-                observation[lane, i, k] = 0.0
-        lanes.targets[lane, i] = NO_TARGET
-        lanes.settled[lane, i] = False
+    copy_arrays(start_of(pool.starts, s), state_of(missions.worlds, lane, pool.arenas, s))
+    first = first_learners_at(pool.learners, s)
+    copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
+    n_uas = first.report.shape[0]
+    n_covered = first.report[0, COVERED]
+    seen = first_look_at(pool.looks, s).observation
+    _copy(seen, borrow(observation, lane, seen.shape))
+    report = missions.learners.report
+    for i in range(n_uas, report.shape[1]):
+        missions.worlds.status[lane, i] = ABSENT
+        missions.learners.targets[lane, i] = NO_TARGET
+        for k in range(K_WAYPOINTS):
+            missions.learners.candidates[lane, i, k] = -1
+        for k in range(OBSERVATION_SIZE):
+            observation[lane, i, k] = 0.0
         for column in range(REPORT_SIZE):
-            lanes.report[lane, i, column] = 0.0
-        lanes.report[lane, i, CONTACT_WITH] = -1.0
-        lanes.report[lane, i, STATUS] = worlds.status[lane, i]
-        lanes.report[lane, i, COVERED] = n_covered
+            report[lane, i, column] = 0.0
+        report[lane, i, CONTACT_WITH] = -1.0
+        report[lane, i, STATUS] = ABSENT
+        report[lane, i, COVERED] = n_covered
+    for i in range(report.shape[1]):
+        missions.settled[lane, i] = False
     for column in range(SWARM_SIZE):
         lanes.swarm[lane, column] = 0.0
     lanes.swarm[lane, SWARM_COVERED] = n_covered
-    _copy(candidates, borrow(lanes.candidates, lane, candidates.shape))
-    _copy(company, borrow(lanes.company, lane, company.shape))
-    _copy(seen, borrow(observation, lane, seen.shape))
 
 
 @inlined_kernel
-def _settle(worlds, lanes, lane, n_uas, max_steps):
+def _add_up(worlds, lanes, learners, lane, max_steps):
     """Add up what a step has brought, in the order of UAS and terms; says if the mission is over.
 
     The order matters: sums of floats depend on it, and a lane must equal a single mission.
     """
-    report = borrow(lanes.report, lane, (n_uas, REPORT_SIZE))
+    report = learners.report
+    n_uas = report.shape[0]
     flies = False
     for i in range(lanes.rewards.shape[1]):
         lanes.rewards[lane, i] = 0.0
@@ -196,27 +234,37 @@ def _settle(worlds, lanes, lane, n_uas, max_steps):
 
 
 @inlined_kernel
-def _keep_last_looks(worlds, lanes, lane, n_uas, before, observation):
+def _keep_last_looks(worlds, settled, lane, n_uas, before, observation):
     """What a UAS that does not fly has seen last stays its observation.
 
     Two arrays take turns: once it lies in both, nothing has to be copied any more.
     """
     for i in range(observation.shape[1]):
         flies = i < n_uas and worlds.status[lane, i] == FLYING
-        if not flies and not lanes.settled[lane, i]:
+        if not flies and not settled[lane, i]:
             for k in range(OBSERVATION_SIZE):
                 observation[lane, i, k] = before[lane, i, k]
-        lanes.settled[lane, i] = not flies
+        settled[lane, i] = not flies
 
 
 @inlined_kernel
-def step_lane(
-    pool, tables, worlds, lanes, lane, order, thread, kind, weights, nonlinear, assistants,
-    autoreset, before, observation,
-):  # fmt: skip
-    """One lane of `step_batch`."""
+def _keep_end(missions, lane, observation):
+    """Keep the end of a mission, before the next begins in the same step."""
+    final = missions.final
     whole = (observation.shape[1], OBSERVATION_SIZE)
+    _copy(borrow(observation, lane, whole), borrow(final.observation, lane, whole))
+    _copy(missions.learners.report[lane], final.report[lane])
+    _copy(missions.learners.candidates[lane], final.candidates[lane])
+    for column in range(SWARM_SIZE):
+        final.swarm[lane, column] = missions.lanes.swarm[lane, column]
+
+
+@inlined_kernel
+def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, observation):
+    """One lane of `step_batch`."""
+    lanes = missions.lanes
     if order == REST:
+        whole = (observation.shape[1], OBSERVATION_SIZE)
         _copy(borrow(before, lane, whole), borrow(observation, lane, whole))
         return
     begins = order != FLY
@@ -227,35 +275,26 @@ def step_lane(
             lanes.rewards[lane, i] = 0.0
     else:
         s = lanes.scenario[lane]
-        arena = arena_of(pool, s)
-        ranges, scales, neighbours = tables_of(tables, s)
-        n_uas, n_waypoints = arena.uas.shape[0], arena.waypoints.shape[0]
+        arena = arena_of(pool.arenas, s)
         max_steps = arena.rules[0].max_steps
-        state = state_of(worlds, lane, n_uas, n_waypoints)
-        _keep_last_looks(worlds, lanes, lane, n_uas, before, observation)
+        state = state_of(missions.worlds, lane, pool.arenas, s)
+        learners = learners_of(missions.learners, lane, pool.arenas, s)
+        n_uas = state.status.shape[0]
+        _keep_last_looks(missions.worlds, missions.settled, lane, n_uas, before, observation)
         step_learners(
-            arena, state, kind, ranges, scales, neighbours, weights, nonlinear, assistants,
-            borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])),
-            borrow(lanes.targets, lane, (n_uas,)),
-            borrow(lanes.candidates, lane, (n_uas, K_WAYPOINTS)),
-            borrow(lanes.company, lane, (n_waypoints, 2)),
-            borrow(lanes.commands, thread, (n_uas,)), borrow(lanes.outcome, thread, (n_uas,)),
-            borrow(lanes.report, lane, (n_uas, REPORT_SIZE)), max_steps,
+            arena, state, tables_at(pool.tables, s), learners,
+            _scratch_of(missions.scratch, thread, pool.arenas, s), rules, max_steps,
             borrow(observation, lane, (n_uas, OBSERVATION_SIZE)),
         )  # fmt: skip
-        over = _settle(worlds, lanes, lane, n_uas, max_steps)
+        over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
         if over and autoreset == NEXT_STEP:
             lanes.orders[lane] = DRAW
         elif over and autoreset == SAME_STEP:
-            _copy(borrow(observation, lane, whole), borrow(lanes.final_observation, lane, whole))
-            _copy(lanes.report[lane], lanes.final_report[lane])
-            _copy(lanes.candidates[lane], lanes.final_candidates[lane])
-            for column in range(SWARM_SIZE):
-                lanes.final_swarm[lane, column] = lanes.swarm[lane, column]
+            _keep_end(missions, lane, observation)
             begins = True
             order = DRAW
     if begins:
-        _begin_lane(pool, tables, worlds, lanes, lane, order, observation)
+        _begin_lane(pool, missions, lane, order, observation)
 
 
 @kernel
@@ -268,41 +307,40 @@ def _all_finite(numbers):
 
 
 @kernel
-def _first_refused(pool, lanes, orders):
+def _first_refused(pool, missions, orders):
     """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
-    if _all_finite(borrow(lanes.asked, 0, (lanes.asked.size,))):
+    asked = missions.learners.asked
+    if _all_finite(borrow(asked, 0, (asked.size,))):
         return ACCEPTED
-    for lane in range(lanes.scenario.shape[0]):
+    for lane in range(asked.shape[0]):
         if orders[lane] != FLY:
             continue
-        at = pool.spans[lanes.scenario[lane]]
-        n_uas = at.uas[1] - at.uas[0]
-        i = first_not_finite(borrow(lanes.asked, lane, (n_uas, lanes.asked.shape[2])))
+        s = missions.lanes.scenario[lane]
+        i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
         if i != ACCEPTED:
-            return lane * lanes.asked.shape[1] + i
+            return lane * asked.shape[1] + i
     return ACCEPTED
 
 
+class BatchRules(NamedTuple):
+    """What holds for all steps of all lanes."""
+
+    rules: Rules
+    autoreset: int
+    """NEXT_STEP, SAME_STEP or DISABLED."""
+
+
 @kernel
-def step_batch(
-    pool, tables, worlds, lanes, orders, kind, weights, nonlinear, assistants, autoreset,
-    before, observation,
-):  # fmt: skip
+def step_batch(pool, missions, orders, rules, before, observation):
     """Fly all lanes for one step, or begin missions in them.
 
     One kernel for both: each takes ten seconds to compile.
 
     Args:
-        pool: `ArenaPool`.
-        tables: `LearnerTables`.
-        worlds: `WorldState` of all lanes; written.
-        lanes: `Lanes` with `asked` filled in; written.
+        pool: `MissionPool`.
+        missions: `Missions` with `asked` filled in; written.
         orders: (L,) what each lane does; `lanes.orders`, or an array of its own.
-        kind: See `step_learners`, also the next three.
-        weights: (R,).
-        nonlinear: Whether.
-        assistants: Who helps to fly.
-        autoreset: NEXT_STEP, SAME_STEP or DISABLED.
+        rules: `BatchRules`.
         before: (L, U, OBSERVATION_SIZE) float32, the observations of the step before.
         observation: (L, U, OBSERVATION_SIZE) float32, another array; written.
 
@@ -310,31 +348,28 @@ def step_batch(
         ACCEPTED, or lane · U + i of the first UAS whose action is not finite; then nothing has
         changed.
     """
-    refused = _first_refused(pool, lanes, orders)
+    refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
-        for lane in range(lanes.scenario.shape[0]):
+        for lane in range(orders.shape[0]):
             step_lane(
-                pool, tables, worlds, lanes, lane, orders[lane], 0, kind, weights, nonlinear,
-                assistants, autoreset, before, observation,
+                pool, missions, lane, orders[lane], 0, rules.rules, rules.autoreset, before,
+                observation,
             )  # fmt: skip
     return refused
 
 
 @allocating_kernel(parallel=True)
-def step_batch_in_threads(
-    pool, tables, worlds, lanes, orders, kind, weights, nonlinear, assistants, autoreset,
-    before, observation,
-):  # fmt: skip
+def step_batch_in_threads(pool, missions, orders, rules, before, observation):
     """`step_batch`, the lanes shared among numba's threads.
 
     A function of its own: to start threads takes longer than to fly a few lanes, and numba's cache
     cannot tell two ways to compile one function apart.
     """
-    refused = _first_refused(pool, lanes, orders)
+    refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
-        for lane in prange(lanes.scenario.shape[0]):
+        for lane in prange(orders.shape[0]):
             step_lane(
-                pool, tables, worlds, lanes, lane, orders[lane], get_thread_id(), kind, weights,
-                nonlinear, assistants, autoreset, before, observation,
+                pool, missions, lane, orders[lane], get_thread_id(), rules.rules, rules.autoreset,
+                before, observation,
             )  # fmt: skip
     return refused

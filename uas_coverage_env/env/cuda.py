@@ -16,38 +16,45 @@ from numba import config, cuda
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import first_not_finite, write_commands
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.kernel import ACCEPTED, CONTACT_WITH, COVERED, REWARD, STATUS, settle
-from uas_coverage_env.env.nearest import NO_TARGET
+from uas_coverage_env.env.kernel import ACCEPTED, finish_step
+from uas_coverage_env.env.memory import (
+    LEARNERS,
+    LOOK,
+    REWARD,
+    SCRATCH,
+    STATUS,
+    Learners,
+    Look,
+    Scratch,
+)
+from uas_coverage_env.env.pool import (
+    MissionPool,
+    ScenarioPool,
+    first_learners_at,
+    first_look_at,
+    learners_of,
+    tables_at,
+)
+from uas_coverage_env.env.rewards import weights_of
 from uas_coverage_env.kernels import kernel
+from uas_coverage_env.memory import copy_arrays, lane_view
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING, Arena, WorldState
+from uas_coverage_env.world import FLYING, WorldState
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.pool import arena_of, lanes_of, start_of, state_of
+from uas_coverage_env.world.state import STATE
 from uas_coverage_env.world.step import begin_step, carry_out
 
 THREADS_PER_BLOCK = 64
 
 
 class Missions(NamedTuple):
-    """All missions of N lanes; the first axis is the lane."""
+    """All missions of N lanes; the first axis of every array is the lane."""
 
-    x: NDArray[np.float64]
-    """(N, U, 14) see `WorldState`, also the next six."""
-    reference: NDArray[np.float64]
-    status: NDArray[np.int64]
-    departed: NDArray[np.bool_]
-    returning: NDArray[np.bool_]
-    uncovered: NDArray[np.bool_]
-    step: NDArray[np.int64]
-    asked: NDArray[np.float64]
-    """(N, U, size) see `step_learners`, also the next six."""
-    targets: NDArray[np.int64]
-    candidates: NDArray[np.int64]
-    company: NDArray[np.float32]
-    commands: NDArray[np.void]
-    outcome: NDArray[np.void]
-    report: NDArray[np.float64]
-    observation: NDArray[np.float32]
-    """(N, U, OBSERVATION_SIZE)."""
+    worlds: WorldState
+    learners: Learners
+    looks: Look
+    scratch: Scratch
     rewards: NDArray[np.float64]
     """(N, U) of each UAS for the latest step."""
     ended: NDArray[np.bool_]
@@ -58,101 +65,52 @@ class Missions(NamedTuple):
     """(N,) agent-steps flown since the beginning."""
 
 
-class Tables(NamedTuple):
-    """What is the same in all lanes."""
-
-    ranges: NDArray[np.void]
-    scales: NDArray[np.void]
-    neighbours: NDArray[np.void]
-    weights: NDArray[np.float64]
-
-
-class Start(NamedTuple):
-    """What changes in a mission and is not zero at its start."""
-
-    x: NDArray[np.float64]
-    uncovered: NDArray[np.bool_]
-    candidates: NDArray[np.int64]
-    company: NDArray[np.float32]
-    observation: NDArray[np.float32]
+_scratch_of = lane_view(SCRATCH, sized_by=ARENA)
+_look_of = lane_view(LOOK, sized_by=ARENA)
 
 
 @kernel
-def _begin_mission(start, missions, lane):
-    n_covered = 0
-    for w in range(start.uncovered.shape[0]):
-        missions.uncovered[lane, w] = start.uncovered[w]
-        n_covered += not start.uncovered[w]
-        for k in range(2):
-            missions.company[lane, w, k] = start.company[w, k]
-    missions.step[lane, 0] = 0
-    for i in range(start.x.shape[0]):
-        for k in range(start.x.shape[1]):
-            missions.x[lane, i, k] = start.x[i, k]
-        missions.reference[lane, i, 0] = 0.0
-        missions.reference[lane, i, 1] = 0.0
-        missions.status[lane, i] = FLYING
-        missions.departed[lane, i] = False
-        missions.returning[lane, i] = False
-        missions.targets[lane, i] = NO_TARGET
-        missions.rewards[lane, i] = 0.0
-        for k in range(start.candidates.shape[1]):
-            missions.candidates[lane, i, k] = start.candidates[i, k]
-        for k in range(start.observation.shape[1]):
-            missions.observation[lane, i, k] = start.observation[i, k]
-        for k in range(missions.report.shape[2]):
-            missions.report[lane, i, k] = 0.0
-        missions.report[lane, i, CONTACT_WITH] = -1.0
-        missions.report[lane, i, COVERED] = n_covered
-
-
-@kernel
-def step_mission(arena, tables, start, missions, kind, nonlinear, lane):
+def step_mission(pool, weights, missions, kind, nonlinear, lane):
     """Fly one lane for one step; see `Missions`.
 
     Args:
-        arena: The arena.
-        tables: `Tables`.
-        start: `Start`.
+        pool: `MissionPool` of one scenario.
+        weights: (R,) of the reward terms.
         missions: `Missions`; the lane is written.
         kind: Kind of command that the actions become, not GO_TO.
         nonlinear: Whether the 6-DOF plant is flown.
         lane: Which.
     """
-    missions.refused[lane] = first_not_finite(missions.asked[lane]) != ACCEPTED
+    state = state_of(missions.worlds, lane, pool.arenas, 0)
+    learners = learners_of(missions.learners, lane, pool.arenas, 0)
+    seen = _look_of(missions.looks, lane, pool.arenas, 0)
+    missions.refused[lane] = first_not_finite(learners.asked) != ACCEPTED
     if missions.refused[lane]:
         return
     if missions.ended[lane]:
         missions.ended[lane] = False
-        _begin_mission(start, missions, lane)
+        copy_arrays(start_of(pool.starts, 0), state)
+        copy_arrays(first_learners_at(pool.learners, 0), learners)
+        copy_arrays(first_look_at(pool.looks, 0), seen)
+        for i in range(state.status.shape[0]):
+            missions.rewards[lane, i] = 0.0
         return
-    state = WorldState(
-        missions.x[lane],
-        missions.reference[lane],
-        missions.status[lane],
-        missions.departed[lane],
-        missions.returning[lane],
-        missions.uncovered[lane],
-        missions.step[lane],
-    )
-    commands = missions.commands[lane]
-    outcome = missions.outcome[lane]
-    targets = missions.targets[lane]
-    candidates = missions.candidates[lane]
-    report = missions.report[lane]
+    arena = arena_of(pool.arenas, 0)
+    tables = tables_at(pool.tables, 0)
+    scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
     max_steps = arena.rules[0].max_steps
-    write_commands(state, kind, tables.ranges, missions.asked[lane], candidates, targets, commands)
-    begin_step(state, commands, outcome)
-    carry_out(arena, state, nonlinear, outcome)
-    settle(
-        arena, state, tables.scales, tables.neighbours, tables.weights, targets, candidates,
-        missions.company[lane], commands, outcome, report, max_steps, missions.observation[lane],
+    write_commands(
+        state, kind, tables.ranges, learners.asked, learners.candidates, learners.targets,
+        scratch.commands,
     )  # fmt: skip
+    begin_step(state, scratch.commands, scratch.outcome)
+    carry_out(arena, state, nonlinear, scratch.outcome)
+    finish_step(arena, state, tables, learners, scratch, weights, max_steps, seen.observation)
     flies = False
-    for i in range(report.shape[0]):
-        missions.rewards[lane, i] = report[i, REWARD]
-        missions.acted[lane] += outcome[i].flew
-        flies = flies or report[i, STATUS] == FLYING
+    for i in range(state.status.shape[0]):
+        missions.rewards[lane, i] = learners.report[i, REWARD]
+        missions.acted[lane] += scratch.outcome[i].flew
+        flies = flies or learners.report[i, STATUS] == FLYING
     missions.ended[lane] = not flies or state.step[0] >= max_steps
 
 
@@ -162,11 +120,18 @@ def _on_device(array: NDArray) -> Any:
     return array.copy() if simulated else cuda.to_device(array)
 
 
+def _all_on_device(arrays: Any) -> Any:
+    """The same named tuple, of arrays and named tuples, with its arrays on the device."""
+    if isinstance(arrays, np.ndarray):
+        return _on_device(arrays)
+    return arrays._make(map(_all_on_device, arrays))
+
+
 @cuda.jit
-def _step_missions(arena, tables, start, missions, kind, nonlinear):
+def _step_missions(pool, weights, missions, kind, nonlinear):
     lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
     if lane < missions.ended.shape[0]:
-        step_mission(arena, tables, start, missions, kind, nonlinear, lane)
+        step_mission(pool, weights, missions, kind, nonlinear, lane)
 
 
 class CudaMissions:
@@ -183,7 +148,7 @@ class CudaMissions:
         max_cycles: Steps after which missions are cut; None: the scenario's.
 
     Attributes:
-        missions: `Missions` on the device; to be read only, but for `asked`.
+        missions: `Missions` on the device; to be read only, but for `learners.asked`.
 
     Raises:
         ValueError: An argument is none of what is allowed.
@@ -202,31 +167,30 @@ class CudaMissions:
     ) -> None:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
-        episode = Episode(
-            scenario,
-            action=action,
-            dynamics=dynamics,
-            return_mode=False,
-            safety_filter=False,
-            reward_weights=reward_weights,
-            max_cycles=max_cycles,
-        )
-        if episode.chooses:
+        if dynamics not in ("lpv", "nonlinear"):
+            raise ValueError(f"dynamics is {dynamics!r}; it is 'lpv' or 'nonlinear'")
+        pool = ScenarioPool(scenario, action=action, max_cycles=max_cycles)
+        if action == "waypoint":
             raise ValueError("the waypoint action needs guidance, which does not run on a GPU")
-        episode.reset()
-        arena, tables, start, one = episode.arrays()
-        nothing = np.zeros((), dtype=np.bool_)
-        changing = (*one, np.zeros(len(episode.names)), nothing, nothing, np.zeros((), np.int64))
-        self.missions = Missions(
-            *(_on_device(np.repeat(array[None], num_envs, axis=0)) for array in changing)
+        n_uas = pool.sizes["U"]
+        missions = Missions(
+            lanes_of(num_envs, pool.arrays.starts),
+            LEARNERS.zeros(pool.sizes, lanes=num_envs),
+            LOOK.zeros(pool.sizes, lanes=num_envs),
+            SCRATCH.zeros(pool.sizes, lanes=num_envs),
+            np.zeros((num_envs, n_uas)),
+            np.zeros(num_envs, dtype=np.bool_),
+            np.zeros(num_envs, dtype=np.bool_),
+            np.zeros(num_envs, dtype=np.int64),
         )
+        _begin_all(pool.arrays, missions)
+        self.missions: Missions = _all_on_device(missions)
         self._blocks = -(-num_envs // THREADS_PER_BLOCK)
         self._arguments = (
-            Arena(*map(_on_device, arena)),
-            Tables(*map(_on_device, tables)),
-            Start(*map(_on_device, start)),
+            _all_on_device(pool.arrays),
+            _on_device(weights_of(reward_weights)),
             self.missions,
-            episode.actions.kind,
+            pool.actions.kind,
             dynamics == "nonlinear",
         )
 
@@ -235,10 +199,22 @@ class CudaMissions:
 
         Args:
             asked: (N, U, size) actions, on the host or on the device; None: what is in
-                `missions.asked`. Of a lane with one that is not finite nothing is flown, and
-                `missions.refused` is set.
+                `missions.learners.asked`. Of a lane with one that is not finite nothing is flown,
+                and `missions.refused` is set.
         """
         if asked is not None:
-            self.missions.asked[:] = asked
+            self.missions.learners.asked[:] = asked
         launched: Any = _step_missions
         launched[self._blocks, THREADS_PER_BLOCK](*self._arguments)
+
+
+def _begin_all(pool: MissionPool, missions: Missions) -> None:
+    """Put all lanes at t = 0."""
+    parts = (
+        (missions.worlds, STATE.mission(pool.starts, 0)),
+        (missions.learners, LEARNERS.mission(pool.learners, 0)),
+        (missions.looks, LOOK.mission(pool.looks, 0)),
+    )
+    for arrays, first in parts:
+        for array, start in zip(arrays, first, strict=True):
+            array[:] = start

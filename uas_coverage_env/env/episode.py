@@ -10,32 +10,22 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import HOME_CHOICE, actions_of
 from uas_coverage_env.env.global_state import global_space, global_state
-from uas_coverage_env.env.kernel import (
-    ACCEPTED,
-    CONTACT_WITH,
-    COVERED,
-    REPORT_SIZE,
-    STATUS,
-    addresses_of,
-    step_episode,
-)
-from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
-from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
-from uas_coverage_env.env.observation import observe, scales_of
+from uas_coverage_env.env.kernel import ACCEPTED, step_episode
+from uas_coverage_env.env.layout import OBSERVATION_SIZE
+from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners, Prices
 from uas_coverage_env.env.rewards import weights_of
+from uas_coverage_env.env.start import first_look, tables_of
 from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.world import (
-    COMMAND_DTYPE,
     CONTACT_NAMES,
-    FLYING,
     KIND_NAMES,
-    OUTCOME_DTYPE,
     STATUS_NAMES,
     SwarmState,
     World,
     assistants,
 )
+from uas_coverage_env.world.arena import ARENA
 
 _LONGEST = 100_000
 _FLOAT32 = np.dtype(np.float32)
@@ -60,6 +50,7 @@ class Episode:
         max_cycles: Steps after which the episode is cut.
         chooses: Whether the action is a choice of waypoints.
         steps: Flown since t = 0.
+        tables: What does not change during a mission.
         asked: (U, size) the actions of the coming step, to be written before it.
         observation: (U, OBSERVATION_SIZE) the latest; a new array in every step.
 
@@ -105,99 +96,56 @@ class Episode:
             "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
             "uas": self.names,
         }
-        n_uas = len(self.names)
-        self._scales = scales_of(scenario)
-        self._neighbours = neighbours_of(scenario)
-        self.asked = np.zeros((n_uas, self.actions.size))
-        self._targets = np.full(n_uas, NO_TARGET)
-        self._candidates = np.full((n_uas, K_WAYPOINTS), -1)
-        self._company = np.zeros((len(scenario.waypoints), 2), np.float32)
-        self._commands = np.zeros(n_uas, dtype=COMMAND_DTYPE)
-        self._outcome = np.zeros(n_uas, dtype=OUTCOME_DTYPE)
-        self._report = np.zeros((n_uas, REPORT_SIZE))
-        self._observation_shape = (n_uas, OBSERVATION_SIZE)
+        self.tables = tables_of(scenario, self.actions)
+        sizes = ARENA.sizes_of(self._world.arena, {"A": self.actions.size})
+        self._learners = LEARNERS.zeros(sizes)
+        self._scratch = SCRATCH.zeros(sizes)
+        self._prices = Prices(weights_of(reward_weights))
+        self.asked = self._learners.asked
+        self._observation_shape = (len(self.names), OBSERVATION_SIZE)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
-        self._first_look: tuple[NDArray[Any], ...] | None = None
+        self._first: tuple[Learners, NDArray[np.float32]] | None = None
         self._prepare()
-
-    @property
-    def _fixed(self) -> tuple[NDArray[Any], ...]:
-        """The first arrays of a learners' step, which nothing writes."""
-        return self.actions.ranges, self._scales, self._neighbours, self._weights
-
-    @property
-    def _changing(self) -> tuple[NDArray[Any], ...]:
-        """The arrays of a learners' step after them, but for the observation."""
-        return (
-            self.asked,
-            self._targets,
-            self._candidates,
-            self._company,
-            self._commands,
-            self._outcome,
-            self._report,
-        )
 
     def _prepare(self) -> None:
         world = self._world
-        arrays = (*self._fixed, *self._changing)
-        aboard = assistants(world.return_mode, world.safety_filter, goes_to=self.chooses)
-        addresses = addresses_of(world.arena, world.state, arrays, aboard)
+        addresses = EPISODE.addresses_of(
+            world.arena, world.state, self.tables, self._learners, self._scratch, self._prices
+        )
+        called = assistants(world.return_mode, world.safety_filter, goes_to=self.chooses)
         # what the kernel is given in every step: the arrays are written in place
-        self._given = (*addresses, self.actions.kind, world.dynamics == "nonlinear")
-        look = self.observation
-        self._step = machine_code(step_episode, (*self._given, self.max_cycles, look, look))
+        at = np.array([*addresses, *called])
+        self._given = (at, self.actions.kind, world.dynamics == "nonlinear")
+        seen = self.observation
+        # to assign a record field by field takes ten times as long
+        self._scratch_bytes = [array.view(np.uint8) for array in self._scratch]
+        self._step = machine_code(step_episode, (*self._given, self.max_cycles, seen, seen))
 
     def __getstate__(self) -> dict[str, Any]:
-        # neither machine code nor addresses travel
-        kept = self.__dict__.items()
-        return {key: value for key, value in kept if key not in ("_step", "_given")}
+        # neither machine code nor addresses and views travel
+        stays = ("_step", "_given", "_scratch_bytes")
+        return {key: value for key, value in self.__dict__.items() if key not in stays}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self.asked = self._learners.asked  # one array again, not two equal ones
         self._prepare()
 
     def reset(self) -> None:
         """Begin a new mission."""
         self._world.reset()
         self.steps = 0
-        self.asked[:] = 0.0
-        self._targets[:] = NO_TARGET
-        # as bytes: to assign a record field by field takes ten times as long
-        self._outcome.view(np.uint8)[:] = 0
-        self._commands.view(np.uint8)[:] = 0
-        if self._first_look is None:
-            self._first_look = self._look()
-        report, candidates, company, observation = self._first_look
-        self._report[:] = report
-        self._candidates[:] = candidates
-        self._company[:] = company
+        if self._first is None:
+            self._first = first_look(
+                self._world.arena, self._world.state, self.tables, self.actions.size
+            )
+        first, observation = self._first
+        for array, start in zip(self._learners, first, strict=True):
+            array[:] = start
+        for array in self._scratch_bytes:
+            array[:] = 0
         self.observation = observation.copy()
-
-    def _look(self) -> tuple[NDArray[Any], ...]:
-        """What missions begin with, always the same: report, candidates, company, observation."""
-        world = self._world
-        report = np.zeros_like(self._report)
-        report[:, CONTACT_WITH] = -1
-        report[:, STATUS] = world.state.status
-        report[:, COVERED] = (~world.state.uncovered).sum()
-        candidates = np.full_like(self._candidates, -1)
-        company = np.zeros_like(self._company)
-        observation = np.zeros_like(self.observation)
-        count_company(world.state.uncovered, self._neighbours, company)
-        observe(
-            world.arena,
-            world.state,
-            self._scales,
-            company,
-            world.state.status == FLYING,
-            self._targets,
-            self.max_cycles,
-            candidates,
-            observation,
-        )
-        return report, candidates, company, observation
 
     def step(self) -> list[list[float]]:
         """Fly what was asked for one step.
@@ -218,37 +166,12 @@ class Episode:
             )
         self.observation = observation
         self.steps += 1
-        return self._report.tolist()
-
-    def arrays(self) -> tuple[tuple[Any, ...], ...]:
-        """What a kernel needs to fly many of these missions, after `reset`.
-
-        Returns:
-            The arena; what else does not change; what is not zero at the start; all that changes,
-            in the order of `WorldState` and `step_learners`.
-        """
-        world = self._world
-        return (
-            world.arena,
-            self._fixed,
-            (
-                world.state.x,
-                world.state.uncovered,
-                self._candidates,
-                self._company,
-                self.observation,
-            ),
-            (
-                *world.state,
-                *self._changing,
-                self.observation,
-            ),
-        )
+        return self._learners.report.tolist()
 
     @property
     def report(self) -> list[list[float]]:
         """The report of the latest step; before the first, one in which nothing happened."""
-        return self._report.tolist()
+        return self._learners.report.tolist()
 
     def global_state(self) -> NDArray[np.float32]:
         """The whole mission as one vector, see `global_state`."""
@@ -260,7 +183,7 @@ class Episode:
             state.uncovered,
             self._world.arena.moving_path_m[sample],
             self._world.arena.moving_velocity_mps[sample],
-            self._scales[0],
+            self.tables.scales[0],
         )
 
     def state_space(self) -> spaces.Box:
@@ -315,15 +238,15 @@ class Episode:
         if self._filters:
             info["filter"] = {
                 "changed": filtered > 0.0,
-                "asked": _described(self._commands[i]),
-                "applied": _described(self._outcome[i]["applied_command"]),
+                "asked": _described(self._scratch.commands[i]),
+                "applied": _described(self._scratch.outcome[i]["applied_command"]),
             }
         return info
 
     def action_mask(self, i: int) -> NDArray[np.int8]:
         """(K_WAYPOINTS + 1,) 1 where a choice of UAS i names a waypoint, and for home."""
         mask = np.ones(HOME_CHOICE + 1, np.int8)
-        mask[:HOME_CHOICE] = self._candidates[i] >= 0
+        mask[:HOME_CHOICE] = self._learners.candidates[i] >= 0
         return mask
 
 

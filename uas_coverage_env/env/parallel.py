@@ -13,8 +13,8 @@ from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.kernel import REWARD, STATUS
 from uas_coverage_env.env.layout import observation_bounds
+from uas_coverage_env.env.memory import REWARD, STATUS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING

@@ -2,92 +2,45 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.episode import with_max_steps
-from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
-from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
-from uas_coverage_env.env.observation import look, scales_of
-from uas_coverage_env.kernels import kernel, lending_kernel
+from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES, Look
+from uas_coverage_env.env.start import first_look, tables_of
+from uas_coverage_env.memory import Pool, lane_view, pool_view
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.world.pool import (
-    arena_of,
-    begin,
-    end_to_end,
-    lanes_of,
-    n_of,
-    pool_arenas,
-    state_of,
-)
-
-_LOOKS = ("first_candidates", "first_company", "first_observation")
-_SPANNED = ("ranges", "scales", "neighbours", *_LOOKS)
-
-SPANS_DTYPE = np.dtype((np.record, np.dtype([(field, "i8", (2,)) for field in _SPANNED])))
-"""Where a scenario lies in each table: its first row, and the row after its last."""
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.pool import pool_worlds
+from uas_coverage_env.world.state import STATE
 
 
-class LearnerTables(NamedTuple):
-    """What learners need beside the arenas, of S scenarios end to end."""
+class MissionPool(NamedTuple):
+    """All that missions of S scenarios need, for kernels."""
 
-    ranges: NDArray[np.void]
-    """(all UAS,) of RANGES_DTYPE: what the numbers of an action mean."""
-    scales: NDArray[np.void]
-    """(all UAS,) of SCALES_DTYPE: what the numbers of an observation are divided by."""
-    neighbours: NDArray[np.void]
-    """(all waypoints,) of NEIGHBOURS_DTYPE."""
-    first_candidates: NDArray[np.int64]
-    """(all UAS, K_WAYPOINTS) what missions begin with, also the next two."""
-    first_company: NDArray[np.float32]
-    """(all waypoints, 2)."""
-    first_observation: NDArray[np.float32]
-    """(all UAS, OBSERVATION_SIZE)."""
-    spans: NDArray[np.void]
-    """(S,) of SPANS_DTYPE."""
+    arenas: Pool
+    """Of `ARENA`."""
+    starts: Pool
+    """Of `STATE`: the worlds at t = 0."""
+    tables: Pool
+    """Of `TABLES`."""
+    learners: Pool
+    """Of `LEARNERS`: at t = 0."""
+    looks: Pool
+    """Of `LOOK`: at t = 0."""
 
 
-@lending_kernel
-def tables_of(tables, s):
-    """Ranges, scales and neighbours of scenario s, in a kernel: borrowed views."""
-    at = tables.spans[s]
-    return (
-        borrow(tables.ranges, at.ranges[0], (at.ranges[1] - at.ranges[0],)),
-        borrow(tables.scales, at.scales[0], (at.scales[1] - at.scales[0],)),
-        borrow(tables.neighbours, at.neighbours[0], (at.neighbours[1] - at.neighbours[0],)),
-    )
+tables_at = pool_view(TABLES)
+"""In a kernel, (`MissionPool.tables`, s) -> the tables of scenario s."""
 
+first_learners_at = pool_view(LEARNERS)
+"""In a kernel, (`MissionPool.learners`, s) -> the learners' arrays at the start of scenario s."""
 
-@lending_kernel
-def first_look_of(tables, s):
-    """Candidates, company and observation at the start of scenario s, likewise."""
-    at = tables.spans[s]
-    n_uas = at.first_candidates[1] - at.first_candidates[0]
-    n_waypoints = at.first_company[1] - at.first_company[0]
-    return (
-        borrow(tables.first_candidates, at.first_candidates[0], (n_uas, K_WAYPOINTS)),
-        borrow(tables.first_company, at.first_company[0], (n_waypoints, 2)),
-        borrow(tables.first_observation, at.first_observation[0], (n_uas, OBSERVATION_SIZE)),
-    )
+first_look_at = pool_view(LOOK)
+"""In a kernel, (`MissionPool.looks`, s) -> what is seen at the start of scenario s."""
 
-
-@kernel
-def _look_first(arenas, tables, worlds, s, targets, candidates, company, observation):
-    """Write what is seen at the start of scenario s; it is the same in all its missions."""
-    arena = arena_of(arenas, s)
-    _, scales, neighbours = tables_of(tables, s)
-    state = state_of(worlds, 0, arena.uas.shape[0], arena.waypoints.shape[0])
-    begin(arenas, s, state)
-    count_company(state.uncovered, neighbours, company)
-    for i in range(arena.uas.shape[0]):
-        look(
-            arena, state, scales[i], company, i, targets, arena.rules[0].max_steps,
-            candidates[i], observation[i],
-        )  # fmt: skip
+learners_of = lane_view(LEARNERS, sized_by=ARENA)
+"""In a kernel, (learners, lane, `MissionPool.arenas`, s) -> those of a lane in scenario s."""
 
 
 class ScenarioPool:
@@ -102,8 +55,8 @@ class ScenarioPool:
     Attributes:
         scenarios: (S,) as flown, cut to `max_cycles`.
         actions: The kind of action, of the first scenario; kind and size are those of all.
-        arenas: For kernels, see `world.pool`.
-        tables: For kernels.
+        arrays: For kernels.
+        sizes: The largest of every named size.
         n_uas: (S,).
         n_waypoints: (S,).
 
@@ -120,39 +73,28 @@ class ScenarioPool:
     ) -> None:
         given = [scenario] if isinstance(scenario, str | Path | Scenario) else scenario
         self.scenarios = tuple(_loaded(entry, max_cycles) for entry in given)
-        self.arenas = pool_arenas(self.scenarios, measured_m=0.0)  # only what counts
-        self.n_uas = n_of(self.arenas, "uas")
-        self.n_waypoints = n_of(self.arenas, "waypoints")
+        worlds = pool_worlds(self.scenarios, measured_m=0.0)  # only what counts
         actions = [actions_of(action, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
-        blocks = {
-            "ranges": [entry.ranges for entry in actions],
-            "scales": [scales_of(scenario) for scenario in self.scenarios],
-            "neighbours": [neighbours_of(scenario) for scenario in self.scenarios],
-        }
-        spans = np.zeros(len(self.scenarios), dtype=SPANS_DTYPE)
-        arrays = {}
-        for field, rows in blocks.items():
-            arrays[field], spans[field] = end_to_end(rows)
-        unseen: dict[str, Any] = {field: np.zeros((0, 0)) for field in _LOOKS}
-        looks = self._first_looks(LearnerTables(**arrays, spans=spans, **unseen))
-        for field, rows in looks.items():
-            arrays[field], spans[field] = end_to_end(rows)
-        self.tables = LearnerTables(**arrays, spans=spans)
-
-    def _first_looks(self, tables: LearnerTables) -> dict[str, list[NDArray]]:
-        worlds = lanes_of(1, self.arenas)
-        looks: dict[str, list[NDArray]] = {field: [] for field in _LOOKS}
-        for s, (n_uas, n_waypoints) in enumerate(zip(self.n_uas, self.n_waypoints, strict=True)):
-            first = (
-                np.full((n_uas, K_WAYPOINTS), -1),
-                np.zeros((n_waypoints, 2), np.float32),
-                np.zeros((n_uas, OBSERVATION_SIZE), np.float32),
+        tables = [tables_of(*both) for both in zip(self.scenarios, actions, strict=True)]
+        first = [
+            first_look(
+                ARENA.mission(worlds.arenas, s),
+                STATE.mission(worlds.starts, s),
+                tables[s],
+                self.actions.size,
             )
-            _look_first(self.arenas, tables, worlds, s, np.full(n_uas, NO_TARGET), *first)
-            for rows, array in zip(looks.values(), first, strict=True):
-                rows.append(array)
-        return looks
+            for s in range(len(self.scenarios))
+        ]
+        self.arrays = MissionPool(
+            *worlds,
+            TABLES.pool(tables),
+            LEARNERS.pool([learners for learners, _ in first]),
+            LOOK.pool([Look(observation) for _, observation in first]),
+        )
+        self.sizes = {**ARENA.largest(worlds.arenas), "A": self.actions.size}
+        self.n_uas = ARENA.size(worlds.arenas, "U")
+        self.n_waypoints = ARENA.size(worlds.arenas, "W")
 
     def __len__(self) -> int:
         return len(self.scenarios)

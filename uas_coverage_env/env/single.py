@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.kernel import COVERED, ENERGY, STATUS
 from uas_coverage_env.env.layout import observation_bounds
+from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.scenario import Scenario

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.batch import CoverageBatch, masks_of
 from uas_coverage_env.env.batch_kernel import SWARM_COVERED, SWARM_REWARD
-from uas_coverage_env.env.kernel import CONTACT, ENERGY, FILTERED, RETURNING, STATUS
 from uas_coverage_env.env.layout import observation_bounds
+from uas_coverage_env.env.memory import CONTACT, ENERGY, FILTERED, RETURNING, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.screen import RENDER_FPS
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
@@ -174,9 +174,9 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         observation = self._batch.reset(seed, mask=mask, scenarios=options.get("scenario"))
         self._tiles.forget(np.flatnonzero(mask).tolist())
         self._watch()
-        lanes = self._batch.lanes
+        learners, swarm = self._batch.learners, self._batch.lanes.swarm
         return self._shown(observation), self._infos(
-            lanes.report, lanes.swarm, lanes.candidates, mask
+            learners.report, swarm, learners.candidates, mask
         )
 
     def step(self, actions: NDArray[Any]) -> Arrays:
@@ -193,11 +193,12 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         observation = self._batch.step(actions)
         self._watch()
         lanes = self._batch.lanes
-        infos = self._infos(lanes.report, lanes.swarm, lanes.candidates, self._all)
+        learners = self._batch.learners
+        infos = self._infos(learners.report, lanes.swarm, learners.candidates, self._all)
         ended = lanes.terminated | lanes.truncated
         rewards = lanes.swarm[:, SWARM_REWARD].copy()
         if self._same_step and ended.any():
-            rewards[ended] = lanes.final_swarm[ended, SWARM_REWARD]
+            rewards[ended] = self._batch.missions.final.swarm[ended, SWARM_REWARD]
             self._add_final(infos, ended)
         return (
             self._shown(observation),
@@ -309,14 +310,12 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         return infos
 
     def _add_final(self, infos: dict[str, Any], ended: NDArray[np.bool_]) -> None:
-        lanes = self._batch.lanes
+        final = self._batch.missions.final
         final_obs = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(ended):
-            final_obs[lane] = lanes.final_observation[lane].ravel().copy()
+            final_obs[lane] = final.observation[lane].ravel().copy()
         infos["final_obs"], infos["_final_obs"] = final_obs, ended
-        infos["final_info"] = self._infos(
-            lanes.final_report, lanes.final_swarm, lanes.final_candidates, ended
-        )
+        infos["final_info"] = self._infos(final.report, final.swarm, final.candidates, ended)
         infos["_final_info"] = ended
 
     def _watch(self) -> None:

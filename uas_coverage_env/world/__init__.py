@@ -26,6 +26,7 @@ from uas_coverage_env.world.return_mode import has_to_return, seconds_home
 from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, crossing, route
 from uas_coverage_env.world.simulation import Dynamics, World, initial_state
 from uas_coverage_env.world.state import (
+    ABSENT,
     FLYING,
     LANDED,
     LOST,
@@ -36,6 +37,7 @@ from uas_coverage_env.world.state import (
 from uas_coverage_env.world.step import advance, begin_mission, first_invalid
 
 __all__ = [
+    "ABSENT",
     "ACCELERATION",
     "CLEAR",
     "CLIMB",

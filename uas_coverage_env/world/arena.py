@@ -1,16 +1,18 @@
 """A scenario as arrays, for the kernels: what never changes during a mission."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.memory import Memory
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
-from uas_coverage_env.world.boxes import SURE_M, obstacle_columns
+from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
+from uas_coverage_env.world.boxes import N_COLUMNS, SURE_M, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.world.routes import node_distances
 
@@ -121,39 +123,40 @@ RULES_DTYPE = _record(
 
 
 class Arena(NamedTuple):
-    """The scenario for kernels: entities as records, planes in two arrays."""
+    """The scenario for kernels: entities as records, planes in two arrays.
 
-    vehicles: NDArray[np.void]
-    """(U,) of VEHICLE_DTYPE."""
-    uas: NDArray[np.void]
-    """(U,) of UAS_DTYPE."""
-    obstacles: NDArray[np.void]
-    """(O,) of OBSTACLE_DTYPE."""
-    obstacle_columns: NDArray[np.float64]
-    """(N_COLUMNS, C) see `obstacle_columns`."""
-    normals: NDArray[np.float64]
-    """(F, 3) faces of the obstacles, the fence, and the walls of footprints."""
-    offsets_m: NDArray[np.float64]
-    """(F,) [m]."""
-    moving: NDArray[np.void]
-    """(M,) of MOVING_DTYPE."""
-    moving_path_m: NDArray[np.float64]
-    """(T+1, M, 3) [m] centres at every sample."""
-    moving_velocity_mps: NDArray[np.float64]
-    """(T+1, M, 3) [m/s] velocities at every sample."""
-    waypoints: NDArray[np.void]
-    """(W,) of WAYPOINT_DTYPE."""
-    waypoint_columns: NDArray[np.float64]
-    """(N_WAYPOINT_COLUMNS, W) what all waypoints are asked for, in the order in which a processor
-    takes four at a time: north, east, down [m], radius² [m²], weight; then whole numbers: share of
-    all weight in units of 1 / ALL_SHARES, and this times north and east in units of
-    `rules.unit_m`. Sums of whole numbers are exact, whatever their order."""
-    rules: NDArray[np.void]
-    """(1,) of RULES_DTYPE."""
-    nodes_m: NDArray[np.float64]
-    """(K, 2) [m] corners at which routes turn."""
-    node_distance_m: NDArray[np.float64]
-    """(W+U, K) [m] way from a corner to a waypoint or a start; inf where there is none."""
+    U UAS, O obstacles in C columns, F planes, M moving obstacles at T samples, W waypoints and
+    N nodes of routes.
+    """
+
+    vehicles: Annotated[NDArray[np.void], VEHICLE_DTYPE, "U"]
+    uas: Annotated[NDArray[np.void], UAS_DTYPE, "U"]
+    obstacles: Annotated[NDArray[np.void], OBSTACLE_DTYPE, "O"]
+    obstacle_columns: Annotated[NDArray[np.float64], N_COLUMNS, "C"]
+    """See `obstacle_columns`."""
+    normals: Annotated[NDArray[np.float64], "F", 3]
+    """Faces of the obstacles, the fence, and the walls of footprints."""
+    offsets_m: Annotated[NDArray[np.float64], "F"]
+    """[m]."""
+    moving: Annotated[NDArray[np.void], MOVING_DTYPE, "M"]
+    moving_path_m: Annotated[NDArray[np.float64], "T", "M", 3]
+    """[m] centres at every sample."""
+    moving_velocity_mps: Annotated[NDArray[np.float64], "T", "M", 3]
+    """[m/s] velocities at every sample."""
+    waypoints: Annotated[NDArray[np.void], WAYPOINT_DTYPE, "W"]
+    waypoint_columns: Annotated[NDArray[np.float64], N_WAYPOINT_COLUMNS, "W"]
+    """What all waypoints are asked for, in the order in which a processor takes four at a time:
+    north, east, down [m], radius² [m²], weight; then whole numbers: share of all weight in units of
+    1 / ALL_SHARES, and this times north and east in units of `rules.unit_m`. Sums of whole numbers
+    are exact, whatever their order."""
+    rules: Annotated[NDArray[np.void], RULES_DTYPE, 1]
+    nodes_m: Annotated[NDArray[np.float64], "N", 2]
+    """[m] corners at which routes turn."""
+    node_distance_m: Annotated[NDArray[np.float64], "W + U", "N"]
+    """[m] way from a corner to a waypoint or a start; inf where there is none."""
+
+
+ARENA = Memory(Arena)
 
 
 def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:

@@ -15,21 +15,12 @@ from numba.core import cgutils, errors
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from uas_coverage_env.vehicle import N_STATES
-from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
-from uas_coverage_env.world.arena import (
-    MOVING_DTYPE,
-    OBSTACLE_DTYPE,
-    RULES_DTYPE,
-    UAS_DTYPE,
-    WAYPOINT_DTYPE,
-    Arena,
-)
+from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.guidance import steer
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.return_mode import call_home
 from uas_coverage_env.world.safety import filter_commands
-from uas_coverage_env.world.state import WorldState
+from uas_coverage_env.world.state import STATE
 
 AssistantCode = NDArray[np.int64] | Sequence[Callable[..., None]]
 """Addresses of the assistants' machine code, in the order in which they are called; with
@@ -64,38 +55,11 @@ def _address_of(assistant: Any) -> int:
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
+@cache
 def _types() -> tuple[types.Type, ...]:
     """Of the arguments of every assistant: arena, state, nonlinear and outcome."""
-
-    def empty(dtype: Any, n_axes: int = 1) -> Any:
-        return np.empty((0,) * n_axes, dtype)
-
-    arena = Arena(
-        vehicles=empty(VEHICLE_DTYPE),
-        uas=empty(UAS_DTYPE),
-        obstacles=empty(OBSTACLE_DTYPE),
-        obstacle_columns=empty(float, 2),
-        normals=empty(float, 2),
-        offsets_m=empty(float),
-        moving=empty(MOVING_DTYPE),
-        moving_path_m=empty(float, 3),
-        moving_velocity_mps=empty(float, 3),
-        waypoints=empty(WAYPOINT_DTYPE),
-        waypoint_columns=empty(float, 2),
-        rules=empty(RULES_DTYPE),
-        nodes_m=empty(float, 2),
-        node_distance_m=empty(float, 2),
-    )
-    state = WorldState(
-        x=np.empty((0, N_STATES)),
-        reference=empty(float, 2),
-        status=empty(np.int64),
-        departed=empty(np.bool_),
-        returning=empty(np.bool_),
-        uncovered=empty(np.bool_),
-        step=empty(np.int64),
-    )
-    return typeof(arena), typeof(state), types.boolean, typeof(empty(OUTCOME_DTYPE))
+    outcome = typeof(np.empty(0, OUTCOME_DTYPE))
+    return ARENA.numba_type(), STATE.numba_type(), types.boolean, outcome
 
 
 def assist(assistant: Any, arena: Any, state: Any, nonlinear: Any, outcome: Any) -> None:

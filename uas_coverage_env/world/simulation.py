@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, N_STATES
+from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world.arena import build_arena
 from uas_coverage_env.world.assist import AssistantCode, assistants
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.state import FLYING, SwarmState, WorldState
-from uas_coverage_env.world.step import ACCEPTED, begin_mission, step_world
+from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState
+from uas_coverage_env.world.step import ACCEPTED, MISSION, begin_mission, step_world
 
 Dynamics = Literal["lpv", "nonlinear"]
 
@@ -24,19 +24,12 @@ _OUTCOMES_IN_BLOCK = 256
 
 def initial_state(scenario: Scenario) -> WorldState:
     """All UAS at rest at their starts, batteries rested, nothing covered."""
-    n_uas = len(scenario.uas)
-    x = np.zeros((n_uas, N_STATES))
-    x[:, :3] = [uas.start_m for uas in scenario.uas]
-    x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
-    return WorldState(
-        x=x,
-        reference=np.zeros((n_uas, 2)),
-        status=np.full(n_uas, FLYING),
-        departed=np.zeros(n_uas, dtype=np.bool_),
-        returning=np.zeros(n_uas, dtype=np.bool_),
-        uncovered=np.ones(len(scenario.waypoints), dtype=np.bool_),
-        step=np.zeros(1, dtype=np.int64),
-    )
+    state = STATE.zeros({"U": len(scenario.uas), "W": len(scenario.waypoints)})
+    state.x[:, :3] = [uas.start_m for uas in scenario.uas]
+    state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
+    state.status[:] = FLYING
+    state.uncovered[:] = True
+    return state
 
 
 class World:
@@ -76,7 +69,6 @@ class World:
         self._start = initial_state(scenario)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
-        self._before_commands = (*self.arena, *self._state)
         self._nonlinear = dynamics == "nonlinear"
         self._prepare()
 
@@ -85,10 +77,11 @@ class World:
         self._next_outcome = 0
         self._step: Callable[..., int] | None = None
         self._assistants: AssistantCode = ()
+        self._at = MISSION.addresses_of(self.arena, self._state)
 
     def __getstate__(self) -> dict[str, Any]:
-        # machine code does not travel: it is there, or compiled, wherever the copy goes
-        stays = ("_step", "_assistants", "_outcomes")
+        # neither machine code nor addresses travel: they are made anew wherever the copy goes
+        stays = ("_step", "_assistants", "_outcomes", "_at")
         return {k: v for k, v in self.__dict__.items() if k not in stays}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -131,7 +124,7 @@ class World:
             # not before: environments have a world, too, and a step of their own
             self._assistants = assistants(self.return_mode, self.safety_filter)
         outcome = self._fresh_outcome()
-        arguments = (*self._before_commands, commands, self._nonlinear, self._assistants, outcome)
+        arguments = (self._at, commands, self._nonlinear, self._assistants, outcome)
         if self._step is None:
             self._step = machine_code(step_world, arguments)
         invalid = self._step(*arguments)

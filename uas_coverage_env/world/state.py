@@ -1,13 +1,19 @@
 """The state of the world, and the part of it that a player sees."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.memory import Memory, Values
+from uas_coverage_env.vehicle import N_STATES
+
 FLYING, LANDED, LOST = range(3)
 """Status of a UAS. Landed and lost are final."""
+
+ABSENT = -1
+"""Status of a UAS that a mission does not have, in arrays with room for more."""
 
 STATUS_NAMES = ("flying", "landed", "lost")
 
@@ -15,24 +21,27 @@ STATUS_NAMES = ("flying", "landed", "lost")
 class WorldState(NamedTuple):
     """Everything that changes from step to step; the arrays are written in place."""
 
-    x: NDArray[np.float64]
-    """(U, 14) the paper's states, in the order of `vehicle.layout`."""
-    reference: NDArray[np.float64]
-    """(U, 2) [m/s] velocity that the inner loop tracks now, north and east."""
-    status: NDArray[np.int64]
-    """(U,) FLYING, LANDED or LOST."""
-    departed: NDArray[np.bool_]
-    """(U,) has been farther from its start than the landing distance."""
-    returning: NDArray[np.bool_]
-    """(U,) return mode has taken over."""
-    uncovered: NDArray[np.bool_]
-    """(W,) waypoint still to be covered."""
-    step: NDArray[np.int64]
-    """(1,) number of the sample, 0 at the start."""
+    x: Annotated[NDArray[np.float64], "U", N_STATES]
+    """The paper's states, in the order of `vehicle.layout`."""
+    reference: Annotated[NDArray[np.float64], "U", 2]
+    """[m/s] velocity that the inner loop tracks now, north and east."""
+    status: Annotated[NDArray[np.int64], "U", Values(ABSENT, LOST)]
+    """FLYING, LANDED or LOST; ABSENT in a batch, where a mission has fewer UAS than others."""
+    departed: Annotated[NDArray[np.bool_], "U"]
+    """Has been farther from its start than the landing distance."""
+    returning: Annotated[NDArray[np.bool_], "U"]
+    """Return mode has taken over."""
+    uncovered: Annotated[NDArray[np.bool_], "W"]
+    """Waypoint still to be covered."""
+    step: Annotated[NDArray[np.int64], 1, Values(0, "samples")]
+    """Number of the sample, 0 at the start."""
 
     def copy(self) -> Self:
         """The same state in arrays of its own."""
         return self._make(array.copy() for array in self)
+
+
+STATE = Memory(WorldState)
 
 
 @dataclass(frozen=True, slots=True)

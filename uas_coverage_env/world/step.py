@@ -3,8 +3,9 @@
 import math
 
 from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.memory import Layout
 from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
-from uas_coverage_env.world.arena import Arena
+from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.assist import assist
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
@@ -16,7 +17,7 @@ from uas_coverage_env.world.contacts import (
 from uas_coverage_env.world.control import command_wrench
 from uas_coverage_env.world.coverage import cover, land
 from uas_coverage_env.world.outcome import NONE
-from uas_coverage_env.world.state import FLYING, LOST, WorldState
+from uas_coverage_env.world.state import FLYING, LOST, STATE
 
 ACCEPTED = -1
 
@@ -149,23 +150,25 @@ def begin_mission(arena, state, outcome):
     cover(arena, state, outcome)
 
 
+MISSION = Layout(ARENA, STATE)
+_views = MISSION.views
+
+
 @kernel
-def step_world(
-    vehicles, uas, obstacles, obstacle_columns, normals, offsets_m, moving, moving_path_m,
-    moving_velocity_mps, waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
-    x, reference, status, departed, returning, uncovered, step,
-    commands, nonlinear, assistants, outcome,
-):  # fmt: skip
-    """`advance` called from Python: arrays one by one cost half the time of two named tuples.
+def step_world(at, commands, nonlinear, assistants, outcome):
+    """`advance` called from Python.
+
+    Args:
+        at: Addresses of arena and state, see `MISSION`.
+        commands: See `advance`, also the next three.
+        nonlinear: Whether.
+        assistants: Who helps to fly.
+        outcome: Written.
 
     Returns:
         ACCEPTED, or the index of a UAS whose command is invalid; then nothing has changed.
     """
-    arena = Arena(
-        vehicles, uas, obstacles, obstacle_columns, normals, offsets_m, moving, moving_path_m,
-        moving_velocity_mps, waypoints, waypoint_columns, rules, nodes_m, node_distance_m,
-    )  # fmt: skip
-    state = WorldState(x, reference, status, departed, returning, uncovered, step)
+    arena, state = _views(at)
     invalid = first_invalid(arena, state, commands)
     if invalid == ACCEPTED:
         advance(arena, state, commands, nonlinear, assistants, outcome)

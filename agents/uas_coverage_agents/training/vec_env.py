@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from uas_coverage_env.env import CoverageBatch, observation_bounds
-from uas_coverage_env.env.kernel import STATUS
+from uas_coverage_env.env.memory import STATUS
 from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING
@@ -128,7 +128,7 @@ class CoverageVecEnv(VecEnv):
         lanes = batch.lanes
         over = (lanes.terminated | lanes.truncated)[:, None]
         # of a mission that is over, the world shows the next one already
-        flies = np.where(over, lanes.final_report[:, :, STATUS] == FLYING, batch.flying)
+        flies = np.where(over, batch.missions.final.report[:, :, STATUS] == FLYING, batch.flying)
         ended = (flew & ~flies) | over
         self._returns += lanes.rewards
         self._lengths += flew
@@ -136,7 +136,7 @@ class CoverageVecEnv(VecEnv):
         if ended.any():
             for lane, i in np.argwhere(ended).tolist():
                 info = infos[lane * self.n_uas + i]
-                last = lanes.final_observation if over[lane, 0] else observation
+                last = batch.missions.final.observation if over[lane, 0] else observation
                 info["terminal_observation"] = last[lane, i].copy()
                 info["TimeLimit.truncated"] = bool(flies[lane, i])
                 if flew[lane, i]:

@@ -8,9 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
+from uas_coverage_agents.waypoint.lanes import (
+    LANES,
+    begin_lanes,
+    make_lanes,
+    pool_legs,
+    step_lanes,
+)
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
-from uas_coverage_agents.waypoint.look import NO_TARGET
 from uas_coverage_agents.waypoint.settings import WaypointSettings
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
@@ -23,8 +28,10 @@ from uas_coverage_agents.waypoint.team import (
 )
 from uas_coverage_env.env.put_aside import Limits, check_like, check_values
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import STATUS_NAMES, assistants
-from uas_coverage_env.world.pool import n_of, pool_arenas
+from uas_coverage_env.world import assistants
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.pool import pool_worlds
+from uas_coverage_env.world.state import STATE
 
 _LARGEST_SHARE_COVERED = 0.7
 _MOST_DISCHARGED = 0.3
@@ -61,11 +68,11 @@ class WaypointVecEnv(VecEnv):
     def __init__(
         self, scenarios: Sequence[Scenario], settings: WaypointSettings, n_lanes: int, seed: int
     ) -> None:
-        self._arenas = pool_arenas(scenarios, measured_m=0.0)  # only what counts
+        self._worlds = pool_worlds(scenarios, measured_m=0.0)  # only what counts
         self._legs = pool_legs(scenarios)
-        self._n_uas = n_of(self._arenas, "uas")
-        self._n_waypoints = n_of(self._arenas, "waypoints")
-        self._lanes, self._states = make_lanes(n_lanes, self._arenas)
+        self._n_uas = ARENA.size(self._worlds.arenas, "U")
+        self._n_waypoints = ARENA.size(self._worlds.arenas, "W")
+        self._lanes, self._states = make_lanes(n_lanes, self._worlds)
         self._settings = settings
         self._prices = prices_of(settings)
         aboard = assistants(settings.return_mode, settings.safety_filter)
@@ -98,7 +105,7 @@ class WaypointVecEnv(VecEnv):
         if not lanes.legal[np.arange(self.num_envs), self._choices].all():
             raise ValueError("a choice is masked; ask `action_masks` before")
         before = lanes.account @ self._prices
-        step_lanes(self._arenas, self._legs, lanes, self._states, self._choices, *self._assistants)
+        step_lanes(self._worlds, self._legs, lanes, self._states, self._choices, *self._assistants)
         rewards = (before - lanes.account @ self._prices).astype(np.float32)
         done = lanes.decider == NOBODY
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -141,14 +148,13 @@ class WaypointVecEnv(VecEnv):
     def _limits(self, scenario: NDArray[np.int64]) -> Limits:
         """What the indices may be of lanes that fly these scenarios."""
         s = scenario.clip(0, len(self._n_uas) - 1)
-        last_waypoint = self._n_waypoints[s] - 1
+        sizes = {"S": len(self._n_uas), "U": self._n_uas[s], "W": self._n_waypoints[s]}
+        longest = int(self._worlds.arenas.arrays.rules["max_steps"].max())
+        of_lanes = LANES.limits(sizes, lanes=False)
+        of_states = STATE.limits({"samples": longest + 1}, lanes=True)
         return {
-            "lanes.scenario": (0, len(self._n_uas) - 1),
-            "lanes.decider": (NOBODY, self._n_uas[s] - 1),
-            "lanes.targets": (NO_TARGET, last_waypoint[:, None]),
-            "lanes.candidates": (-1, last_waypoint[:, None]),
-            "state.step": (0, self._arenas.rules["max_steps"].max()),
-            "state.status": (0, len(STATUS_NAMES) - 1),
+            **{f"lanes.{name}": limits for name, limits in of_lanes.items()},
+            **{f"state.{name}": limits for name, limits in of_states.items()},
             "missions": (0, np.iinfo(np.int64).max - 1),
         }
 
@@ -162,7 +168,7 @@ class WaypointVecEnv(VecEnv):
                 np.stack(column) for column in zip(*drawn, strict=True)
             )
             begin_lanes(
-                self._arenas, self._legs, self._lanes, self._states,
+                self._worlds, self._legs, self._lanes, self._states,
                 which, scenarios, covered, discharged, *self._assistants,
             )  # fmt: skip
             which = which[self._lanes.decider[which] == NOBODY]

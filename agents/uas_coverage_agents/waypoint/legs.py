@@ -1,15 +1,17 @@
 """Leg times between waypoints and to the starts, along the routes of the world."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import CRUISE_SHARE
 from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.memory import Memory
 from uas_coverage_env.vehicle import N_STATES, X, Y, Z
 from uas_coverage_env.world import Arena, route, seconds_home
+from uas_coverage_env.world.arena import ARENA
 
 ROUTED_UNITS = 6.0
 """Longer legs than this are rarely flown: they are taken straight."""
@@ -24,14 +26,17 @@ _LEAD_S = 1.6
 class Legs(NamedTuple):
     """What does not change during a mission; computed once, for the slowest of the fleet."""
 
-    between_s: NDArray[np.float64]
-    """(W, W) [s] from the first to the second waypoint."""
-    home_s: NDArray[np.float64]
-    """(U, W) [s] from a waypoint to each start, landing included."""
-    return_s: NDArray[np.float64]
-    """(U, W) [s] the same as return mode reckons it, with reserve."""
-    unit: NDArray[np.float64]
-    """(2,) `unit_m` and `unit_s`, see `layout`."""
+    between_s: Annotated[NDArray[np.float64], "W", "W"]
+    """[s] from the first to the second waypoint."""
+    home_s: Annotated[NDArray[np.float64], "U", "W"]
+    """[s] from a waypoint to each start, landing included."""
+    return_s: Annotated[NDArray[np.float64], "U", "W"]
+    """[s] the same as return mode reckons it, with reserve."""
+    unit: Annotated[NDArray[np.float64], 2]
+    """`unit_m` and `unit_s`, see `layout`."""
+
+
+LEGS = Memory(Legs)
 
 
 @allocating_kernel
@@ -114,12 +119,6 @@ def _fill(arena, between_s, home_s, return_s, unit):
 
 def legs_of(arena: Arena) -> Legs:
     """The leg times of a scenario."""
-    n_uas, n_waypoints = len(arena.uas), len(arena.waypoints)
-    legs = Legs(
-        between_s=np.zeros((n_waypoints, n_waypoints)),
-        home_s=np.zeros((n_uas, n_waypoints)),
-        return_s=np.zeros((n_uas, n_waypoints)),
-        unit=np.zeros(2),
-    )
+    legs = LEGS.zeros(ARENA.sizes_of(arena))
     _fill(arena, *legs)
     return legs

@@ -38,6 +38,7 @@ from uas_coverage_env.world import (
     assistants,
     build_arena,
 )
+from uas_coverage_env.world.state import STATE
 
 
 def network(hidden: int, prior: float) -> Pointer:
@@ -106,6 +107,7 @@ class WaypointPilot:
         self._returning = np.zeros(n_uas, dtype=np.bool_)
         self._blocked = np.zeros(n_waypoints, dtype=np.bool_)
         self._desk = Desk(
+            state=STATE.zeros({"U": n_uas, "W": n_waypoints}),
             commands=np.zeros(n_uas, dtype=COMMAND_DTYPE),
             outcome=np.zeros(n_uas, dtype=OUTCOME_DTYPE),
             candidates=np.full(K, -1),

@@ -26,6 +26,7 @@ from uas_coverage_agents.waypoint.team import (
     fly_on,
 )
 from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.memory import copy_arrays
 from uas_coverage_env.world import HOME, WorldState
 
 PRICES_WH = {ENERGY: 1.0, TIME: 0.1, LEFT: 20.0, LOST_UAS: 100.0, NOT_HOME: 100.0}
@@ -58,22 +59,15 @@ def no_plan(n_uas: int, n_waypoints: int) -> Plan:
 
 
 class Desk(NamedTuple):
-    """Room for one observation and what follows from it."""
+    """Room for one simulated mission: its state, an observation and what follows from it."""
 
+    state: WorldState
     commands: NDArray[np.void]
     outcome: NDArray[np.void]
     candidates: NDArray[np.int64]
     legal: NDArray[np.bool_]
     observation: NDArray[np.float32]
     scores: NDArray[np.float64]
-
-
-@allocating_kernel
-def _copy(state):
-    return WorldState(
-        state.x.copy(), state.reference.copy(), state.status.copy(), state.departed.copy(),
-        state.returning.copy(), state.uncovered.copy(), state.step.copy(),
-    )  # fmt: skip
 
 
 @allocating_kernel
@@ -138,7 +132,8 @@ def simulate(
     Returns:
         (cost [Wh], number of decisions).
     """
-    state = _copy(start)
+    state = desk.state
+    copy_arrays(start, state)
     targets = start_targets.copy()
     blocked = start_blocked.copy()
     account = np.zeros(_PRICES_WH.shape[0])
