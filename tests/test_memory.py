@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from uas_coverage_env.kernels import kernel
-from uas_coverage_env.memory import Layout, Memory, Values, copy_arrays, lane_view, pool_view
+from uas_coverage_env.memory import Memory, Values
+from uas_coverage_env.views import Layout, copy_arrays, lane_view, pool_view
 
 BOX_DTYPE = np.dtype((np.record, np.dtype([("side_m", "f8"), ("n", "i8")], align=True)))
 

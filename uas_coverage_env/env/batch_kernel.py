@@ -26,6 +26,7 @@ from uas_coverage_env.env.memory import (
 )
 from uas_coverage_env.env.nearest import NO_TARGET
 from uas_coverage_env.env.pool import (
+    MissionPool,
     ScenarioPool,
     first_learners_at,
     first_look_at,
@@ -34,7 +35,8 @@ from uas_coverage_env.env.pool import (
 )
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
-from uas_coverage_env.memory import Memory, Values, copy_arrays, lane_view
+from uas_coverage_env.memory import Memory, Values
+from uas_coverage_env.views import Handover, copy_arrays, lane_view
 from uas_coverage_env.world import ABSENT, FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.pool import arena_of, lanes_of, start_of, state_of
@@ -358,6 +360,24 @@ def step_batch(pool, missions, orders, rules, before, observation):
     return refused
 
 
+class _Given(NamedTuple):
+    """What the lanes are given, in one piece."""
+
+    pool: MissionPool
+    missions: Missions
+    rules: Rules
+
+
+def _example() -> _Given:
+    pool = ScenarioPool("open_field")
+    rules = Rules(0, np.zeros(len(REWARD_TERMS)), False, np.zeros(0, np.int64))
+    return _Given(pool.arrays, new_missions(pool, 1, 1), rules)
+
+
+_HANDOVER = Handover(_example)
+_keep, _take = _HANDOVER.keep, _HANDOVER.take
+
+
 @allocating_kernel(parallel=True)
 def step_batch_in_threads(pool, missions, orders, rules, before, observation):
     """`step_batch`, the lanes shared among numba's threads.
@@ -367,9 +387,12 @@ def step_batch_in_threads(pool, missions, orders, rules, before, observation):
     """
     refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
+        kept = _keep(_Given(pool, missions, rules.rules))
+        autoreset = rules.autoreset
         for lane in prange(orders.shape[0]):
+            given = _take(kept)
             step_lane(
-                pool, missions, lane, orders[lane], get_thread_id(), rules.rules, rules.autoreset,
-                before, observation,
+                given.pool, given.missions, lane, orders[lane], get_thread_id(), given.rules,
+                autoreset, before, observation,
             )  # fmt: skip
     return refused

@@ -25,6 +25,7 @@ from uas_coverage_env.env.memory import (
     STATUS,
     Learners,
     Look,
+    Prices,
     Scratch,
 )
 from uas_coverage_env.env.pool import (
@@ -37,8 +38,8 @@ from uas_coverage_env.env.pool import (
 )
 from uas_coverage_env.env.rewards import weights_of
 from uas_coverage_env.kernels import kernel
-from uas_coverage_env.memory import copy_arrays, lane_view
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.views import copy_arrays, lane_view
 from uas_coverage_env.world import FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.pool import arena_of, lanes_of, start_of, state_of
@@ -128,10 +129,10 @@ def _all_on_device(arrays: Any) -> Any:
 
 
 @cuda.jit
-def _step_missions(pool, weights, missions, kind, nonlinear):
+def _step_missions(pool, prices, missions, kind, nonlinear):
     lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
     if lane < missions.ended.shape[0]:
-        step_mission(pool, weights, missions, kind, nonlinear, lane)
+        step_mission(pool, prices.weights, missions, kind, nonlinear, lane)
 
 
 class CudaMissions:
@@ -188,7 +189,7 @@ class CudaMissions:
         self._blocks = -(-num_envs // THREADS_PER_BLOCK)
         self._arguments = (
             _all_on_device(pool.arrays),
-            _on_device(weights_of(reward_weights)),
+            _all_on_device(Prices(weights_of(reward_weights))),
             self.missions,
             pool.actions.kind,
             dynamics == "nonlinear",

@@ -10,7 +10,8 @@ from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
 from uas_coverage_env.env.nearest import NEIGHBOURS_DTYPE, NO_TARGET
 from uas_coverage_env.env.observation import SCALES_DTYPE
 from uas_coverage_env.env.rewards import REWARD_TERMS
-from uas_coverage_env.memory import Layout, Memory, Values
+from uas_coverage_env.memory import Memory, Values
+from uas_coverage_env.views import Layout
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE

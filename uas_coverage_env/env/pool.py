@@ -8,8 +8,9 @@ from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.episode import with_max_steps
 from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES, Look
 from uas_coverage_env.env.start import first_look, tables_of
-from uas_coverage_env.memory import Pool, lane_view, pool_view
+from uas_coverage_env.memory import Pool
 from uas_coverage_env.scenario import Scenario, load_scenario
+from uas_coverage_env.views import lane_view, pool_view
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.pool import pool_worlds
 from uas_coverage_env.world.state import STATE

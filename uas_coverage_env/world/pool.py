@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uas_coverage_env.memory import Pool, lane_view, pool_view
+from uas_coverage_env.memory import Pool
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.views import lane_view, pool_view
 from uas_coverage_env.world.arena import ARENA, build_arena
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.simulation import initial_state

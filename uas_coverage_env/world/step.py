@@ -3,8 +3,8 @@
 import math
 
 from uas_coverage_env.kernels import inlined_kernel, kernel
-from uas_coverage_env.memory import Layout
 from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
+from uas_coverage_env.views import Layout
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.assist import assist
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH

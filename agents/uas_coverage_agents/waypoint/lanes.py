@@ -17,12 +17,20 @@ from uas_coverage_agents.waypoint.team import (
     fly_on,
 )
 from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.memory import Memory, Pool, Values, copy_arrays, pool_view
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.memory import Memory, Pool, Values
+from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.views import Handover, copy_arrays, pool_view
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, WorldState, build_arena
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.pool import WorldPool, arena_of, lanes_of, start_of, state_of
+from uas_coverage_env.world.pool import (
+    WorldPool,
+    arena_of,
+    lanes_of,
+    pool_worlds,
+    start_of,
+    state_of,
+)
 
 legs_at = pool_view(LEGS)
 """In a kernel, (pool, s) -> the legs of scenario s."""
@@ -109,15 +117,36 @@ def begin_lane(
     _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants)
 
 
+class _Given(NamedTuple):
+    """What the lanes are given, in one piece."""
+
+    worlds: WorldPool
+    legs: Pool
+    lanes: Lanes
+    states: WorldState
+
+
+def _example() -> _Given:
+    scenarios = [load_scenario("open_field")]
+    worlds = pool_worlds(scenarios)
+    return _Given(worlds, pool_legs(scenarios), *make_lanes(1, worlds))
+
+
+_HANDOVER = Handover(_example)
+_keep, _take = _HANDOVER.keep, _HANDOVER.take
+
+
 @allocating_kernel(parallel=True)
 def begin_lanes(
     worlds, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants
 ):
     """`begin_lane` in some lanes; `which`, `s`, `covered` and `discharged` have a row for each."""
+    kept = _keep(_Given(worlds, all_legs, lanes, states))
     for k in prange(which.shape[0]):
+        given = _take(kept)
         begin_lane(
-            worlds, all_legs, lanes, states, which[k], s[k], covered[k], discharged[k],
-            return_mode, assistants,
+            given.worlds, given.legs, given.lanes, given.states, which[k], s[k], covered[k],
+            discharged[k], return_mode, assistants,
         )  # fmt: skip
 
 
@@ -136,8 +165,12 @@ def step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants
         return_mode: Whether the world brings UAS home in time.
         assistants: See `world.advance`.
     """
+    kept = _keep(_Given(worlds, all_legs, lanes, states))
     for lane in prange(choices.shape[0]):
-        i = lanes.decider[lane]
+        given = _take(kept)
+        i = given.lanes.decider[lane]
         if i != NOBODY:
-            choose(lanes.targets[lane], lanes.candidates[lane], i, choices[lane])
-            _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants)
+            choose(given.lanes.targets[lane], given.lanes.candidates[lane], i, choices[lane])
+            _fly_lane(
+                given.worlds, given.legs, given.lanes, given.states, lane, return_mode, assistants
+            )
