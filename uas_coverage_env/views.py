@@ -313,7 +313,8 @@ class Handover:
 def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """The same value, its arrays views: to count references to them would hold up all threads."""
     if isinstance(kind, types.BaseTuple):
-        parts = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)
+        kinds: Any = kind
+        parts = zip(kinds, cgutils.unpack_tuple(builder, value), strict=True)
         return context.make_tuple(
             builder, kind, [_without_owners(context, builder, *part) for part in parts]
         )
