@@ -13,18 +13,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from rich.table import Table
+from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
+from uas_coverage_env.env.surroundings import surroundings
 
 from uas_coverage_env.borrow import borrow
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions import write_commands
 from uas_coverage_env.env.kernel import Rules, step_learners
-from uas_coverage_env.env.layout import OBSERVATION_SIZE
 from uas_coverage_env.env.memory import Learners, Scratch
-from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
-from uas_coverage_env.env.observation import look
+from uas_coverage_env.env.observation import OBSERVATION_SIZE, look
 from uas_coverage_env.env.pool import learners_of, tables_at
 from uas_coverage_env.env.rewards import REWARD_TERMS, pay
-from uas_coverage_env.env.surroundings import surroundings
 from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
 from uas_coverage_env.world.contacts import (

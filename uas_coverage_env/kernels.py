@@ -62,6 +62,10 @@ allocating_kernel = _decorator(error_model="numpy", _nrt=True)
 numba's other options: `@allocating_kernel(parallel=True)`."""
 
 
+class Constant(int):
+    """A whole number that `machine_code` compiles into a kernel: one for each value."""
+
+
 def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """A kernel compiled for arguments of these types, which the caller has to keep to.
 
@@ -69,7 +73,12 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return function
-    return function.compile(tuple(typeof(argument) for argument in arguments))
+    return function.compile(
+        tuple(
+            types.literal(int(argument)) if isinstance(argument, Constant) else typeof(argument)
+            for argument in arguments
+        )
+    )
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:

@@ -18,7 +18,7 @@ from sphinx.application import Sphinx
 import uas_coverage_env.env.actions as actions
 from uas_coverage_env import Acceleration, Velocity, Wrench, load_scenario, uas_coverage_v0
 from uas_coverage_env.env import CoverageParallelEnv
-from uas_coverage_env.env.layout import OBSERVATION_SIZE, layout_table
+from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.flight.registry import describe_planners
 from uas_coverage_env.scenario.schema import scenario_schema

@@ -5,7 +5,7 @@ import pytest
 from uas_coverage_agents.velocity.patience import LOOK_AWAY_S, PATIENCE_S, Patience
 
 from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
-from uas_coverage_env.env.layout import K_WAYPOINTS
+from uas_coverage_env.env.observation import K_WAYPOINTS
 
 THERE, CLOSENESS = (observation_columns("waypoints", name)[:, 0] for name in ("valid", "closeness"))
 NEAR, FAR = 0.6, 0.3

@@ -11,7 +11,7 @@ from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_modules
 from typer.core import TyperGroup
 
 from uas_coverage_env.cli.app import app
-from uas_coverage_env.env.layout import OBSERVATION_LAYOUT
+from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
 from uas_coverage_env.leaderboard import players_of
@@ -53,7 +53,7 @@ def test_the_site_fetches_nothing(site):
 
 def test_the_environment_page_has_every_feature_of_the_observation(site):
     text = (site / "environment.html").read_text()
-    for group in OBSERVATION_LAYOUT:
+    for group in OBSERVATION:
         for feature in group.features:
             assert f"{group.name}.{feature.name}" in text
 

@@ -11,6 +11,7 @@ from practice_grounds import practice_ground
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.memory import REWARD
+from uas_coverage_env.env.settings import MissionSettings
 
 N_LANES, N_STEPS = 2, 25
 
@@ -19,18 +20,7 @@ def compare():
     """Fly both ways, lanes with different actions, past the end of missions."""
     ground = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
     missions = CudaMissions(N_LANES, ground)
-    episodes = [
-        Episode(
-            ground,
-            action="velocity",
-            dynamics="lpv",
-            return_mode=False,
-            safety_filter=False,
-            reward_weights=None,
-            max_cycles=None,
-        )
-        for _ in range(N_LANES)
-    ]
+    episodes = [Episode(ground, MissionSettings()) for _ in range(N_LANES)]
     for episode in episodes:
         episode.reset()
     rng = np.random.default_rng(0)

@@ -10,6 +10,7 @@ from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEn
 from uas_coverage_env.env.batch_kernel import ABSENT, drawn
 from uas_coverage_env.env.memory import ENERGY, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.world import FLYING, LOST, STATUS_NAMES, build_arena
 from uas_coverage_env.world.arena import ARENA
@@ -26,9 +27,9 @@ MIXED = (
 def random_actions(batch, seed):
     rng = np.random.default_rng(seed)
     if batch.chooses:
-        return rng.integers(0, 13, (batch.num_lanes, batch.n_uas))
+        return rng.integers(0, 13, (batch.num_envs, batch.n_uas))
     # beyond ±1, too
-    return rng.uniform(-1.3, 1.3, (batch.num_lanes, batch.n_uas, batch.actions.size))
+    return rng.uniform(-1.3, 1.3, (batch.num_envs, batch.n_uas, batch.actions.size))
 
 
 def assert_is(batch, lane, env, observations, rewards=None, infos=None):
@@ -101,15 +102,15 @@ def test_every_lane_flies_what_a_single_environment_flies(action, dynamics, assi
     assert missions.max() > 0
 
 
-def flown(num_lanes, seed, threads=1):
+def flown(num_envs, seed, threads=1):
     """Everything that 30 steps leave behind in lanes that are seeded one after the other."""
-    batch = CoverageBatch(num_lanes, MIXED, autoreset="same_step", max_cycles=9, threads=threads)
+    batch = CoverageBatch(num_envs, MIXED, autoreset="same_step", max_cycles=9, threads=threads)
     batch.reset(seed=seed)
     rng = np.random.default_rng(0)
     for _ in range(30):
         # the same actions for the same lanes, however many there are
         actions = rng.uniform(-1, 1, (16, 3, 3))
-        batch.step(actions[seed : seed + num_lanes])
+        batch.step(actions[seed : seed + num_envs])
     return batch.state_dict()
 
 
@@ -252,7 +253,7 @@ def test_a_batch_has_to_be_reset_first():
 
 
 def test_a_pool_takes_names_and_cuts_missions():
-    pool = ScenarioPool(["open_field", MIXED[0]], max_cycles=7)
+    pool = ScenarioPool(["open_field", MIXED[0]], MissionSettings(max_cycles=7))
     assert [scenario.max_steps for scenario in pool.scenarios] == [7, 7]
     assert len(pool) == 2
     np.testing.assert_array_equal(pool.n_uas, [2, 3])

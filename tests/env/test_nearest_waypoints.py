@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from practice_grounds import practice_ground
 
 from uas_coverage_env.env import K_WAYPOINTS
-from uas_coverage_env.env.nearest import nearest_waypoints
+from uas_coverage_env.env.observation.nearest import nearest_waypoints
 from uas_coverage_env.kernels import kernel, lowest_bit
 from uas_coverage_env.world import World
 

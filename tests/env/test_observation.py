@@ -8,7 +8,7 @@ from practice_grounds import practice_ground
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import (
     K_WAYPOINTS,
-    OBSERVATION_LAYOUT,
+    OBSERVATION,
     OBSERVATION_SIZE,
     CoverageParallelEnv,
     CoverageSwarmEnv,
@@ -55,7 +55,7 @@ def test_the_space_has_the_size_and_bounds_of_the_layout():
 def test_every_number_belongs_to_exactly_one_feature():
     columns = [
         observation_columns(group.name, feature.name).ravel()
-        for group in OBSERVATION_LAYOUT
+        for group in OBSERVATION
         for feature in group.features
     ]
     assert sorted(np.concatenate(columns).tolist()) == list(range(OBSERVATION_SIZE))

@@ -5,8 +5,7 @@ import pytest
 from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
-from uas_coverage_env.env import HOME_CHOICE, REWARD_TERMS, rewards_table
-from uas_coverage_env.env.rewards import TERMS
+from uas_coverage_env.env import HOME_CHOICE, REWARD, REWARD_TERMS, rewards_table
 
 
 def run(env, policy, limit=200):
@@ -190,4 +189,4 @@ def test_wrong_weights_are_refused(weights, named):
 def test_the_documentation_shows_all_terms_and_weights():
     rows = [line.strip() for line in uas_coverage_v0.parallel_env.__doc__.splitlines()]
     assert set(rewards_table().splitlines()) <= set(rows)
-    assert len(rewards_table().splitlines()) == len(TERMS) + 2
+    assert len(rewards_table().splitlines()) == len(REWARD) + 2

@@ -3,10 +3,12 @@
 from uas_coverage_env.env.actions import ACTION_NAMES, HOME_CHOICE
 from uas_coverage_env.env.aec import env, raw_env
 from uas_coverage_env.env.batch import CoverageBatch
-from uas_coverage_env.env.layout import (
+from uas_coverage_env.env.observation import (
     K_WAYPOINTS,
-    OBSERVATION_LAYOUT,
+    OBSERVATION,
     OBSERVATION_SIZE,
+    Feature,
+    ObservationBlock,
     layout_table,
     observation_bounds,
     observation_columns,
@@ -15,7 +17,8 @@ from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
-from uas_coverage_env.env.rewards import REWARD_TERMS, rewards_table
+from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm, rewards_table
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.single import CoverageSwarmEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv
 
@@ -24,15 +27,20 @@ __all__ = [
     "GYMNASIUM_ID",
     "HOME_CHOICE",
     "K_WAYPOINTS",
-    "OBSERVATION_LAYOUT",
+    "OBSERVATION",
     "OBSERVATION_SIZE",
     "PETTINGZOO_ID",
+    "REWARD",
     "REWARD_TERMS",
     "CoverageBatch",
     "CoverageParallelEnv",
     "CoverageSwarmEnv",
     "CoverageVectorEnv",
+    "Feature",
+    "MissionSettings",
+    "ObservationBlock",
     "Observer",
+    "RewardTerm",
     "ScenarioPool",
     "env",
     "layout_table",

@@ -25,8 +25,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.layout import K_WAYPOINTS
-from uas_coverage_env.env.nearest import NO_TARGET
+from uas_coverage_env.env.observation.nearest import NO_TARGET
+from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, Z

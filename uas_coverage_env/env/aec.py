@@ -1,7 +1,7 @@
 """The multi-agent environment in turns: one agent acts after the other (PettingZoo AEC)."""
 
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,6 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.scenario import Scenario
-
-
-class Settings(TypedDict, total=False):
-    """Keyword arguments of the environments, see `CoverageParallelEnv`."""
-
-    action: str
-    dynamics: str
-    return_mode: bool
-    safety_filter: bool
-    reward_weights: Any
-    max_cycles: int | None
-    render_mode: str | None
 
 
 class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
@@ -45,7 +33,7 @@ class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
 
 
 def raw_env(
-    scenario: str | Path | Scenario = "village", **settings: Unpack[Settings]
+    scenario: str | Path | Scenario = "village", **settings: Any
 ) -> AECEnv[str, NDArray[np.float32], Any]:
     """The environment in turns, without checks of its own.
 
@@ -57,7 +45,7 @@ def raw_env(
 
 
 def env(
-    scenario: str | Path | Scenario = "village", **settings: Unpack[Settings]
+    scenario: str | Path | Scenario = "village", **settings: Any
 ) -> AECEnv[str, NDArray[np.float32], Any]:
     """The environment in turns; an invalid action is refused at once.
 

@@ -25,16 +25,16 @@ from uas_coverage_env.env.batch_kernel import (
     step_batch_in_threads,
 )
 from uas_coverage_env.env.kernel import ACCEPTED, Rules
-from uas_coverage_env.env.layout import OBSERVATION_SIZE
 from uas_coverage_env.env.memory import LEARNERS, Learners
+from uas_coverage_env.env.observe import observing_of
+from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.put_aside import check_like, check_values
-from uas_coverage_env.env.rewards import weights_of
-from uas_coverage_env.kernels import machine_code
+from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.kernels import Constant, machine_code
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import (
     FLYING,
-    AssistantCode,
     SwarmState,
     WorldState,
     assistants,
@@ -56,20 +56,16 @@ class CoverageBatch:
     that a scenario does not have are zero, never fly, and what is asked of them has no effect.
 
     Args:
-        num_lanes: L.
+        num_envs: L.
         scenario: See `ScenarioPool`.
-        action: A name of `ACTION_NAMES`.
-        dynamics: "lpv" or "nonlinear".
-        return_mode: Bring every UAS home in time.
-        safety_filter: Keep commands clear of harm.
-        reward_weights: Reward term -> weight; the others keep their defaults.
-        max_cycles: Steps after which missions are cut; None: as each scenario has it.
         autoreset: A name of `AUTORESET`.
         threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
             for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
+        **settings: See `MissionSettings`.
 
     Attributes:
-        num_lanes: L.
+        settings: How missions are flown and paid.
+        num_envs: L.
         n_uas: U, of the largest scenario.
         pool: The scenarios.
         missions: What happened, see `Missions`; the arrays are written by every step.
@@ -81,48 +77,37 @@ class CoverageBatch:
 
     def __init__(
         self,
-        num_lanes: int,
+        num_envs: int,
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
         *,
-        action: str = "velocity",
-        dynamics: str = "lpv",
-        return_mode: bool = False,
-        safety_filter: bool = False,
-        reward_weights: Mapping[str, float] | None = None,
-        max_cycles: int | None = None,
         autoreset: str = "next_step",
         threads: int = 1,
+        **settings: Any,
     ) -> None:
-        _check_count("num_envs", num_lanes, _MOST_LANES)
+        _check_count("num_envs", num_envs, _MOST_LANES)
         if threads != 1:
             _check_count("threads", threads, numba.get_num_threads())
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
-        for name, switch in (("return_mode", return_mode), ("safety_filter", safety_filter)):
-            if not isinstance(switch, bool | np.bool_):
-                raise ValueError(f"{name} is {switch!r}; it is True or False")
-        if dynamics not in ("lpv", "nonlinear"):
-            raise ValueError(f"dynamics is {dynamics!r}; it is 'lpv' or 'nonlinear'")
-        self.pool = ScenarioPool(scenario, action=action, max_cycles=max_cycles)
-        self.num_lanes = int(num_lanes)
+        self.settings = MissionSettings.of(settings)
+        self.pool = ScenarioPool(scenario, self.settings)
+        self.num_envs = int(num_envs)
         self.n_uas = int(self.pool.n_uas.max())
         self.actions = self.pool.actions
-        self.chooses = action == "waypoint"
-        self.filters = bool(safety_filter)
+        self.chooses = self.settings.chooses
+        self.filters = self.settings.safety_filter
         self.autoreset = AUTORESET[autoreset]
-        self.missions = new_missions(self.pool, self.num_lanes, int(threads))
-        self._settings = (self.actions.kind, weights_of(reward_weights), dynamics == "nonlinear")
-        self._brings_home = bool(return_mode)
-        shape = (self.num_lanes, self.n_uas, OBSERVATION_SIZE)
+        self.missions = new_missions(self.pool, self.num_envs, int(threads))
+        shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
-        self._assistants: AssistantCode = ()
+        self._rules: BatchRules | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # machine code does not travel
-        return {**self.__dict__, "_kernel": None, "_assistants": ()}
+        # neither machine code nor its addresses travel
+        return {**self.__dict__, "_kernel": None, "_rules": None}
 
     @property
     def worlds(self) -> WorldState:
@@ -141,7 +126,7 @@ class CoverageBatch:
 
     @property
     def observation(self) -> NDArray[np.float32]:
-        """(L, U, OBSERVATION_SIZE) the latest; overwritten by the step after the next."""
+        """(L, U, V) the latest; overwritten by the step after the next."""
         return self._observations[0]
 
     @property
@@ -164,13 +149,13 @@ class CoverageBatch:
             ValueError: A seed is negative or too large, or their number is wrong.
         """
         if isinstance(seed, int | np.integer):
-            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_lanes)]
+            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_envs)]
         elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
             seeds = list(seed)
         else:
             raise ValueError(f"seed is {seed!r}; give a whole number, or one for each lane")
-        if len(seeds) != self.num_lanes:
-            raise ValueError(f"{len(seeds)} seeds for {self.num_lanes} lanes; give one for each")
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} lanes; give one for each")
         for lane, value in enumerate(seeds):
             if value is None:
                 continue
@@ -197,17 +182,17 @@ class CoverageBatch:
             scenarios: (L,) indices in the pool, what to fly instead of drawing; None: draw.
 
         Returns:
-            (L, U, OBSERVATION_SIZE) see `observation`.
+            (L, U, V) see `observation`.
 
         Raises:
             ValueError: An argument is wrong.
         """
         if mask is None:
-            mask = np.ones(self.num_lanes, dtype=np.bool_)
-        elif mask.shape != (self.num_lanes,) or mask.dtype != np.bool_:
+            mask = np.ones(self.num_envs, dtype=np.bool_)
+        elif mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise ValueError(
                 f"mask has shape {mask.shape} and dtype {mask.dtype}; "
-                f"give one truth value for each of {self.num_lanes} lanes"
+                f"give one truth value for each of {self.num_envs} lanes"
             )
         if not self._begun and not mask.all():
             raise ResetNeeded("reset of some lanes before any: reset all lanes first")
@@ -226,7 +211,7 @@ class CoverageBatch:
             actions: (L, U, size) numbers, or (L, U) choices; as (L, -1) too.
 
         Returns:
-            (L, U, OBSERVATION_SIZE) see `observation`.
+            (L, U, V) see `observation`.
 
         Raises:
             ValueError: An action is invalid; names lane, UAS and value. Nothing has changed.
@@ -308,11 +293,10 @@ class CoverageBatch:
         return self.pool.scenarios[self.lanes.scenario[lane]]
 
     def _run(self, orders: NDArray[np.int64]) -> int:
-        if self._kernel is None:
-            self._assistants = assistants(self._brings_home, self.filters, goes_to=self.chooses)
-        rules = BatchRules(Rules(*self._settings, self._assistants), self.autoreset)
+        rules = self._rules = self._rules or self._compiled_rules()
         before, free = self._observations
-        given = (self.pool.arrays, self.missions, orders, rules, before, free)
+        width = Constant(self.settings.observation_size)
+        given = (self.pool.arrays, self.missions, orders, rules, before, free, width)
         if self._kernel is None:
             kernel = step_batch if self._threads == 1 else step_batch_in_threads
             self._kernel = machine_code(kernel, given)
@@ -327,13 +311,22 @@ class CoverageBatch:
             self._observations = free, before
         return refused
 
+    def _compiled_rules(self) -> BatchRules:
+        settings = self.settings
+        called = assistants(settings.return_mode, settings.safety_filter, goes_to=self.chooses)
+        paying = paying_of(settings.reward, settings.weights)
+        observing = observing_of(settings.observation)
+        nonlinear = settings.dynamics == "nonlinear"
+        rules = Rules(self.actions.kind, nonlinear, called, paying, observing)
+        return BatchRules(rules, self.autoreset)
+
     def _chosen(self, scenarios: Any) -> NDArray[np.int64]:
         if scenarios is None:
-            return np.full(self.num_lanes, DRAW)
+            return np.full(self.num_envs, DRAW)
         chosen = np.asarray(scenarios)
-        if chosen.shape != (self.num_lanes,) or chosen.dtype.kind not in "iu":
+        if chosen.shape != (self.num_envs,) or chosen.dtype.kind not in "iu":
             raise ValueError(
-                f"scenarios are {scenarios!r}; give an index for each of {self.num_lanes} lanes"
+                f"scenarios are {scenarios!r}; give an index for each of {self.num_envs} lanes"
             )
         if chosen.min() < 0 or chosen.max() >= len(self.pool):
             raise ValueError(
@@ -348,7 +341,7 @@ class CoverageBatch:
         if len(actions.shape) < 2 or len(actions) != len(asked) or actions.size != asked.size:
             raise ValueError(
                 f"actions have shape {actions.shape}; give {self.actions.size} for each of "
-                f"{self.n_uas} UAS in each of {self.num_lanes} lanes"
+                f"{self.n_uas} UAS in each of {self.num_envs} lanes"
             )
         if actions.dtype.kind not in ("iu" if self.chooses else "fiu"):
             kind = "whole numbers" if self.chooses else "real numbers"

@@ -25,9 +25,11 @@ from uas_coverage_env.env.memory import (
     STATUS,
     Learners,
     Look,
-    Prices,
     Scratch,
 )
+from uas_coverage_env.env.observation import OBSERVATION
+from uas_coverage_env.env.observe import observing_of
+from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.pool import (
     MissionPool,
     ScenarioPool,
@@ -36,7 +38,8 @@ from uas_coverage_env.env.pool import (
     learners_of,
     tables_at,
 )
-from uas_coverage_env.env.rewards import weights_of
+from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.kernels import kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.views import copy_arrays, lane_view
@@ -71,12 +74,13 @@ _look_of = lane_view(LOOK, sized_by=ARENA)
 
 
 @kernel
-def step_mission(pool, weights, missions, kind, nonlinear, lane):
+def step_mission(pool, paying, observing, missions, kind, nonlinear, lane):
     """Fly one lane for one step; see `Missions`.
 
     Args:
         pool: `MissionPool` of one scenario.
-        weights: (R,) of the reward terms.
+        paying: `Paying`.
+        observing: `Observing`.
         missions: `Missions`; the lane is written.
         kind: Kind of command that the actions become, not GO_TO.
         nonlinear: Whether the 6-DOF plant is flown.
@@ -106,7 +110,7 @@ def step_mission(pool, weights, missions, kind, nonlinear, lane):
     )  # fmt: skip
     begin_step(state, scratch.commands, scratch.outcome)
     carry_out(arena, state, nonlinear, scratch.outcome)
-    finish_step(arena, state, tables, learners, scratch, weights, max_steps, seen.observation)
+    finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
         missions.rewards[lane, i] = learners.report[i, REWARD]
@@ -129,10 +133,10 @@ def _all_on_device(arrays: Any) -> Any:
 
 
 @cuda.jit
-def _step_missions(pool, prices, missions, kind, nonlinear):
+def _step_missions(pool, paying, observing, missions, kind, nonlinear):
     lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
     if lane < missions.ended.shape[0]:
-        step_mission(pool, prices.weights, missions, kind, nonlinear, lane)
+        step_mission(pool, paying, observing, missions, kind, nonlinear, lane)
 
 
 class CudaMissions:
@@ -143,10 +147,7 @@ class CudaMissions:
     Args:
         num_envs: N.
         scenario: Name of a shipped scenario, path of a scenario file, or a scenario.
-        action: "velocity", "acceleration" or "wrench".
-        dynamics: "lpv" or "nonlinear".
-        reward_weights: Reward term -> weight; the others keep their defaults.
-        max_cycles: Steps after which missions are cut; None: the scenario's.
+        **settings: See `MissionSettings`; what does not run on a GPU is refused.
 
     Attributes:
         missions: `Missions` on the device; to be read only, but for `learners.asked`.
@@ -160,19 +161,23 @@ class CudaMissions:
         self,
         num_envs: int,
         scenario: str | Path | Scenario = "village",
-        *,
-        action: str = "velocity",
-        dynamics: str = "lpv",
-        reward_weights: dict[str, float] | None = None,
-        max_cycles: int | None = None,
+        **settings: Any,
     ) -> None:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
-        if dynamics not in ("lpv", "nonlinear"):
-            raise ValueError(f"dynamics is {dynamics!r}; it is 'lpv' or 'nonlinear'")
-        pool = ScenarioPool(scenario, action=action, max_cycles=max_cycles)
-        if action == "waypoint":
-            raise ValueError("the waypoint action needs guidance, which does not run on a GPU")
+        given = MissionSettings.of(settings)
+        if given.chooses or given.return_mode or given.safety_filter:
+            raise ValueError(
+                "the waypoint action, return_mode and safety_filter do not run on a GPU; take "
+                "another action and leave both switches off"
+            )
+        if given.observation != OBSERVATION or given.reward != DEFAULT_REWARD:
+            raise ValueError(
+                "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
+            )
+        pool = ScenarioPool(scenario, given)
+        paying = paying_of(DEFAULT_REWARD, given.weights)
+        observing = observing_of(OBSERVATION)
         n_uas = pool.sizes["U"]
         missions = Missions(
             lanes_of(num_envs, pool.arrays.starts),
@@ -189,10 +194,11 @@ class CudaMissions:
         self._blocks = -(-num_envs // THREADS_PER_BLOCK)
         self._arguments = (
             _all_on_device(pool.arrays),
-            _all_on_device(Prices(weights_of(reward_weights))),
+            _all_on_device(paying),
+            _all_on_device(observing),
             self.missions,
             pool.actions.kind,
-            dynamics == "nonlinear",
+            given.dynamics == "nonlinear",
         )
 
     def step(self, asked: Any = None) -> None:

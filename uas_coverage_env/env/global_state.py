@@ -9,17 +9,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.layout import OBSERVATION_LAYOUT, observation_bounds
+from uas_coverage_env.env.observation import observation_bounds
+from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.world import LANDED, LOST
 
-_OWN = OBSERVATION_LAYOUT[0].size
 _MOVING_BOUND = 2.0
 _MOVING_MPS = 20.0
 
 
 def global_space(n_uas: int, n_moving: int, n_waypoints: int) -> spaces.Box:
     """The space of the vector; its size depends on the scenario."""
-    own_low, own_high = (bounds[:_OWN] for bounds in observation_bounds())
+    own_low, own_high = observation_bounds([OWN])
     low = np.concatenate(
         [
             np.tile(np.append(own_low, [0, 0]), n_uas),
@@ -38,7 +38,7 @@ def global_space(n_uas: int, n_moving: int, n_waypoints: int) -> spaces.Box:
 
 
 def global_state(
-    observation: NDArray[np.float32],
+    own: NDArray[np.float32],
     status: NDArray[np.int64],
     uncovered: NDArray[np.bool_],
     moving_position_m: NDArray[np.float64],
@@ -48,14 +48,14 @@ def global_state(
     """The vector.
 
     Args:
-        observation: (U, OBSERVATION_SIZE) of all UAS.
+        own: (U, size) the group `own` of all UAS, as each observed it last.
         status: (U,) FLYING, LANDED or LOST.
         uncovered: (W,).
         moving_position_m: (M, 3) [m] centres.
         moving_velocity_mps: (M, 3) [m/s].
         scale: A record of SCALES_DTYPE, for the box around the fence.
     """
-    uas = np.column_stack([observation[:, :_OWN], status == LANDED, status == LOST])
+    uas = np.column_stack([own, status == LANDED, status == LOST])
     place = (moving_position_m - scale["centre_m"]) * scale["per_half_side"] * [1, 1, -1]
     moving = np.column_stack([place, moving_velocity_mps / _MOVING_MPS])
     moving = np.clip(moving, -_MOVING_BOUND, _MOVING_BOUND)

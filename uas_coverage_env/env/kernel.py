@@ -2,12 +2,8 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uas_coverage_env.borrow import part
 from uas_coverage_env.env.actions import first_not_finite, write_commands
-from uas_coverage_env.env.layout import OBSERVATION_SIZE
 from uas_coverage_env.env.memory import (
     CONTACT,
     CONTACT_WITH,
@@ -18,10 +14,12 @@ from uas_coverage_env.env.memory import (
     RETURNING,
     REWARD,
     STATUS,
+    Observing,
+    Paying,
 )
-from uas_coverage_env.env.nearest import count_company
-from uas_coverage_env.env.observation import look
-from uas_coverage_env.env.rewards import pay
+from uas_coverage_env.env.observation.nearest import count_company
+from uas_coverage_env.env.observe import observe_one
+from uas_coverage_env.env.pay import pay
 from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import FLYING, advance
 
@@ -33,21 +31,20 @@ class Rules(NamedTuple):
 
     kind: int
     """Kind of command that the actions become."""
-    weights: NDArray[np.float64]
-    """(R,) of the reward terms."""
     nonlinear: bool
     """Whether the 6-DOF plant is flown."""
     assistants: Any
-    """Who helps to fly, see `world.advance`."""
+    """Which help to fly, see `world.advance`."""
+    paying: Paying
+    observing: Observing
 
 
 @inlined_kernel
-def finish_step(arena, state, tables, learners, scratch, weights, max_cycles, observation):
-    """Pay for a step that was flown and look around; arguments as for `step_learners`."""
-    over = state.step[0] >= max_cycles
+def finish_step(arena, state, tables, learners, scratch, paying, observing, observation, on_gpu):
+    """Pay for a step that was flown, and observe; arguments as for `step_learners` and `pay`."""
     report = learners.report
     outcome = scratch.outcome
-    pay(arena, state, scratch.commands, outcome, weights, over, report)
+    pay(arena, state, tables, learners, scratch, paying, on_gpu)
     newly_covered = 0
     for i in range(report.shape[0]):
         newly_covered += outcome[i].newly_covered
@@ -61,20 +58,17 @@ def finish_step(arena, state, tables, learners, scratch, weights, max_cycles, ob
         report[i, RETURNING] = event.returning
         report[i, COVERED] += newly_covered
         report[i, REWARD] = 0.0
-        for term in range(weights.shape[0]):
-            report[i, REWARD] += report[i, term]
+        for term in range(paying.weights.shape[0]):
+            report[i, REWARD] += learners.terms[i, term]
     if newly_covered > 0:
         count_company(state.uncovered, tables.neighbours, learners.company)
     for i in range(report.shape[0]):
         if outcome[i].flew:
-            look(
-                arena, state, tables.scales[i], learners.company, i, learners.targets, max_cycles,
-                learners.candidates[i], observation[i],
-            )  # fmt: skip
+            observe_one(arena, state, tables, learners, observing, i, observation[i], on_gpu)
 
 
 @inlined_kernel
-def step_learners(arena, state, tables, learners, scratch, rules, max_cycles, observation):
+def step_learners(arena, state, tables, learners, scratch, rules, observation):
     """Fly one step, pay for it and look around.
 
     Args:
@@ -84,15 +78,16 @@ def step_learners(arena, state, tables, learners, scratch, rules, max_cycles, ob
         learners: `Learners` with the actions, all finite; written.
         scratch: `Scratch`; written.
         rules: `Rules`.
-        max_cycles: Steps after which the episode is cut.
-        observation: (U, OBSERVATION_SIZE) float32; that of a UAS that did not fly stays.
+        observation: (U, V) float32; that of a UAS that did not fly stays.
     """
     write_commands(
         state, rules.kind, tables.ranges, learners.asked, learners.candidates, learners.targets,
         scratch.commands,
     )  # fmt: skip
     advance(arena, state, scratch.commands, rules.nonlinear, rules.assistants, scratch.outcome)
-    finish_step(arena, state, tables, learners, scratch, rules.weights, max_cycles, observation)
+    finish_step(
+        arena, state, tables, learners, scratch, rules.paying, rules.observing, observation, None
+    )
 
 
 _views = EPISODE.views
@@ -100,7 +95,7 @@ _N_NUMBERS = EPISODE.size
 
 
 @kernel
-def step_episode(at, kind, nonlinear, max_cycles, before, observation):
+def step_episode(at, kind, nonlinear, before, observation):
     """`step_learners` called from Python.
 
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
@@ -110,21 +105,21 @@ def step_episode(at, kind, nonlinear, max_cycles, before, observation):
             take longer than the flight of a UAS.
         kind: See `Rules`, also the next.
         nonlinear: Whether.
-        max_cycles: Steps after which the episode is cut.
-        before: (U, OBSERVATION_SIZE) float32, the observation of the step before.
-        observation: (U, OBSERVATION_SIZE) float32, another array; written.
+        before: (U, V) float32, the observation of the step before.
+        observation: (U, V) float32, another array; written.
 
     Returns:
         ACCEPTED, or the index of a UAS whose action is not finite; then nothing has changed.
     """
-    arena, state, tables, learners, scratch, prices = _views(at)
+    arena, state, tables, learners, scratch, paying, observing = _views(at)
     invalid = first_not_finite(learners.asked)
     if invalid != ACCEPTED:
         return invalid
     for i in range(observation.shape[0]):
         if state.status[i] != FLYING:
-            for k in range(OBSERVATION_SIZE):
+            for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
-    rules = Rules(kind, prices.weights, nonlinear, part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS))
-    step_learners(arena, state, tables, learners, scratch, rules, max_cycles, observation)
+    assistants = part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
+    rules = Rules(kind, nonlinear, assistants, paying, observing)
+    step_learners(arena, state, tables, learners, scratch, rules, observation)
     return ACCEPTED

@@ -6,22 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import RANGES_DTYPE
-from uas_coverage_env.env.layout import K_WAYPOINTS, OBSERVATION_SIZE
-from uas_coverage_env.env.nearest import NEIGHBOURS_DTYPE, NO_TARGET
-from uas_coverage_env.env.observation import SCALES_DTYPE
-from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.observation.nearest import NEIGHBOURS_DTYPE, NO_TARGET
+from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
 from uas_coverage_env.memory import Memory, Values
 from uas_coverage_env.views import Layout
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 
-ENERGY, CONTACT, CONTACT_WITH, STATUS, FILTERED, RETURNING, COVERED, REWARD = range(
-    len(REWARD_TERMS), len(REWARD_TERMS) + 8
-)
-"""Columns of a report behind the reward terms: energy drawn since t = 0 [Wh], outcome of the step,
-number of waypoints that the swarm has covered so far, and the sum of the reward terms, added up in
-their order (Python's own `sum` rounds in another way since 3.12)."""
+ENERGY, CONTACT, CONTACT_WITH, STATUS, FILTERED, RETURNING, COVERED, REWARD = range(8)
+"""Columns of a report: energy drawn since t = 0 [Wh], outcome of the step, number of waypoints that
+the swarm has covered so far, and the reward: the sum of its terms, added up in their order
+(Python's own `sum` rounds in another way since 3.12)."""
 
 REPORT_SIZE = REWARD + 1
 
@@ -48,13 +44,16 @@ class Learners(NamedTuple):
     company: Annotated[NDArray[np.float32], "W", 2]
     """See `count_company`."""
     report: Annotated[NDArray[np.float64], "U", REPORT_SIZE]
-    """Reward terms of the latest step, then the columns named above."""
+    """Of the latest step: the columns named above."""
+    terms: Annotated[NDArray[np.float64], "U", "R"]
+    """Of the latest step: the R terms of the reward, weighted."""
 
 
 class Look(NamedTuple):
     """What is seen."""
 
-    observation: Annotated[NDArray[np.float32], "U", OBSERVATION_SIZE]
+    observation: Annotated[NDArray[np.float32], "U", "V"]
+    """V numbers for each UAS."""
 
 
 class Scratch(NamedTuple):
@@ -64,14 +63,31 @@ class Scratch(NamedTuple):
     outcome: Annotated[NDArray[np.void], OUTCOME_DTYPE, "U"]
 
 
-class Prices(NamedTuple):
-    """What rewards are made of."""
+class Paying(NamedTuple):
+    """The R terms of a reward, for kernels."""
 
-    weights: Annotated[NDArray[np.float64], len(REWARD_TERMS)]
+    weights: Annotated[NDArray[np.float64], "R"]
+    begins_as_usual: Annotated[NDArray[np.bool_], 1]
+    """The terms of `REWARD` come first: they are part of the step."""
+    calls: Annotated[NDArray[np.int64], "reward calls", 4]
+    """Of each other term: address, which it is, first parameter, and how many."""
+    parameters: Annotated[NDArray[np.float64], "reward parameters"]
+    """Of all of them."""
+
+
+class Observing(NamedTuple):
+    """The blocks of an observation, for kernels."""
+
+    begins_as_usual: Annotated[NDArray[np.bool_], 1]
+    """The blocks of `OBSERVATION` come first: they are part of the step."""
+    calls: Annotated[NDArray[np.int64], "observation calls", 5]
+    """Of each other block: address, first column, size, first parameter, and how many."""
+    parameters: Annotated[NDArray[np.float64], "observation parameters"]
+    """Of all of them."""
 
 
 TABLES, LEARNERS, LOOK = Memory(Tables), Memory(Learners), Memory(Look)
-SCRATCH, PRICES = Memory(Scratch), Memory(Prices)
+SCRATCH, PAYING, OBSERVING = Memory(Scratch), Memory(Paying), Memory(Observing)
 
-EPISODE = Layout(ARENA, STATE, TABLES, LEARNERS, SCRATCH, PRICES)
+EPISODE = Layout(ARENA, STATE, TABLES, LEARNERS, SCRATCH, PAYING, OBSERVING)
 """All that a step of one mission works on."""

@@ -1,6 +1,7 @@
 """The multi-agent environment: one agent per UAS, all act at once (PettingZoo)."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
@@ -13,11 +14,12 @@ from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.layout import observation_bounds
 from uas_coverage_env.env.memory import REWARD, STATUS
+from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.world import FLYING, SwarmState
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
@@ -83,12 +85,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`.
-        action: "velocity", "acceleration", "wrench" or "waypoint".
-        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
-        return_mode: The world takes a UAS home in time, whatever it is asked for.
-        safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
-        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
-        max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
+        {settings}
         render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra `human`:
             space pauses, right steps, escape closes it and the missions go on unseen).
 
@@ -107,29 +104,17 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self,
         scenario: str | Path | Scenario = "village",
         *,
-        action: str = "velocity",
-        dynamics: str = "lpv",
-        return_mode: bool = False,
-        safety_filter: bool = False,
-        reward_weights: Mapping[str, float] | None = None,
-        max_cycles: int | None = None,
         render_mode: str | None = None,
+        **settings: Any,
     ) -> None:
-        self._settings: dict[str, Any] = {
-            "action": action,
-            "dynamics": dynamics,
-            "return_mode": return_mode,
-            "safety_filter": safety_filter,
-            "reward_weights": reward_weights,
-        }
-        self._episode = Episode(scenario, **self._settings, max_cycles=max_cycles)
+        self._episode = Episode(scenario, MissionSettings.of(settings))
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode
         self.possible_agents = list(self._episode.names)
         self.agents: list[str] = []
         self._begun = False
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
-        low, high = observation_bounds()
+        low, high = observation_bounds(self._episode.settings.observation)
         # one object per agent: a learner seeds them one by one
         self._observation_spaces: dict[str, Any] = {
             agent: spaces.Box(low, high, dtype=np.float32) for agent in self.possible_agents
@@ -148,7 +133,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     @max_cycles.setter
     def max_cycles(self, steps: int) -> None:
         # all anew: return mode and observations reckon with it from the start
-        self._episode = Episode(self.scenario, **self._settings, max_cycles=steps)
+        self._episode = Episode(self.scenario, replace(self._episode.settings, max_cycles=steps))
         self._begun = False
         self.agents = []
 
@@ -263,6 +248,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._episode.actions.accept(agent, action, asked, 0)
         if not np.isfinite(asked).all():
             raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
+
+    def swarm_state(self) -> SwarmState:
+        """What a planner sees now, in arrays of its own: its commands can be learned from."""
+        return self._episode.swarm_state()
 
     def state(self) -> NDArray[np.float32]:
         """The whole mission as one vector of `state_space`."""

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.episode import with_max_steps
 from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES, Look
-from uas_coverage_env.env.start import first_look, tables_of
+from uas_coverage_env.env.observe import observing_of
+from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
 from uas_coverage_env.memory import Pool
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.views import lane_view, pool_view
@@ -50,11 +51,11 @@ class ScenarioPool:
     Args:
         scenario: Name of a shipped scenario, path of a scenario file, or a scenario; or a
             sequence of these.
-        action: A name of `ACTION_NAMES`.
-        max_cycles: Steps after which missions are cut; None: as each scenario has it.
+        settings: How missions are flown and paid; None: as usual.
 
     Attributes:
-        scenarios: (S,) as flown, cut to `max_cycles`.
+        settings: As given.
+        scenarios: (S,) as flown, with the time limit of the settings.
         actions: The kind of action, of the first scenario; kind and size are those of all.
         arrays: For kernels.
         sizes: The largest of every named size.
@@ -62,28 +63,31 @@ class ScenarioPool:
         n_waypoints: (S,).
 
     Raises:
-        ValueError: There is no scenario, or an argument is none of what is allowed.
+        ValueError: There is no scenario, or one is none of what is allowed.
     """
 
     def __init__(
         self,
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario],
-        *,
-        action: str = "velocity",
-        max_cycles: int | None = None,
+        settings: MissionSettings | None = None,
     ) -> None:
         given = [scenario] if isinstance(scenario, str | Path | Scenario) else scenario
-        self.scenarios = tuple(_loaded(entry, max_cycles) for entry in given)
+        settings = settings or MissionSettings()
+        self.settings = settings
+        self.scenarios = tuple(_loaded(entry, settings) for entry in given)
         worlds = pool_worlds(self.scenarios, measured_m=0.0)  # only what counts
-        actions = [actions_of(action, scenario) for scenario in self.scenarios]
+        actions = [actions_of(settings.action, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
         tables = [tables_of(*both) for both in zip(self.scenarios, actions, strict=True)]
+        own_sizes = learners_sizes(settings, self.actions.size)
+        observing = observing_of(settings.observation)
         first = [
             first_look(
                 ARENA.mission(worlds.arenas, s),
                 STATE.mission(worlds.starts, s),
                 tables[s],
-                self.actions.size,
+                observing,
+                own_sizes,
             )
             for s in range(len(self.scenarios))
         ]
@@ -93,7 +97,7 @@ class ScenarioPool:
             LEARNERS.pool([learners for learners, _ in first]),
             LOOK.pool([Look(observation) for _, observation in first]),
         )
-        self.sizes = {**ARENA.largest(worlds.arenas), "A": self.actions.size}
+        self.sizes = {**ARENA.largest(worlds.arenas), **own_sizes}
         self.n_uas = ARENA.size(worlds.arenas, "U")
         self.n_waypoints = ARENA.size(worlds.arenas, "W")
 
@@ -101,7 +105,7 @@ class ScenarioPool:
         return len(self.scenarios)
 
 
-def _loaded(scenario: str | Path | Scenario, max_cycles: int | None) -> Scenario:
+def _loaded(scenario: str | Path | Scenario, settings: MissionSettings) -> Scenario:
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    return scenario if max_cycles is None else with_max_steps(scenario, max_cycles)
+    return settings.limited(scenario)

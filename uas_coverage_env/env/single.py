@@ -1,6 +1,5 @@
 """The single-agent environment: one agent flies the whole swarm (Gymnasium)."""
 
-from collections.abc import Mapping
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -14,12 +13,12 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.layout import observation_bounds
 from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
-from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.world import FLYING, SwarmState
 
 
 @with_tables
@@ -57,12 +56,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`.
-        action: "velocity", "acceleration", "wrench" or "waypoint".
-        dynamics: "lpv" or "nonlinear".
-        return_mode: The world takes a UAS home in time, whatever it is asked for.
-        safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
-        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
-        max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
+        {settings}
         render_mode: None, "rgb_array" or "human", see `CoverageParallelEnv`.
 
     Version History:
@@ -78,28 +72,18 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self,
         scenario: str | Path | Scenario = "village",
         *,
-        action: str = "velocity",
-        dynamics: str = "lpv",
-        return_mode: bool = False,
-        safety_filter: bool = False,
-        reward_weights: Mapping[str, float] | None = None,
-        max_cycles: int | None = None,
         render_mode: str | None = None,
+        **settings: Any,
     ) -> None:
-        self._episode = Episode(
-            scenario,
-            action=action,
-            dynamics=dynamics,
-            return_mode=return_mode,
-            safety_filter=safety_filter,
-            reward_weights=reward_weights,
-            max_cycles=max_cycles,
-        )
+        self._episode = Episode(scenario, MissionSettings.of(settings))
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode
         self._begun = False
         n_uas = len(self._episode.names)
-        low, high = (np.tile(bounds, n_uas) for bounds in observation_bounds())
+        low, high = (
+            np.tile(bounds, n_uas)
+            for bounds in observation_bounds(self._episode.settings.observation)
+        )
         self.observation_space = spaces.Box(low, high, dtype=np.float32)
         self.action_space = self._episode.actions.joint_space(n_uas)
 
@@ -150,6 +134,10 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         reward = reduce(add, info["reward_terms"].values())
         return episode.observation.ravel(), reward, not flies, truncated, info
 
+    def swarm_state(self) -> SwarmState:
+        """What a planner sees now, in arrays of its own: its commands can be learned from."""
+        return self._episode.swarm_state()
+
     def action_masks(self) -> NDArray[np.bool_]:
         """The choices that exist now, of all UAS one after the other (sb3-contrib's MaskablePPO).
 
@@ -179,11 +167,11 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def _info(self, report: list[list[float]]) -> dict[str, Any]:
         episode = self._episode
         # not Python's `sum`, which rounds in another way than a kernel since 3.12
-        sums = [reduce(add, column) for column in zip(*report, strict=True)]
+        terms = [reduce(add, column) for column in zip(*episode.terms, strict=True)]
         info: dict[str, Any] = {
-            "reward_terms": dict(zip(REWARD_TERMS, sums, strict=False)),
+            "reward_terms": dict(zip(episode.settings.term_names, terms, strict=True)),
             "covered": int(report[0][COVERED]),
-            "energy_Wh": sums[ENERGY],
+            "energy_Wh": reduce(add, [row[ENERGY] for row in report]),
             "uas": {
                 name: episode.info(i, row)
                 for i, (name, row) in enumerate(zip(episode.names, report, strict=True))

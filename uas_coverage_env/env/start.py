@@ -11,10 +11,13 @@ from uas_coverage_env.env.memory import (
     LOOK,
     STATUS,
     Learners,
+    Observing,
     Tables,
 )
-from uas_coverage_env.env.nearest import NO_TARGET, count_company, neighbours_of
-from uas_coverage_env.env.observation import observe, scales_of
+from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company, neighbours_of
+from uas_coverage_env.env.observation.scales import scales_of
+from uas_coverage_env.env.observe import observe
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING, Arena, WorldState
 from uas_coverage_env.world.arena import ARENA
@@ -25,8 +28,21 @@ def tables_of(scenario: Scenario, actions: Actions) -> Tables:
     return Tables(actions.ranges, scales_of(scenario), neighbours_of(scenario))
 
 
+def learners_sizes(settings: MissionSettings, action_size: int) -> dict[str, int]:
+    """Sizes of the learners' arrays that do not depend on the scenario."""
+    return {
+        "A": action_size,
+        "R": len(settings.reward),
+        "V": settings.observation_size,
+    }
+
+
 def first_look(
-    arena: Arena, state: WorldState, tables: Tables, action_size: int
+    arena: Arena,
+    state: WorldState,
+    tables: Tables,
+    observing: Observing,
+    sizes: dict[str, int],
 ) -> tuple[Learners, NDArray[np.float32]]:
     """What missions of a scenario begin with, always the same.
 
@@ -34,12 +50,13 @@ def first_look(
         arena: The arena.
         state: The world at t = 0.
         tables: Of the scenario.
-        action_size: Numbers of an action.
+        observing: What is observed.
+        sizes: See `learners_sizes`.
 
     Returns:
-        The learners' arrays, and the observations, (U, OBSERVATION_SIZE).
+        The learners' arrays, and the observations, (U, V).
     """
-    sizes = ARENA.sizes_of(arena, {"A": action_size})
+    sizes = ARENA.sizes_of(arena, sizes)
     learners = LEARNERS.zeros(sizes)
     learners.targets[:] = NO_TARGET
     learners.candidates[:] = -1
@@ -48,15 +65,6 @@ def first_look(
     learners.report[:, COVERED] = (~state.uncovered).sum()
     look = LOOK.zeros(sizes)
     count_company(state.uncovered, tables.neighbours, learners.company)
-    observe(
-        arena,
-        state,
-        tables.scales,
-        learners.company,
-        state.status == FLYING,
-        learners.targets,
-        int(arena.rules["max_steps"][0]),
-        learners.candidates,
-        look.observation,
-    )
+    flying = state.status == FLYING
+    observe(arena, state, tables, learners, observing, flying, look.observation)
     return learners, look.observation

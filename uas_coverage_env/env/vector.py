@@ -1,6 +1,6 @@
 """Many missions as one environment: one agent per mission flies its whole swarm (Gymnasium)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,14 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.batch import CoverageBatch, masks_of
-from uas_coverage_env.env.batch_kernel import SWARM_COVERED, SWARM_REWARD
-from uas_coverage_env.env.layout import observation_bounds
-from uas_coverage_env.env.memory import CONTACT, ENERGY, FILTERED, RETURNING, STATUS
-from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.batch_kernel import (
+    SWARM_COVERED,
+    SWARM_ENERGY,
+    SWARM_FIRST_TERM,
+    SWARM_REWARD,
+)
+from uas_coverage_env.env.memory import CONTACT, FILTERED, RETURNING, STATUS
+from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
 from uas_coverage_env.scenario import Scenario
@@ -65,12 +69,6 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
     Args:
         num_envs: How many.
         scenario: A scenario, its name or file, or a sequence of these.
-        action: See `CoverageSwarmEnv`, also the next five.
-        dynamics: "lpv" or "nonlinear".
-        return_mode: Bring every UAS home in time.
-        safety_filter: Keep commands clear of harm.
-        reward_weights: Reward term -> weight.
-        max_cycles: Time limit of the missions in steps.
         autoreset_mode: An `AutoresetMode`, or its value.
         threads: How many of numba's threads share the missions, see `CoverageBatch`.
         copy: Whether observations are arrays of their own. False: they are overwritten by the step
@@ -78,6 +76,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         render_mode: None; "rgb_array": `render` returns a tuple of pictures, 512 x 512 pixels each,
             as Gymnasium's wrappers ask for; "rgb_array_tiled": one array (H, W, 3) that shows the
             first 16 missions side by side; "human": a window with these (extra `human`).
+        **settings: See `MissionSettings`.
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
@@ -94,16 +93,11 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         num_envs: int = 1,
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
         *,
-        action: str = "velocity",
-        dynamics: str = "lpv",
-        return_mode: bool = False,
-        safety_filter: bool = False,
-        reward_weights: Mapping[str, float] | None = None,
-        max_cycles: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         copy: bool = True,
         render_mode: str | None = None,
+        **settings: Any,
     ) -> None:
         try:
             mode = AutoresetMode(autoreset_mode)
@@ -115,17 +109,12 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         self._batch = CoverageBatch(
             num_envs,
             scenario,
-            action=action,
-            dynamics=dynamics,
-            return_mode=return_mode,
-            safety_filter=safety_filter,
-            reward_weights=reward_weights,
-            max_cycles=max_cycles,
             autoreset=_MODES[mode],
             threads=threads,
+            **settings,
         )
         self.metadata = {**self.metadata, "autoreset_mode": mode}
-        self.num_envs = self._batch.num_lanes
+        self.num_envs = self._batch.num_envs
         self.render_mode = render_mode
         self._tiles = Tiles(self.num_envs, render_mode)
         self.copy = copy
@@ -135,7 +124,10 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         self._all.flags.writeable = False
         self._attributes: dict[str, tuple[Any, ...]] = {}
         n_uas = self._batch.n_uas
-        low, high = (np.tile(bounds, n_uas) for bounds in observation_bounds())
+        low, high = (
+            np.tile(bounds, n_uas)
+            for bounds in observation_bounds(self._batch.settings.observation)
+        )
         self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
         self.single_action_space = self._batch.actions.joint_space(n_uas)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -289,13 +281,13 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         else:
             swarm = swarm.copy()
         terms: dict[str, Any] = {}
-        for column, name in enumerate(REWARD_TERMS):
+        for column, name in enumerate(self._batch.settings.term_names, SWARM_FIRST_TERM):
             terms[name] = swarm[:, column]
             terms[f"_{name}"] = mask
         infos = {
             "reward_terms": terms,
             "covered": swarm[:, SWARM_COVERED].astype(np.int64),
-            "energy_Wh": swarm[:, ENERGY],
+            "energy_Wh": swarm[:, SWARM_ENERGY],
             "scenario": self._batch.lanes.scenario * mask,
             "status": report[:, :, STATUS].astype(np.int64),
             "contact": report[:, :, CONTACT].astype(np.int64),

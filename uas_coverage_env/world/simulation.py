@@ -76,7 +76,7 @@ class World:
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
         self._step: Callable[..., int] | None = None
-        self._assistants: AssistantCode = ()
+        self._assistants: AssistantCode = np.zeros(0, dtype=np.int64)
         self._at = MISSION.addresses_of(self.arena, self._state)
 
     def __getstate__(self) -> dict[str, Any]:

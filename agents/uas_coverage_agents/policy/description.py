@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, JsonValue, model_validator
 
 from uas_coverage_agents.policy.networks import Network
-from uas_coverage_env.env.layout import Group
+from uas_coverage_env.env.observation import Group
 from uas_coverage_env.strict_toml import StrictModel
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -15,7 +15,7 @@ Size = Annotated[int, Field(ge=1, le=100_000)]
 
 
 class ObservedFeature(StrictModel):
-    """Some numbers of an observation, as in `uas_coverage_env.env.layout.Feature`."""
+    """Some numbers of an observation, as in `uas_coverage_env.env.observation.Feature`."""
 
     name: Name
     size: Size

@@ -11,7 +11,7 @@ from torch import nn
 from uas_coverage_agents.policy.gaze import Gaze
 from uas_coverage_agents.training.actor_critic import ActorCritic
 from uas_coverage_env.env import observation_columns
-from uas_coverage_env.env.layout import HEIGHT_M
+from uas_coverage_env.env.observation.scales import HEIGHT_M
 
 _FIRST = int(observation_columns("waypoints", "valid")[0, 0])
 _NORTH, _EAST = (observation_columns("waypoints", "direction")[0] - _FIRST).tolist()

@@ -73,7 +73,7 @@ class CoverageVecEnv(VecEnv):
         self.batch = CoverageBatch(
             num_missions, scenario, action=action, autoreset="same_step", **settings
         )
-        self.num_missions = self.batch.num_lanes
+        self.num_missions = self.batch.num_envs
         self.n_uas = self.batch.n_uas
         shape = (self.num_missions, self.n_uas)
         self._returns = np.zeros(shape)

@@ -23,7 +23,7 @@ from uas_coverage_agents.training.vec_env import CoverageVecEnv
 from uas_coverage_agents.velocity.pilot import OUTPUTS, gaze, observation
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
-from uas_coverage_env.env.layout import NEARBY_M
+from uas_coverage_env.env.observation.scales import NEARBY_M
 
 _FLYING = int(observation_columns("own", "flying")[0, 0])
 _RETURNING = int(observation_columns("own", "returning")[0, 0])

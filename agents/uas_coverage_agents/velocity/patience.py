@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env import observation_columns
-from uas_coverage_env.env.layout import NEARBY_M
+from uas_coverage_env.env.observation.scales import NEARBY_M
 
 PATIENCE_S = 20.0
 """For how long a waypoint may be the next one near by; covering one takes less than ten [s]."""

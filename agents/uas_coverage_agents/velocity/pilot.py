@@ -10,7 +10,7 @@ from uas_coverage_agents.policy.gaze import Gaze
 from uas_coverage_agents.velocity.patience import Patience
 from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.layout import OBSERVATION_LAYOUT, SCALES
+from uas_coverage_env.env.observation import OBSERVATION, SCALES
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import Command, SwarmState, Velocity, World
 
@@ -20,7 +20,7 @@ OUTPUTS = 3
 
 def observation() -> Observation:
     """What the policy reads: the observation of the environment, as it is."""
-    return Observation.of(LAYOUT, OBSERVATION_LAYOUT, SCALES)
+    return Observation.of(LAYOUT, OBSERVATION, SCALES)
 
 
 def gaze(hidden: int, keys: int) -> Gaze:

@@ -7,7 +7,7 @@ Nothing depends on where north is, or on the order of the fleet.
 
 import numpy as np
 
-from uas_coverage_env.env.layout import Feature, Group
+from uas_coverage_env.env.observation import Feature, Group
 
 LAYOUT = "waypoint_v1"
 

@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.env.layout import NEARBY_M
+from uas_coverage_env.env.observation.scales import NEARBY_M
 from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.vehicle import DOD
 

@@ -1,10 +1,11 @@
-"""What lies around a UAS: free ways to obstacles and fence, compiled."""
+"""What lies around a UAS: free ways to obstacles and fence."""
 
 import math
 
 from uas_coverage_env.borrow import borrow, part
-from uas_coverage_env.env.layout import HEIGHT_M, N_RAYS, RAY_M
-from uas_coverage_env.env.relative import within
+from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
+from uas_coverage_env.env.observation.relative import within
+from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import X, Y, Z
@@ -15,6 +16,20 @@ from uas_coverage_env.world.boxes import (
     MIDDLE,
     PER_HALF,
 )
+
+_FEATURES = (
+    Feature(
+        "rays",
+        N_RAYS,
+        0,
+        1,
+        "1 - free way / 80 m to obstacle or fence: N, NE, …, NW, up, down",
+    ),
+    Feature("clearance", 1, -1, 1, "clearance from the nearest fixed obstacle / 20 m"),
+    Feature("fence", 1, -1, 1, "distance to the fence beyond its margin / 20 m"),
+)
+
+_AT = Group("surroundings", 1, _FEATURES).columns
 
 _BEYOND_M = RAY_M + 1e-6
 """A plane at this distance is out of reach of all rays, whatever is rounded [m]."""
@@ -245,8 +260,8 @@ def _rays_to_obstacle(obstacle, normals, offsets_m, x, y, z, free_m):
 
 
 @inlined_kernel
-def surroundings(arena, state, i, row, k):
-    """Write what lies around UAS i: rays, nearest obstacle, fence; returns the next column."""
+def write_surroundings(arena, state, i, row):
+    """Write the group: rays, nearest obstacle, fence."""
     normals = arena.normals
     offsets_m = arena.offsets_m
     rules = arena.rules[0]
@@ -275,8 +290,15 @@ def surroundings(arena, state, i, row, k):
             if in_reach[o] != 0.0:
                 _rays_to_obstacle(obstacle, normals, offsets_m, x, y, z, free_m)
     for ray in range(N_RAYS):
-        row[k + ray] = within(1.0 - free_m[ray] * (1.0 / RAY_M), 0.0, 1.0)
-    k += N_RAYS
-    row[k] = within(clearance_m * (1.0 / HEIGHT_M), -1.0, 1.0)
-    row[k + 1] = within((inside_m - rules.fence_margin_m) * (1.0 / HEIGHT_M), -1.0, 1.0)
-    return k + 2
+        row[_AT.rays + ray] = within(1.0 - free_m[ray] * (1.0 / RAY_M), 0.0, 1.0)
+    row[_AT.clearance] = within(clearance_m * (1.0 / HEIGHT_M), -1.0, 1.0)
+    row[_AT.fence] = within((inside_m - rules.fence_margin_m) * (1.0 / HEIGHT_M), -1.0, 1.0)
+
+
+@kernel
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
+    write_surroundings(arena, state, i, row)
+
+
+SURROUNDINGS = ObservationBlock("surroundings", 1, _FEATURES, write)

@@ -1,0 +1,29 @@
+"""What a UAS observes: blocks, each one file that holds its table and the kernel that writes it."""
+
+from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
+from uas_coverage_env.env.observation.layout import (
+    OBSERVATION,
+    OBSERVATION_SIZE,
+    checked_blocks,
+    layout_table,
+    observation_bounds,
+    observation_columns,
+)
+from uas_coverage_env.env.observation.scales import K_MOVING, K_UAS, K_WAYPOINTS, SCALES
+
+__all__ = [
+    "K_MOVING",
+    "K_UAS",
+    "K_WAYPOINTS",
+    "OBSERVATION",
+    "OBSERVATION_SIZE",
+    "SCALES",
+    "Feature",
+    "Group",
+    "ObservationBlock",
+    "checked_blocks",
+    "flag",
+    "layout_table",
+    "observation_bounds",
+    "observation_columns",
+]

@@ -1,0 +1,61 @@
+"""The way home past obstacles."""
+
+from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
+from uas_coverage_env.env.observation.relative import close, direction, within
+from uas_coverage_env.env.observation.scales import HEIGHT_M
+from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.world import HOME as HOME_TARGET
+from uas_coverage_env.world.guidance import target_position
+from uas_coverage_env.world.routes import shortest_way
+
+_FEATURES = (
+    Feature("direction", 2, -1, 1, "unit vector of the first leg home past obstacles"),
+    flag("closeness", "1/(1 + way home / 30 m)"),
+    Feature("below", 1, -1, 1, "how far the start is below / 20 m"),
+)
+
+_AT = Group("home", 1, _FEATURES).columns
+
+
+@inlined_kernel
+def _way_home(arena, state, i):
+    """The way home.
+
+    Returns:
+        End of the first leg, north and east [m]; length of the way [m]; how far the start is below
+        [m]; depth of discharge that the way costs.
+    """
+    uas = arena.uas[i]
+    x = state.x[i, X]
+    y = state.x[i, Y]
+    z = state.x[i, Z]
+    target, x1, y1, z1 = target_position(arena, i, HOME_TARGET)
+    leg_x, leg_y, way_m = shortest_way(arena, target, x, y, z, x1, y1, z1)
+    flight_s = way_m / uas.speed_mps + max(0.0, z1 - z) / uas.descent_mps
+    return leg_x, leg_y, way_m, z1 - z, flight_s * uas.dod_per_s
+
+
+@kernel
+def charge_home(arena, state, i):
+    """Depth of discharge that the way home costs at top speed."""
+    return _way_home(arena, state, i)[4]
+
+
+@inlined_kernel
+def write_home(arena, state, i, row):
+    """Write the group; returns the depth of discharge that the way costs."""
+    leg_x, leg_y, way_m, below_m, home_dod = _way_home(arena, state, i)
+    direction(leg_x - state.x[i, X], leg_y - state.x[i, Y], row, _AT.direction)
+    row[_AT.closeness] = close(way_m)
+    row[_AT.below] = within(below_m * (1.0 / HEIGHT_M), -1.0, 1.0)
+    return home_dod
+
+
+@kernel
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
+    write_home(arena, state, i, row)
+
+
+HOME = ObservationBlock("home", 1, _FEATURES, write)

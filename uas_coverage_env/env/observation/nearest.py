@@ -1,0 +1,148 @@
+"""The nearest open waypoints of a UAS, and the waypoints next to a waypoint."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from uas_coverage_env.borrow import part
+from uas_coverage_env.env.observation.relative import close
+from uas_coverage_env.env.observation.scales import CROWD, CROWD_M, K_WAYPOINTS
+from uas_coverage_env.env.observation.sorted_list import insert
+from uas_coverage_env.kernels import inlined_kernel, kernel, lowest_bit, room
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import X, Y, Z
+
+NO_TARGET = -2
+"""Target of a UAS that has none; home is world's HOME, waypoints are their indices."""
+
+N_NEIGHBOURS = 24
+
+_WORD = 63
+"""As many waypoints are asked at once: their answers are the bits of one number that has a sign."""
+
+NEIGHBOURS_DTYPE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [("index", "i8", (N_NEIGHBOURS,)), ("distance_m", "f8", (N_NEIGHBOURS,))], align=True
+        ),
+    )
+)
+"""The waypoints next to a waypoint, nearest first; -1 and infinity where there are no more."""
+
+
+def neighbours_of(scenario: Scenario) -> NDArray[np.void]:
+    """The neighbours of every waypoint.
+
+    Returns:
+        (W,) of NEIGHBOURS_DTYPE.
+    """
+    positions_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    neighbours = np.zeros(len(positions_m), dtype=NEIGHBOURS_DTYPE)
+    neighbours["index"], neighbours["distance_m"] = -1, np.inf
+    answer = KDTree(positions_m).query(positions_m, k=N_NEIGHBOURS + 1)
+    for w, (away_m, others) in enumerate(zip(*map(np.asarray, answer), strict=True)):
+        # the query finds the waypoint itself, and W where there are no more
+        found = (others != w) & (others < len(positions_m))
+        n = min(int(found.sum()), N_NEIGHBOURS)
+        neighbours["index"][w, :n] = others[found][:n]
+        neighbours["distance_m"][w, :n] = away_m[found][:n]
+    return neighbours
+
+
+@inlined_kernel
+def _away_m2(columns, w, x, y, z):
+    dx = columns[0, w] - x
+    dy = columns[1, w] - y
+    dz = columns[2, w] - z
+    return dx * dx + dy * dy + dz * dz
+
+
+@inlined_kernel
+def _open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
+    """The open waypoints no farther than a limit, as the bits of a number."""
+    bits = 0
+    for w in range(uncovered.shape[0]):
+        dx = north_m[w] - x
+        dy = east_m[w] - y
+        dz = down_m[w] - z
+        near = uncovered[w] & (dx * dx + dy * dy + dz * dz <= limit_m2)
+        bits |= np.int64(near) << w
+    return bits
+
+
+@inlined_kernel
+def nearest_waypoints(arena, state, i, candidates):
+    """The open waypoints nearest to UAS i; of two equally near, the first of the scenario.
+
+    Args:
+        arena: The arena.
+        state: The state of the world.
+        i: Index of the UAS.
+        candidates: (K_WAYPOINTS,) indices of waypoints, -1 where there are no more; written.
+            What is in it, from the step before, hardly changes and is looked at first; it may be
+            anything in which nothing is twice.
+    """
+    x = state.x[i, X]
+    y = state.x[i, Y]
+    z = state.x[i, Z]
+    columns = arena.waypoint_columns
+    uncovered = state.uncovered
+    n_waypoints = uncovered.shape[0]
+    away_m2 = room(K_WAYPOINTS)
+    found = 0
+    for c in range(K_WAYPOINTS):
+        w = candidates[c]
+        if 0 <= w < n_waypoints and uncovered[w]:
+            m2 = _away_m2(columns, w, x, y, z)
+            found = insert(candidates, away_m2, found, w, m2)
+    for first in range(0, n_waypoints, _WORD):
+        n = min(_WORD, n_waypoints - first)
+        limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
+        bits = _open_within(
+            part(columns, first, n), part(columns, n_waypoints + first, n),
+            part(columns, 2 * n_waypoints + first, n), part(uncovered, first, n),
+            x, y, z, limit_m2,
+        )  # fmt: skip
+        held = 0
+        for c in range(found):
+            at = candidates[c] - first
+            held |= (1 << at) if 0 <= at < n else 0
+        bits &= ~held
+        while bits != 0:
+            w = first + lowest_bit(bits)
+            bits &= bits - 1
+            m2 = _away_m2(columns, w, x, y, z)
+            found = insert(candidates, away_m2, found, w, m2)
+    for c in range(found, K_WAYPOINTS):
+        candidates[c] = -1
+
+
+@kernel
+def count_company(uncovered, neighbours, company):
+    """Write what is open around every waypoint; it changes only when a waypoint is covered.
+
+    Args:
+        uncovered: (W,) still to be covered.
+        neighbours: (W,) of NEIGHBOURS_DTYPE.
+        company: (W, 2) of float32, closeness of the next open waypoint, and how crowded it is;
+            written.
+    """
+    for w in range(company.shape[0]):
+        index = neighbours[w].index
+        distance_m = neighbours[w].distance_m
+        next_m = math.inf
+        crowd = 0
+        for n in range(N_NEIGHBOURS):
+            other = index[n]
+            if other < 0:
+                break
+            if uncovered[other]:
+                next_m = min(next_m, distance_m[n])
+                if distance_m[n] > CROWD_M or crowd == CROWD:
+                    break
+                crowd += 1
+        company[w, 0] = close(next_m)
+        company[w, 1] = crowd / CROWD

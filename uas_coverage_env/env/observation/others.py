@@ -1,0 +1,71 @@
+"""The other UAS that fly nearest to a UAS."""
+
+from uas_coverage_env.env.observation.block import (
+    DIRECTION,
+    Feature,
+    Group,
+    ObservationBlock,
+    flag,
+)
+from uas_coverage_env.env.observation.relative import (
+    apart_m,
+    charge_left,
+    close,
+    direction,
+    within,
+)
+from uas_coverage_env.env.observation.scales import HEIGHT_M, K_UAS
+from uas_coverage_env.env.observation.sorted_list import insert
+from uas_coverage_env.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.vehicle import VX, VY, X, Y, Z
+from uas_coverage_env.world import FLYING
+
+_FEATURES = (
+    flag("valid", "1 for a flying UAS; all are 0 where there is none"),
+    Feature("direction", 2, -1, 1, DIRECTION),
+    flag("closeness", "1/(1 + distance / 30 m)"),
+    Feature("below", 1, -1, 1, "how far it is below / 20 m"),
+    Feature("velocity", 2, -2, 2, "relative, north and east / own limit"),
+    Feature("charge_left", 1, -1, 1, "its (dod_max - dod) / dod_max"),
+)
+
+_GROUP = Group("others", K_UAS, _FEATURES)
+_AT = _GROUP.columns
+_WIDTH = _GROUP.width
+
+
+@inlined_kernel
+def write_others(arena, state, tables, i, row):
+    """Write the group."""
+    x = state.x[i]
+    scale = tables.scales[i]
+    index = room(K_UAS)
+    away_m = room(K_UAS)
+    found = 0
+    for j in range(state.status.shape[0]):
+        if j != i and state.status[j] == FLYING:
+            other = state.x[j]
+            m = apart_m(other[X] - x[X], other[Y] - x[Y], other[Z] - x[Z])
+            found = insert(index, away_m, found, j, m)
+    for at in range(_WIDTH * K_UAS):
+        row[at] = 0.0
+    for c in range(found):
+        nearest = int(index[c])
+        other = state.x[nearest]
+        at = _WIDTH * c
+        row[at + _AT.valid] = 1.0
+        direction(other[X] - x[X], other[Y] - x[Y], row, at + _AT.direction)
+        row[at + _AT.closeness] = close(away_m[c])
+        row[at + _AT.below] = within((other[Z] - x[Z]) / HEIGHT_M, -1.0, 1.0)
+        row[at + _AT.velocity] = within((other[VX] - x[VX]) * scale.per_v_xy, -2.0, 2.0)
+        row[at + _AT.velocity + 1] = within((other[VY] - x[VY]) * scale.per_v_xy, -2.0, 2.0)
+        row[at + _AT.charge_left] = charge_left(arena, state, nearest)
+
+
+@kernel
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
+    write_others(arena, state, tables, i, row)
+
+
+OTHERS = ObservationBlock("others", K_UAS, _FEATURES, write)

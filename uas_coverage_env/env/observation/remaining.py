@@ -1,0 +1,117 @@
+"""Where the weight of the open waypoints lies."""
+
+from uas_coverage_env.borrow import part
+from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
+from uas_coverage_env.env.observation.relative import within
+from uas_coverage_env.env.observation.scales import FAR_M
+from uas_coverage_env.kernels import counting_kernel, inlined_kernel, kernel, room
+from uas_coverage_env.vehicle import X, Y
+from uas_coverage_env.world.arena import ALL_SHARES
+
+_N_SECTORS = 8
+_N_SUMS = _N_SECTORS + 2
+
+_FEATURES = (
+    Feature("sectors", 8, 0, 1, "share of the open weight in 45° from north over east"),
+    Feature("centre", 2, -1, 1, "north and east to the centre of the open weight / 250 m"),
+)
+
+_AT = Group("remaining", 1, _FEATURES).columns
+
+
+@inlined_kernel
+def _way(here_m, there_m):
+    # not in `_add_open` itself: this is no whole number, and its order of operations has to stay
+    return there_m - here_m
+
+
+@counting_kernel
+def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, y, sums):
+    """Add up the open waypoints: shares in each eighth of the horizon, and times north and east.
+
+    The eighths go from north over east. Three questions tell in which one a waypoint lies: is it in
+    the first half, in the first quarter of its half, in the first eighth of its quarter? To compare
+    takes the processor longer than to add, so the sums are those over each combination of yes; the
+    eighths follow from them.
+    """
+    every = half = quarter = eighth = half_quarter = half_eighth = quarter_eighth = all_three = 0.0
+    north = east = 0.0
+    for w in range(uncovered.shape[0]):
+        share = shares[w] if uncovered[w] else 0.0
+        dx = _way(x, north_m[w])
+        dy = _way(y, east_m[w])
+        in_half = dy >= 0.0
+        in_quarter = (in_half & (dx > 0.0)) | ((dy < 0.0) & (dx < 0.0))
+        in_eighth = (in_quarter & (abs(dy) < abs(dx))) | ((not in_quarter) & (abs(dx) < abs(dy)))
+        every += share
+        half += share if in_half else 0.0
+        quarter += share if in_quarter else 0.0
+        eighth += share if in_eighth else 0.0
+        half_quarter += share if in_half & in_quarter else 0.0
+        half_eighth += share if in_half & in_eighth else 0.0
+        quarter_eighth += share if in_quarter & in_eighth else 0.0
+        all_three += share if in_half & in_quarter & in_eighth else 0.0
+        north += shares_north[w] if uncovered[w] else 0.0
+        east += shares_east[w] if uncovered[w] else 0.0
+    sums[0] = all_three
+    sums[1] = half_quarter - all_three
+    sums[2] = half_eighth - all_three
+    sums[3] = half - half_quarter - half_eighth + all_three
+    sums[4] = quarter_eighth - all_three
+    sums[5] = quarter - half_quarter - quarter_eighth + all_three
+    sums[6] = eighth - half_eighth - quarter_eighth + all_three
+    sums[7] = every - half - quarter - eighth
+    sums[7] += half_quarter + half_eighth + quarter_eighth - all_three
+    sums[8] = north
+    sums[9] = east
+
+
+@inlined_kernel
+def _open_weight(arena, state, i, sums):
+    """See `_add_open`; returns the share of all weight that is open, in units of 1 / ALL_SHARES."""
+    n = state.uncovered.shape[0]
+    columns = arena.waypoint_columns
+    _add_open(
+        part(columns, 0, n),
+        part(columns, n, n),
+        part(columns, 5 * n, n),
+        part(columns, 6 * n, n),
+        part(columns, 7 * n, n),
+        state.uncovered, state.x[i, X], state.x[i, Y], sums,
+    )  # fmt: skip
+    left = 0.0
+    for s in range(_N_SECTORS):
+        left += sums[s]
+    return left
+
+
+@kernel
+def share_of_open_weight(arena, state, i):
+    """Share of all weight that is still to be covered."""
+    return _open_weight(arena, state, i, room(_N_SUMS)) * (1.0 / ALL_SHARES)
+
+
+@inlined_kernel
+def write_remaining(arena, state, i, row):
+    """Write the group; returns the share of all weight that is still to be covered."""
+    sums = room(_N_SUMS)
+    left = _open_weight(arena, state, i, sums)
+    per_share = 1.0 / left if left > 0.0 else 0.0
+    for s in range(_N_SECTORS):
+        row[_AT.sectors + s] = within(sums[s] * per_share, 0.0, 1.0)
+    there = 1.0 if left > 0.0 else 0.0
+    to_m = per_share * arena.rules[0].unit_m
+    north_m = sums[8] * to_m - there * state.x[i, X]
+    east_m = sums[9] * to_m - there * state.x[i, Y]
+    row[_AT.centre] = within(north_m * (1.0 / FAR_M), -1.0, 1.0)
+    row[_AT.centre + 1] = within(east_m * (1.0 / FAR_M), -1.0, 1.0)
+    return left * (1.0 / ALL_SHARES)
+
+
+@kernel
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
+    write_remaining(arena, state, i, row)
+
+
+REMAINING = ObservationBlock("remaining", 1, _FEATURES, write)

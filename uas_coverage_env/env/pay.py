@@ -1,0 +1,113 @@
+"""The rewards of all UAS, compiled: the default terms as one kernel, others at their address."""
+
+from collections import namedtuple
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from uas_coverage_env.borrow import part
+from uas_coverage_env.calls import Signature
+from uas_coverage_env.env.memory import LEARNERS, SCRATCH, TABLES, Paying
+from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
+from uas_coverage_env.env.rewards import terms as default
+from uas_coverage_env.kernels import inlined_kernel
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.state import STATE
+
+_AT = namedtuple("columns", REWARD_TERMS)(*range(len(REWARD)))
+
+
+@cache
+def _types() -> tuple[types.Type, ...]:
+    """Of the arguments of a term's kernel."""
+    return (
+        ARENA.numba_type(), STATE.numba_type(), TABLES.numba_type(), LEARNERS.numba_type(),
+        SCRATCH.numba_type(), types.int64, types.Array(types.float64, 1, "C"),
+    )  # fmt: skip
+
+
+_SIGNATURE = Signature(
+    "arena state tables learners scratch i parameters", _types, result=types.float64
+)
+_value_of = _SIGNATURE.call
+
+
+def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64]) -> Paying:
+    """Compile the terms, or load them from the cache.
+
+    Args:
+        terms: Of a reward.
+        weights: (R,) theirs.
+
+    Raises:
+        ValueError: A term cannot be compiled.
+    """
+    same = [term.value is usual.value for term, usual in zip(terms, REWARD, strict=False)]
+    begins_as_usual = len(same) == len(REWARD) and all(same)
+    calls = []
+    parameters: list[float] = []
+    for k, term in enumerate(terms):
+        if not begins_as_usual or k >= len(REWARD):
+            address = _SIGNATURE.address_of(term.value)
+            calls.append((address, k, len(parameters), len(term.parameters)))
+            parameters.extend(term.parameters)
+    return Paying(
+        weights=weights,
+        begins_as_usual=np.array([begins_as_usual]),
+        calls=np.array(calls, dtype=np.int64).reshape(-1, 4),
+        parameters=np.array(parameters, dtype=np.float64),
+    )
+
+
+@inlined_kernel
+def _pay_as_usual(arena, state, tables, learners, scratch, i):
+    """Write the terms of `REWARD`, not yet weighted."""
+    row = learners.terms[i]
+    none = part(learners.terms, 0, 0)
+    row[_AT.coverage] = default.coverage(arena, state, tables, learners, scratch, i, none)
+    row[_AT.team_coverage] = default.team_coverage(arena, state, tables, learners, scratch, i, none)
+    row[_AT.energy] = default.energy(arena, state, tables, learners, scratch, i, none)
+    row[_AT.violation] = default.violation(arena, state, tables, learners, scratch, i, none)
+    row[_AT.home] = default.home(arena, state, tables, learners, scratch, i, none)
+    row[_AT.stranded] = default.stranded(arena, state, tables, learners, scratch, i, none)
+    row[_AT.filter] = default.filter_change(arena, state, tables, learners, scratch, i, none)
+    row[_AT.time] = default.time(arena, state, tables, learners, scratch, i, none)
+
+
+@inlined_kernel
+def pay(arena, state, tables, learners, scratch, paying, on_gpu):
+    """Write the weighted terms of every UAS that flew in this step; those of the others are zero.
+
+    Args:
+        arena: The arena.
+        state: The state of the world after the step.
+        tables: `Tables`.
+        learners: `Learners`; its terms are written.
+        scratch: `Scratch`.
+        paying: `Paying`.
+        on_gpu: None on the processor. A GPU calls nothing at an address: it knows `REWARD` alone.
+    """
+    terms = learners.terms
+    n_terms = paying.weights.shape[0]
+    for i in range(terms.shape[0]):
+        for term in range(n_terms):
+            terms[i, term] = 0.0
+        if not scratch.outcome[i].flew:
+            continue
+        if on_gpu is not None:
+            _pay_as_usual(arena, state, tables, learners, scratch, i)
+        else:
+            if paying.begins_as_usual[0]:
+                _pay_as_usual(arena, state, tables, learners, scratch, i)
+            for t in range(paying.calls.shape[0]):
+                call = paying.calls[t]
+                terms[i, call[1]] = _value_of(
+                    call[0], arena, state, tables, learners, scratch, i,
+                    part(paying.parameters, call[2], call[3]),
+                )  # fmt: skip
+        for term in range(n_terms):
+            # adding zero makes -0.0 a plain zero
+            terms[i, term] = terms[i, term] * paying.weights[term] + 0.0

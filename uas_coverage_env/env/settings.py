@@ -1,0 +1,102 @@
+"""How missions are flown and paid: what every environment can be told, in one record."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.actions import ACTION_NAMES
+from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
+from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Dynamics
+
+_LONGEST = 100_000
+
+
+@dataclass(frozen=True)
+class MissionSettings:
+    """What the environments take as keyword arguments, whatever their interface.
+
+    Attributes:
+        action: "velocity", "acceleration", "wrench" or "waypoint".
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world takes a UAS home in time, whatever it is asked for.
+        safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`.
+        reward: Terms that the reward is made of, see `RewardTerm`.
+
+    Raises:
+        ValueError: A value is none of what is allowed; says what is.
+    """
+
+    action: str = "velocity"
+    dynamics: Dynamics = "lpv"
+    return_mode: bool = False
+    safety_filter: bool = False
+    reward_weights: Mapping[str, float] | None = None
+    max_cycles: int | None = None
+    observation: tuple[ObservationBlock, ...] = OBSERVATION
+    reward: tuple[RewardTerm, ...] = REWARD
+
+    def __post_init__(self) -> None:
+        if self.action not in ACTION_NAMES:
+            raise ValueError(f"action is {self.action!r}; it is one of {', '.join(ACTION_NAMES)}")
+        if self.dynamics not in get_args(Dynamics):
+            allowed = ", ".join(get_args(Dynamics))
+            raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
+        for name in ("return_mode", "safety_filter"):
+            switch = getattr(self, name)
+            if not isinstance(switch, bool | np.bool_):
+                raise ValueError(f"{name} is {switch!r}; it is True or False")
+            object.__setattr__(self, name, bool(switch))
+        cycles = self.max_cycles
+        whole = isinstance(cycles, int | np.integer) and not isinstance(cycles, bool)
+        if cycles is not None and (not whole or not 1 <= cycles <= _LONGEST):
+            raise ValueError(f"max_cycles is {cycles!r}; give a whole number from 1 to {_LONGEST}")
+        object.__setattr__(self, "observation", checked_blocks(self.observation))
+        object.__setattr__(self, "reward", checked_terms(self.reward))
+        weights_of(self.reward, self.reward_weights)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "MissionSettings":
+        """The settings of keyword arguments.
+
+        Raises:
+            ValueError: There is no such setting, or a value is none of what is allowed.
+        """
+        known = [field.name for field in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise ValueError(f"there is no argument {name!r}; there are {', '.join(known)}")
+        return cls(**given)
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(R,) the weights of the terms."""
+        return weights_of(self.reward, self.reward_weights)
+
+    @property
+    def term_names(self) -> tuple[str, ...]:
+        """(R,) the names of the terms."""
+        return tuple(term.name for term in self.reward)
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers in the observation of one UAS."""
+        return sum(block.size for block in self.observation)
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the action is a choice of waypoints."""
+        return self.action == "waypoint"
+
+    def limited(self, scenario: Scenario) -> Scenario:
+        """The scenario with this time limit; return mode and the observed time know it."""
+        if self.max_cycles is None:
+            return scenario
+        return scenario.model_copy(update={"max_steps": int(self.max_cycles)})
