@@ -27,8 +27,9 @@ from uas_coverage_env.env.rewards import REWARD_TERMS, pay
 from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
 from uas_coverage_env.world.contacts import (
+    check_limits,
     count_breaches,
-    judge_limits,
+    judge_fence_and_battery,
     judge_obstacles,
     judge_separation,
 )
@@ -109,8 +110,9 @@ def _obstacles(arena, state, tables, view, weights, spare, row):
 @compiled
 def _other_contacts(arena, state, tables, view, weights, spare, row):
     judge_separation(arena, state, view.outcome)
-    judge_limits(arena, state, view.outcome)
+    judge_fence_and_battery(arena, state, view.outcome)
     count_breaches(arena, state, view.outcome)
+    check_limits(arena, state, False, view.outcome)
 
 
 @compiled

@@ -70,7 +70,8 @@ def run(
     """Fly one mission and write a flight directory.
 
     Ctrl-C ends the flight early and keeps what was flown. Exits 0 where everything is covered,
-    everybody home and nothing was touched (also where --steps ended the run), 1 otherwise.
+    everybody home, nothing touched and no limit exceeded (also where --steps ended the run), 1
+    otherwise.
     """
     mission = loaded(scenario)
     player = load_planner(planner, _options(option or ()))
@@ -138,12 +139,7 @@ def _report(screen: Console, flight: Flight, directory: Path) -> None:
         )
     screen.print(table)
     for violation in flight.violations:
-        partner = f" with {violation.partner}" if violation.partner else ""
-        screen.print(
-            f"violation: {violation.uas}, {violation.kind} contact{partner} "
-            f"at {violation.time_s:g} s",
-            markup=False,
-        )
+        screen.print(f"violation: {violation}", markup=False)
     ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
     screen.print(
         f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "

@@ -212,11 +212,14 @@ class Episode:
 
     def info(self, i: int, row: list[float]) -> dict[str, Any]:
         """What is told about a UAS beside its observation and reward, see `CoverageParallelEnv`."""
-        energy_Wh, contact, contact_with, status, filtered, returning, covered, _ = row
+        (
+            energy_Wh, contact, contact_with, limits, status, filtered, returning, covered, _
+        ) = row  # fmt: skip
         info: dict[str, Any] = {
             "status": STATUS_NAMES[int(status)],
             "contact": None,
             "contact_with": None,
+            "limits_exceeded": int(limits),
             "returning": returning > 0.0,
             "covered": int(covered),
             "energy_Wh": energy_Wh,

@@ -11,6 +11,7 @@ from uas_coverage_env.env.memory import (
     ENERGY,
     EPISODE,
     FILTERED,
+    LIMITS,
     RETURNING,
     REWARD,
     STATUS,
@@ -53,6 +54,7 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         report[i, ENERGY] += event.energy_Wh
         report[i, CONTACT] = event.contact
         report[i, CONTACT_WITH] = event.contact_with
+        report[i, LIMITS] = event.limits_exceeded
         report[i, STATUS] = state.status[i]
         report[i, FILTERED] = event.filtered
         report[i, RETURNING] = event.returning

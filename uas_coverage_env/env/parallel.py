@@ -70,9 +70,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     Infos:
         `status` (flying, landed, lost); `contact` and `contact_with` (what it was lost to, else
-        None); `returning` (it flies home); `covered` (waypoints the swarm has covered so far);
-        `energy_Wh` (drawn by this UAS so far); `reward_terms`; `action_mask` with the waypoint
-        action; `filter` (changed, asked, applied) with the safety filter.
+        None); `limits_exceeded` (the vehicle's limits beyond which it is, as a mask: bit k for
+        `vehicle.LIMIT_NAMES[k]`); `returning` (it flies home); `covered`
+        (waypoints the swarm has covered so far); `energy_Wh` (drawn by this UAS so far);
+        `reward_terms`; `action_mask` with the waypoint action; `filter` (changed, asked, applied)
+        with the safety filter.
 
     Starting State:
         All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is

@@ -18,7 +18,7 @@ from uas_coverage_env.env.batch_kernel import (
     SWARM_FIRST_TERM,
     SWARM_REWARD,
 )
-from uas_coverage_env.env.memory import CONTACT, FILTERED, RETURNING, STATUS
+from uas_coverage_env.env.memory import CONTACT, FILTERED, LIMITS, RETURNING, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
@@ -64,7 +64,8 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         `reward_terms` (a dictionary of these), `covered` and `energy_Wh` of the swarm, `scenario`,
         `action_mask` with the waypoint action; and of all UAS (num_envs, U): `status` (index in
         `world.STATUS_NAMES`, -1 where a mission has no such UAS), `contact` (index in
-        `world.CONTACT_NAMES`), `returning`, and `filtered` with the safety filter.
+        `world.CONTACT_NAMES`), `limits_exceeded` (a mask, bit k for `vehicle.LIMIT_NAMES[k]`),
+        `returning`, and `filtered` with the safety filter.
 
     Args:
         num_envs: How many.
@@ -291,6 +292,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
             "scenario": self._batch.lanes.scenario * mask,
             "status": report[:, :, STATUS].astype(np.int64),
             "contact": report[:, :, CONTACT].astype(np.int64),
+            "limits_exceeded": report[:, :, LIMITS].astype(np.int64),
             "returning": report[:, :, RETURNING] > 0.0,
         }
         if self._batch.filters:

@@ -1,7 +1,7 @@
 """The log of a flight under way: samples and steps as they come, arrays in the end."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (
     COVERING,
     LANDED,
+    LIMIT,
     LOST,
     MODES,
     PLAN_DTYPE,
@@ -21,7 +22,15 @@ from uas_coverage_env.flight.record import (
     last_samples,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, N_INPUTS, U_TH, open_circuit_V
+from uas_coverage_env.vehicle import (
+    DOD,
+    LIMIT_NAMES,
+    N_INPUTS,
+    N_LIMITS,
+    U_TH,
+    open_circuit_V,
+    write_limited,
+)
 from uas_coverage_env.world import CONTACT_NAMES, FLYING, Command, World, command_mode
 from uas_coverage_env.world import LANDED as HAS_LANDED
 
@@ -129,14 +138,32 @@ class FlightLog:
             "moving_obstacle": [obstacle.name for obstacle in scenario.moving_obstacles],
             "uas": self._world.names,
         }
-        found = []
+        found: dict[tuple[int, str], Violation] = {}
         for k, step in enumerate(self._steps):
-            for name, entry in zip(self._world.names, step.outcome, strict=True):
+            time_s = (k + 1) * scenario.dt_s
+            for i, name in enumerate(self._world.names):
+                entry = step.outcome[i]
                 if entry["contact"]:
                     kind = CONTACT_NAMES[entry["contact"]]
                     partner = partners[kind][entry["contact_with"]] if kind in partners else None
-                    found.append(Violation((k + 1) * scenario.dt_s, name, kind, partner))
-        return found
+                    found[i, kind] = Violation(time_s, name, kind, partner)
+                for limit, value, bound in self._exceeded(step, i):
+                    now = Violation(time_s, name, LIMIT, limit, value, bound, 1)
+                    found[i, limit] = found[i, limit].worse(now) if (i, limit) in found else now
+        return list(found.values())
+
+    def _exceeded(self, step: _Step, i: int) -> Iterator[tuple[str, float, float]]:
+        """The limits that UAS i exceeds at the end of a step: name, value and bound."""
+        entry = step.outcome[i]
+        mask = int(entry["limits_exceeded"])
+        if not mask:
+            return
+        values, bounds = np.empty(N_LIMITS), self._world.arena.vehicles[i].bounds
+        nonlinear = self._world.dynamics == "nonlinear"
+        write_limited(step.sample.x[i], entry["voltage_V"], entry["current_A"], nonlinear, values)
+        for bit, limit in enumerate(LIMIT_NAMES):
+            if mask >> bit & 1:
+                yield limit, float(values[bit]), float(bounds[bit])
 
     def _smallest(self, field: str) -> float | None:
         """The smallest distance met in flight; None where there never was a partner (infinity)."""

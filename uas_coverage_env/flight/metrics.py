@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LANDED, LOST, Flight
+from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, Flight, Violation
 
 _J_PER_WH = 3600.0
 
@@ -84,15 +84,7 @@ def summary(flight: Flight) -> dict[str, Any]:
         "all_home": bool(home(flight).all()),
         "min_separation_m": flight.min_separation_m,
         "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
-        "violations": [
-            {
-                "t_s": violation.time_s,
-                "uas": violation.uas,
-                "kind": violation.kind,
-                "with": violation.partner,
-            }
-            for violation in flight.violations
-        ],
+        "violations": [_entry(violation) for violation in flight.violations],
         "breaches": flight.breaches,
         "wall_time_s": flight.wall_time_s,
         "decision_time_s": decision_time_s(flight),
@@ -102,3 +94,19 @@ def summary(flight: Flight) -> dict[str, Any]:
         "seed": flight.seed,
         "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
     }
+
+
+def _entry(violation: Violation) -> dict[str, Any]:
+    entry = {
+        "t_s": violation.time_s,
+        "uas": violation.uas,
+        "kind": violation.kind,
+        "with": violation.partner,
+    }
+    if violation.kind == LIMIT:
+        entry |= {
+            "value": violation.value,
+            "limit": violation.limit,
+            "samples": violation.samples,
+        }
+    return entry

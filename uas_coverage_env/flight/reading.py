@@ -6,11 +6,11 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from uas_coverage_env.flight.directory import (
     FLIGHT_COLUMNS,
@@ -19,7 +19,7 @@ from uas_coverage_env.flight.directory import (
     PLAN_COLUMNS,
     STATE_COLUMNS,
 )
-from uas_coverage_env.flight.record import MODES, PLAN_DTYPE, DecisionRecord, Violation
+from uas_coverage_env.flight.record import LIMIT, MODES, PLAN_DTYPE, DecisionRecord, Violation
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import InputError, StrictModel, parse
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES
@@ -35,11 +35,21 @@ _LONGEST_PLAN = 1_000_000
 _LONGEST_SHOWN = 40
 
 
-class _Contact(StrictModel):
-    t_s: Seconds
+class _Violation(StrictModel):
+    time_s: Annotated[float, Field(ge=0.0, alias="t_s")]
     uas: str
     kind: str
     partner: Annotated[str | None, Field(alias="with")]
+    value: float | None = None
+    limit: float | None = None
+    samples: Count | None = None
+
+    @model_validator(mode="after")
+    def _limit_is_whole(self) -> Self:
+        told = (self.partner, self.value, self.limit, self.samples)
+        if self.kind == LIMIT and None in told:
+            raise ValueError("of a limit it holds with, value, limit and samples")
+        return self
 
 
 class _Planner(StrictModel):
@@ -52,7 +62,7 @@ class _Summary(StrictModel):
 
     model_config = ConfigDict(extra="ignore")
 
-    violations: tuple[_Contact, ...]
+    violations: tuple[_Violation, ...]
     breaches: Count
     min_separation_m: float | None
     min_obstacle_clearance_m: float | None
@@ -184,18 +194,15 @@ def _run_fields(path: Path, steps: int) -> dict[str, Any]:
 def _summary_fields(path: Path, scenario: Scenario) -> dict[str, Any]:
     summary = _parsed(path, _Summary)
     names = {uas.name: i for i, uas in enumerate(scenario.uas)}
-    for number, contact in enumerate(summary.violations):
+    for number, violation in enumerate(summary.violations):
         try:
-            _chosen("uas", contact.uas, names)
-            _step(contact.t_s, scenario)
+            _chosen("uas", violation.uas, names)
+            _step(violation.time_s, scenario)
         except ValueError as error:
             raise InputError(f"{path}: was damaged: violations[{number}]: {error}") from error
     return {
         **dict(summary),
-        "violations": tuple(
-            Violation(contact.t_s, contact.uas, contact.kind, contact.partner)
-            for contact in summary.violations
-        ),
+        "violations": tuple(Violation(**dict(violation)) for violation in summary.violations),
         "planner": summary.planner.name,
         "planner_options": dict(summary.planner.options),
     }

@@ -10,10 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, LIMITS
 
 MODES = ("covering", "transit", "return", "landed", "lost")
 COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))
+
+LIMIT = "limit"
+"""The kind of a violation that is no contact."""
+
+_UNITS = {limit.name: limit.unit for limit in LIMITS}
 
 PLAN_DTYPE = np.dtype(
     [("step", np.int64), ("uas", np.int64), ("n", np.int64), ("position_m", np.float64, (3,))]
@@ -22,12 +27,45 @@ PLAN_DTYPE = np.dtype(
 
 @dataclass(frozen=True)
 class Violation:
-    """A contact that cost a UAS: when, which, of what kind, and with whom (None: nobody)."""
+    """What must not happen: a contact, which costs the UAS, or a limit of the vehicle exceeded.
+
+    A flight has one of kind `limit` for each UAS and limit, however long it was exceeded.
+
+    Attributes:
+        time_s: When; of a limit, the first time [s].
+        uas: Which UAS.
+        kind: A contact's name, or `limit`.
+        partner: With what or whom the contact was (None: nobody); the name of the limit.
+        value: Of a limit, the worst value, in the limit's unit; else None.
+        limit: Of a limit, its bound.
+        samples: Of a limit, at how many samples it was exceeded.
+    """
 
     time_s: float
     uas: str
     kind: str
     partner: str | None
+    value: float | None = None
+    limit: float | None = None
+    samples: int | None = None
+
+    def worse(self, now: Self) -> Self:
+        """The same limit exceeded at one more sample."""
+        values = [value for value in (self.value, now.value) if value is not None]
+        value = max(values, key=lambda one: abs(one - (self.limit or 0.0)))
+        return dataclasses.replace(self, value=value, samples=(self.samples or 0) + 1)
+
+    def __str__(self) -> str:
+        """As a line for people."""
+        if self.kind == LIMIT:
+            unit = _UNITS.get(str(self.partner), "")
+            return (
+                f"{self.uas}, beyond its limit of {self.partner} from {self.time_s:g} s on: "
+                f"{self.value:.4g} {unit} of {self.limit:g} {unit} at the worst, "
+                f"samples: {self.samples}"
+            )
+        partner = f" with {self.partner}" if self.partner else ""
+        return f"{self.uas}, {self.kind} contact{partner} at {self.time_s:g} s"
 
 
 @dataclass(frozen=True)
@@ -70,7 +108,7 @@ class Flight:
         moving_position_m: (T, M, 3) [m] centres of the moving obstacles.
         plan: PLAN_DTYPE rows of what the planner predicted; empty where it does not predict.
         decisions: One entry per step.
-        violations: The contacts, in order of time.
+        violations: Contacts and limits exceeded, in order of time.
         breaches: Count of samples closer than the safe distances.
         min_separation_m: Smallest distance between two flying UAS [m]; None: never two.
         min_obstacle_clearance_m: Smallest clearance from any obstacle [m]; None: no obstacle.

@@ -38,6 +38,14 @@ from uas_coverage_env.vehicle.layout import (
     Y,
     Z,
 )
+from uas_coverage_env.vehicle.limits import (
+    LIMIT_NAMES,
+    LIMITS,
+    N_LIMITS,
+    limit_names,
+    limits_exceeded,
+    write_limited,
+)
 from uas_coverage_env.vehicle.linear import LinearModel, linear_model
 from uas_coverage_env.vehicle.lpv import (
     clip_wrench,
@@ -60,7 +68,10 @@ __all__ = [
     "DELTA_THRUST",
     "DOD",
     "LIFT",
+    "LIMITS",
+    "LIMIT_NAMES",
     "N_INPUTS",
+    "N_LIMITS",
     "N_STATES",
     "PHI",
     "PSI",
@@ -95,6 +106,8 @@ __all__ = [
     "fit_thrust_correction",
     "flight_time_s",
     "fly_kinematics",
+    "limit_names",
+    "limits_exceeded",
     "linear_model",
     "load_vehicle",
     "lpv_step",
@@ -108,4 +121,5 @@ __all__ = [
     "vehicle_names",
     "velocity_climb_wrench",
     "velocity_wrench",
+    "write_limited",
 ]

@@ -7,6 +7,7 @@ from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import LIFT, VZ, Z
+from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
 
@@ -72,6 +73,8 @@ VEHICLE_DTYPE = np.dtype(
                 ("alpha_xy_max_radps2", _f8),
                 ("alpha_z_max_radps2", _f8),
                 ("yaw_rate_max_radps", _f8),
+                # what a sample must not exceed, see `limits`
+                ("bounds", _f8, (N_LIMITS,)),
                 # velocity loop
                 ("reference_max_mps", _f8),
                 ("gain", _f8, (3,)),
@@ -164,6 +167,7 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     record["alpha_xy_max_radps2"] = limits.angular_acceleration_xy_max_radps2
     record["alpha_z_max_radps2"] = limits.angular_acceleration_z_max_radps2
     record["yaw_rate_max_radps"] = limits.yaw_rate_max_radps
+    record["bounds"] = bounds_of(vehicle)
     gain, rows, record["reference_max_mps"] = design_velocity_loop(vehicle, float(dt_s))
     if len(rows) > MAX_GOVERNOR_ROWS:
         raise ValueError(f"dt_s is {dt_s}; too short for the limits of {vehicle.name!r}")

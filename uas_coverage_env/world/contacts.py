@@ -11,7 +11,7 @@ from uas_coverage_env.geometry import (
     signed_distance,
 )
 from uas_coverage_env.kernels import inlined_kernel, kernel, room
-from uas_coverage_env.vehicle import DOD, X, Y, Z
+from uas_coverage_env.vehicle import DOD, X, Y, Z, limits_exceeded
 from uas_coverage_env.world.boxes import (
     BLOCK,
     MEASURED,
@@ -221,7 +221,7 @@ def judge_separation(arena, state, outcome):
 
 
 @inlined_kernel
-def judge_limits(arena, state, outcome):
+def judge_fence_and_battery(arena, state, outcome):
     """Contacts with the geofence and the end of the battery.
 
     The fence is convex: a segment that starts inside leaves it only if its end lies outside.
@@ -303,3 +303,14 @@ def count_breaches(arena, state, outcome):
         if event.fence_clearance_m < rules.fence_margin_m:
             count += 1
         event.breaches = count
+
+
+@inlined_kernel
+def check_limits(arena, state, nonlinear, outcome):
+    """Note which of the vehicle's limits each UAS that flew exceeds; one that has landed rests."""
+    for i in range(state.status.shape[0]):
+        event = outcome[i]
+        if event.flew:
+            event.limits_exceeded = limits_exceeded(
+                arena.vehicles[i], state.x[i], event.voltage_V, event.current_A, nonlinear
+            )

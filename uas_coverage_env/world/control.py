@@ -54,4 +54,5 @@ def command_wrench(vehicle, x, reference, command, u):
         u[TAU_X] = values[1]
         u[TAU_Y] = values[2]
         u[TAU_Z] = values[3]
-        clip_wrench(vehicle, u)
+    # the set U holds for every input, whoever made it
+    clip_wrench(vehicle, u)

@@ -31,6 +31,8 @@ OUTCOME_DTYPE = np.dtype(
                 ("contact_with", "i8"),
                 # how many obstacles and UAS are too near at the new sample; the fence counts too
                 ("breaches", "i8"),
+                # the vehicle's limits exceeded at the new sample: bit k for `vehicle.LIMITS[k]`
+                ("limits_exceeded", "i8"),
                 # smallest over the segment flown; inf where there is nothing to be clear of, or
                 # nothing as near as `rules.measured_m`
                 ("obstacle_clearance_m", "f8"),

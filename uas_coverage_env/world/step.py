@@ -9,8 +9,9 @@ from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.assist import assist
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
+    check_limits,
     count_breaches,
-    judge_limits,
+    judge_fence_and_battery,
     judge_obstacles,
     judge_separation,
 )
@@ -61,6 +62,7 @@ def begin_step(state, commands, outcome):
         event.contact = NONE
         event.contact_with = -1
         event.breaches = 0
+        event.limits_exceeded = 0
         event.landed = False
         event.obstacle_clearance_m = math.inf
         event.separation_m = math.inf
@@ -115,10 +117,11 @@ def carry_out(arena, state, nonlinear, outcome):
     _fly(arena, state, nonlinear, outcome)
     judge_obstacles(arena, state, outcome)
     judge_separation(arena, state, outcome)
-    judge_limits(arena, state, outcome)
+    judge_fence_and_battery(arena, state, outcome)
     count_breaches(arena, state, outcome)
     cover(arena, state, outcome)
     land(arena, state, outcome)
+    check_limits(arena, state, nonlinear, outcome)
     _lose(state, outcome)
     state.step[0] += 1
 

@@ -1,0 +1,131 @@
+"""Which of a vehicle's limits a sample exceeds: the set X of Gasche et al., Sec. II.
+
+Inputs need no such question: they are kept within U where they act (`clip_wrench`). A state can
+leave X all the same, since torques within their limits add up to any rate, tilt and speed.
+
+The thrust correction is judged by the current that it draws. The bound of the heading is not a
+capability: it keeps the linearisation valid.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY, VZ, WX, WY, WZ
+from uas_coverage_env.vehicle.params import VehicleParams
+
+
+class Limit(NamedTuple):
+    """A quantity that a vehicle limits.
+
+    Attributes:
+        name: As in the record of a flight.
+        unit: Of its values.
+        meaning: What is measured.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+
+
+LIMITS = (
+    Limit("speed", "m/s", "norm of the horizontal velocity"),
+    Limit("climb", "m/s", "upward velocity"),
+    Limit("descent", "m/s", "downward velocity"),
+    Limit("tilt", "rad", "norm of roll and pitch"),
+    Limit("tilt_rate", "rad/s", "norm of the roll and the pitch rate of the body"),
+    Limit("yaw_rate", "rad/s", "size of the rate of the heading"),
+    Limit("current", "A", "battery current"),
+    Limit("voltage", "V", "battery voltage, which must not be less"),
+)
+"""The place of a limit is its bit in masks."""
+
+LIMIT_NAMES = tuple(limit.name for limit in LIMITS)
+"""Names of the limits, by their bit."""
+
+N_LIMITS = len(LIMITS)
+_VOLTAGE = LIMIT_NAMES.index("voltage")
+
+LPV_TOLERANCE = 0.01
+"""Share of a limit by which it may be exceeded in the LPV model. Plan and world are the same there,
+and the inner loop keeps every limit to the last digits."""
+
+NONLINEAR_TOLERANCE = 0.15
+"""The same in the nonlinear plant, where a step does not end where the linear model says: the inner
+loop overshoots the speed by up to 9 % at steps of 1 s and by up to 12 % at 2 s."""
+
+
+def bounds_of(vehicle: VehicleParams) -> NDArray[np.float64]:
+    """(N_LIMITS,) the bound of each limit, in its unit."""
+    limits, battery = vehicle.limits, vehicle.battery
+    return np.array(
+        [
+            limits.v_xy_max_mps,
+            limits.v_up_max_mps,
+            limits.v_down_max_mps,
+            limits.tilt_max_rad,
+            limits.rate_max_radps,
+            limits.yaw_rate_max_radps,
+            battery.current_max_A,
+            battery.voltage_min_V,
+        ]
+    )
+
+
+@inlined_kernel
+def write_limited(x, voltage_V, current_A, nonlinear, values):
+    """Write what is limited, in the order of LIMITS.
+
+    Args:
+        x: (14,) state.
+        voltage_V: Battery voltage over the step that led to it.
+        current_A: Battery current over that step.
+        nonlinear: The state is of the nonlinear plant, whose heading turns at another rate than
+            the body about its own axis.
+        values: (N_LIMITS,) written.
+    """
+    values[0] = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
+    values[1] = -x[VZ]
+    values[2] = x[VZ]
+    values[3] = math.sqrt(x[PHI] * x[PHI] + x[THETA] * x[THETA])
+    values[4] = math.sqrt(x[WX] * x[WX] + x[WY] * x[WY])
+    yaw_rate = x[WZ]
+    if nonlinear:
+        yaw_rate = math.sin(x[PHI]) * x[WY] + math.cos(x[PHI]) * x[WZ]
+        yaw_rate /= math.cos(x[THETA])
+    values[5] = abs(yaw_rate)
+    values[6] = current_A
+    values[7] = voltage_V
+
+
+@kernel
+def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear):
+    """The limits exceeded by more than the tolerance, as a mask: bit k for LIMITS[k].
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: See `write_limited`, also the next three.
+        voltage_V: [V].
+        current_A: [A].
+        nonlinear: Which tolerance holds.
+    """
+    values = room(N_LIMITS)
+    write_limited(x, voltage_V, current_A, nonlinear, values)
+    tolerance = NONLINEAR_TOLERANCE if nonlinear else LPV_TOLERANCE
+    more = 1.0 + tolerance
+    mask = 0
+    for k in range(_VOLTAGE):
+        if values[k] > more * vehicle.bounds[k]:
+            mask |= 1 << k
+    if values[_VOLTAGE] < (1.0 - tolerance) * vehicle.bounds[_VOLTAGE]:
+        mask |= 1 << _VOLTAGE
+    return mask
+
+
+def limit_names(mask: int) -> tuple[str, ...]:
+    """The names of the limits in a mask."""
+    return tuple(name for bit, name in enumerate(LIMIT_NAMES) if int(mask) >> bit & 1)
