@@ -1,7 +1,8 @@
 """A flight directory read for the independent check: plain arrays, nothing of the world's code.
 
 Only `scenario.json`, `flight.csv`, `moving_obstacles.csv`, `plan.csv` and `summary.json` are read,
-the files of the public contract, with the standard library and NumPy.
+the files of the public contract, with the standard library and NumPy; besides, the vehicles' files,
+in the directory or shipped, for their limits, and from `run.json` which dynamics were flown.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +20,12 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+_SHIPPED = Path(__file__).parents[1] / "uas_coverage_env" / "vehicle"
+
 FLYING_MODES = ("covering", "transit", "return")
 NUMBERS = (
     *("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "phi_rad", "theta_rad", "dod", "soc"),
+    *("wx_radps", "wy_radps", "wz_radps"),
     *("voltage_V", "current_A", "lift_N", "tau_x_Nm", "tau_y_Nm", "tau_z_Nm", "covered"),
 )
 
@@ -35,11 +40,13 @@ class Track:
 
     Attributes:
         entry: The UAS in `scenario.json`.
+        vehicle: Its vehicle's file.
         columns: Column name -> (n,) values, those of `NUMBERS`.
         modes: Mode of each row.
     """
 
     entry: dict[str, Any]
+    vehicle: dict[str, Any]
     columns: dict[str, FloatArray]
     modes: tuple[str, ...]
 
@@ -82,6 +89,7 @@ class FlightRecord:
         tracks: One per UAS, in the order of the scenario.
         moving_m: (T, M, 3) [m] centres of the moving obstacles at every sample.
         plan: (step, UAS) -> (n, 3) [m] positions predicted at that step.
+        dynamics: `lpv` or `nonlinear`.
     """
 
     scenario: dict[str, Any]
@@ -89,6 +97,7 @@ class FlightRecord:
     tracks: tuple[Track, ...]
     moving_m: FloatArray
     plan: dict[tuple[int, str], FloatArray]
+    dynamics: str
 
     @property
     def dt_s(self) -> float:
@@ -112,8 +121,16 @@ def read_record(directory: Path) -> FlightRecord:
         scenario = json.loads((directory / name).read_text(encoding="utf-8"))
         name = "summary.json"
         summary = json.loads((directory / name).read_text(encoding="utf-8"))
+        name = "run.json"
+        dynamics = json.loads((directory / name).read_text(encoding="utf-8"))["dynamics"]
+        vehicles = []
+        for uas in scenario["uas"]:
+            # shipped ones by their names, a user's own by the file beside the scenario
+            name = uas["vehicle"]
+            path = directory / name if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
+            vehicles.append(tomllib.loads(path.read_text(encoding="utf-8")))
         name = "flight.csv"
-        tracks = _tracks(_rows(directory / name), scenario)
+        tracks = _tracks(_rows(directory / name), scenario, vehicles)
         steps = max(track.steps for track in tracks)
         name = "moving_obstacles.csv"
         moving_m = _moving(_rows(directory / name), scenario, steps)
@@ -125,7 +142,7 @@ def read_record(directory: Path) -> FlightRecord:
         reason = " ".join(str(error).split())
         kind = type(error).__name__
         raise BadFlightError(f"{directory / name}: was damaged ({kind}: {reason})") from error
-    return FlightRecord(scenario, summary, tracks, moving_m, plan)
+    return FlightRecord(scenario, summary, tracks, moving_m, plan, dynamics)
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
@@ -148,14 +165,16 @@ def _step(row: dict[str, str], dt_s: float) -> int:
     return step
 
 
-def _tracks(rows: list[dict[str, str]], scenario: dict[str, Any]) -> tuple[Track, ...]:
+def _tracks(
+    rows: list[dict[str, str]], scenario: dict[str, Any], vehicles: list[dict[str, Any]]
+) -> tuple[Track, ...]:
     of_uas: dict[str, list[dict[str, str]]] = {uas["name"]: [] for uas in scenario["uas"]}
     for row in rows:
         if _step(row, scenario["dt_s"]) != len(of_uas[row["uas"]]):
             raise ValueError(f"{row['uas']} has no row, or two, before t_s = {row['t_s']}")
         of_uas[row["uas"]].append(row)
     tracks = []
-    for entry in scenario["uas"]:
+    for entry, vehicle in zip(scenario["uas"], vehicles, strict=True):
         mine = of_uas[entry["name"]]
         if not mine:
             raise ValueError(f"no row of {entry['name']}")
@@ -165,7 +184,7 @@ def _tracks(rows: list[dict[str, str]], scenario: dict[str, Any]) -> tuple[Track
             raise ValueError(f"{entry['name']} has rows after it has landed or is lost")
         if modes[-1] not in (*FLYING_MODES, "landed", "lost"):
             raise ValueError(f"{entry['name']} has the unknown mode {modes[-1]!r}")
-        tracks.append(Track(entry, columns, modes))
+        tracks.append(Track(entry, vehicle, columns, modes))
     return tuple(tracks)
 
 

@@ -4,8 +4,7 @@
 
 It shares no code with the world, the planners or the writer of the files: what is in the
 directory is judged anew from the scenario, with NumPy and SciPy alone, and compared with
-`summary.json`. See `docs/safety.md` for what is checked. Vehicle limits are not part of a flight
-directory and are not checked.
+`summary.json`. See `docs/safety.md` for what is checked.
 
 Exits 0 where nothing was touched and everything agrees, 1 otherwise, 2 where a directory is no
 flight.
@@ -30,6 +29,7 @@ from flight_distances import (
     relative_m,
     scheduled,
 )
+from flight_limits import inputs_beyond, limits_exceeded
 from flight_record import BadFlightError, FlightRecord, Track, read_record
 from numpy.typing import NDArray
 from scipy.spatial import QhullError
@@ -54,6 +54,7 @@ class Report:
         energy_Wh: Sum of voltage times current times dt.
         all_home: Whether everybody has landed.
         contacts: (time [s], UAS, kind, with whom), straight from sample to sample.
+        limits: (first time [s], UAS, `limit`, which) of the vehicle's limits exceeded.
         breaches: Samples closer than the safe distances.
         straight_room_m: Kind -> smallest distance left before a contact, straight segments.
         curved_room_m: The same on the cubic curve through positions and velocities.
@@ -65,6 +66,7 @@ class Report:
     energy_Wh: float = 0.0  # noqa: N815
     all_home: bool = False
     contacts: list[tuple[float, str, str, str | None]] = field(default_factory=list)
+    limits: list[tuple[float, str, str, str]] = field(default_factory=list)
     breaches: int = 0
     straight_room_m: dict[str, float] = field(default_factory=dict)
     curved_room_m: dict[str, float] = field(default_factory=dict)
@@ -86,6 +88,7 @@ def check(directory: Path, plan_tolerance_m: float = PLAN_TOLERANCE_M) -> Report
         report = Report(steps=record.steps)
         report.all_home = all(track.end == "landed" for track in record.tracks)
         _judge_distances(record, report)
+        report.limits = sorted(limits_exceeded(record))
         _judge_coverage(record, report)
         _judge_tracks(record, report)
         _judge_plan(record, report, plan_tolerance_m)
@@ -220,6 +223,9 @@ def _oddities(track: Track, record: FlightRecord) -> Iterator[str]:
         yield "does not begin with its charge"
     if np.abs(column["soc"] + column["dod"] - 1.0).max() > _SAME:
         yield "has a charge and a depth of discharge that do not add up"
+    beyond = inputs_beyond(track)
+    if beyond is not None:
+        yield beyond
     off = _motion_gap_m(track, record.dt_s, scenario["landing_speed_mps"])
     if len(off) and off.max() > 0.0:
         step = int(off.argmax())
@@ -290,18 +296,22 @@ def _compare(summary: dict[str, Any], report: Report) -> None:
         if mine != summary[key]:
             report.problems.append(f"{key} is {mine}, the summary says {summary[key]}")
     theirs = [(v["t_s"], v["uas"], v["kind"], v["with"]) for v in summary["violations"]]
-    if sorted(map(repr, theirs)) != sorted(map(repr, report.contacts)):
-        report.problems.append(f"violations are {report.contacts}, the summary says {theirs}")
+    mine = [*report.contacts, *report.limits]
+    if sorted(map(repr, theirs)) != sorted(map(repr, mine)):
+        report.problems.append(f"violations are {mine}, the summary says {theirs}")
     for time_s, uas, kind, partner in report.contacts:
         with_whom = f" with {partner}" if partner else ""
         report.problems.append(f"{uas}: {kind} contact{with_whom} at {time_s:g} s")
+    for time_s, uas, _, name in report.limits:
+        report.problems.append(f"{uas}: beyond its limit of {name} from {time_s:g} s on")
 
 
 def _text(directory: Path, report: Report) -> str:
     lines = [
         f"{directory}: covered {report.coverage:.1%} in {report.steps} steps, "
         f"{report.energy_Wh:.3f} Wh, {'all' if report.all_home else 'not all'} home, "
-        f"{len(report.contacts)} contacts, {report.breaches} breaches"
+        f"{len(report.contacts)} contacts, {len(report.limits)} limits exceeded, "
+        f"{report.breaches} breaches"
     ]
     for kind, straight in report.straight_room_m.items():
         curved = report.curved_room_m[kind]

@@ -10,8 +10,9 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.memory import REWARD
+from uas_coverage_env.env.memory import LIMITS, REWARD
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.vehicle import limit_names
 
 N_LANES, N_STEPS = 2, 25
 
@@ -51,7 +52,18 @@ def compare():
         "refused": missions.missions.refused.tolist(),
         "changed": changed,
         "acted": int(missions.missions.acted.sum()),
+        "limits_exceeded": limits_exceeded(),
     }
+
+
+def limits_exceeded():
+    """Names of the limits that the largest pitch torque exceeds, step by step."""
+    missions = CudaMissions(1, practice_ground(n_uas=1, size_m=2000.0), action="wrench")
+    found = []
+    for _ in range(3):
+        missions.step(np.array([[[0.0, 0.0, 1.0, 0.0]]]))
+        found.append(limit_names(int(missions.missions.learners.report[0, 0, LIMITS])))
+    return found
 
 
 if __name__ == "__main__":

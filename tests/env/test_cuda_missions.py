@@ -20,3 +20,4 @@ def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes():
     assert result["refused"] == [True, False]
     assert result["changed"] == [False, True]
     assert result["acted"] > 20
+    assert result["limits_exceeded"] == [[], ["tilt", "tilt_rate"], ["speed", "tilt", "tilt_rate"]]

@@ -70,6 +70,7 @@ class Expected:
     covered: list[int] = field(default_factory=list)
     contacts: set[str] = field(default_factory=set)
     breaches: int = 0
+    limits: set[str] = field(default_factory=set)
     obstacle_clearance_m: float = math.inf
     separation_m: float = math.inf
 
@@ -117,7 +118,24 @@ def expected_step(scenario, state, wrenches, returning):
         ):
             results[i].status = LANDED
             results[i].x[3:12] = 0.0
+        results[i].limits = limits_exceeded(scenario.vehicles[i], results[i])
     return results, uncovered, departed
+
+
+def limits_exceeded(vehicle, result):
+    """The limits of the paper's X that a sample exceeds by more than 1 %."""
+    limits, battery, x = vehicle.limits, vehicle.battery, result.x
+    used = {
+        "speed": math.hypot(x[3], x[4]) / limits.v_xy_max_mps,
+        "climb": -x[5] / limits.v_up_max_mps,
+        "descent": x[5] / limits.v_down_max_mps,
+        "tilt": math.hypot(x[6], x[7]) / limits.tilt_max_rad,
+        "tilt_rate": math.hypot(x[9], x[10]) / limits.rate_max_radps,
+        "yaw_rate": abs(x[11]) / limits.yaw_rate_max_radps,
+        "current": result.current_A / battery.current_max_A,
+        "voltage": 2.0 - result.voltage_V / battery.voltage_min_V,
+    }
+    return {name for name, share in used.items() if share > 1.01}
 
 
 def _fly(vehicle, dt_s, wrench, result):
