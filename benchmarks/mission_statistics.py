@@ -29,8 +29,8 @@ class Row:
         energy_Wh: Energy of the swarm.
         coverage: Fraction of the waypoints.
         all_home: Whether everybody has landed.
-        violations: Contacts that the world counted.
-        problems: What the independent check found: contacts, and where it disagrees.
+        violations: Contacts and limits exceeded that the world counted.
+        problems: What the independent check found: violations, and where it disagrees.
         breaches: Samples closer than the safe distances, the larger of both counts.
         decision_s: (3,) p50, p95 and p99 of the decision time [s].
         fallbacks: Decisions flown on a fallback.

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from uas_coverage_env.flight import Decision, Flight, rollout, summary
 from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import Velocity
+from uas_coverage_env.world import Velocity, Wrench
 
 FILES = {
     "scenario.json",
@@ -115,6 +115,17 @@ def test_a_lost_uas_has_its_last_row_where_it_is_lost(yard, tmp_path):
         "kind": "geofence",
         "with": None,
     }
+
+
+def test_a_limit_exceeded_is_in_the_summary_and_is_read_back(yard, tmp_path):
+    planner = _Predicting()
+    planner.act = lambda swarm: dict.fromkeys(swarm.active, Wrench(0.0, 0.0, -0.00825, 0.0))
+    flight = rollout(yard, planner, max_steps=3)
+    folder = flight.save(tmp_path / "tilted")
+    tilt = json.loads((folder / "summary.json").read_text())["violations"][0]
+    assert list(tilt) == ["t_s", "uas", "kind", "with", "value", "limit", "samples"]
+    assert (tilt["kind"], tilt["with"], tilt["limit"]) == ("limit", "tilt", 0.4363)
+    assert Flight.load(folder) == flight
 
 
 def test_the_summary_follows_from_the_rows(saved, yard):
@@ -292,6 +303,12 @@ def test_a_wrong_value_is_named_with_its_line(yard, tmp_path, name, column, valu
             ("violations",),
             [{"t_s": 1e300, "uas": "left", "kind": "geofence", "with": None}],
             "violations[0]: 1e+300 s is not within the",
+        ),
+        (
+            "summary.json",
+            ("violations",),
+            [{"t_s": 1.0, "uas": "left", "kind": "limit", "with": "tilt", "limit": 0.4}],
+            "violations[0]: of a limit it holds with, value, limit and samples",
         ),
         ("run.json", ("dynamics",), "magic", "dynamics: should be 'lpv' or 'nonlinear'"),
         ("run.json", ("ended",), "well", "ended: should be 'complete'"),

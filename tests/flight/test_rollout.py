@@ -17,7 +17,8 @@ from uas_coverage_env.flight import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import InputError, parse
-from uas_coverage_env.world import GoTo, Velocity, World
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.world import GoTo, Velocity, World, Wrench
 
 
 class Still:
@@ -119,6 +120,22 @@ def test_a_contact_is_a_violation_with_time_kind_and_partner(yard):
     assert MODES[flight.mode[k, i]] == "lost"
     assert flight.ended == "complete"
     assert not accomplished(flight)
+
+
+def test_a_limit_exceeded_is_one_violation_with_its_first_time_and_worst_value(yard):
+    torque = load_vehicle("s500_v2").torque_max_Nm[1]
+    flight = rollout(yard, commanding(Wrench(0.0, 0.0, -torque, 0.0)), max_steps=3)
+    assert not accomplished(flight)
+    mine = {one.partner: one for one in flight.violations if one.uas == "left"}
+    assert {one.kind for one in flight.violations} == {"limit"}
+    assert set(mine) == {"tilt", "tilt_rate", "speed"}
+    tilt = mine["tilt"]
+    assert (tilt.time_s, tilt.samples, tilt.limit) == (2.0, 2, 0.4363)
+    assert tilt.value == pytest.approx(np.abs(flight.x[:, 0, 7]).max())
+    assert str(tilt) == (
+        "left, beyond its limit of tilt from 2 s on: 2.25 rad of 0.4363 rad at the worst, "
+        "samples: 2"
+    )
 
 
 def test_what_the_safety_filter_replaced_is_kept_step_by_step(yard):

@@ -44,7 +44,8 @@ def test_dynamics(request):
             """
             Vehicle physical constraints, eq. (OCP_3): x(n) in X for n = 1..N, u(n) in U.
             Norms of horizontal velocity, tilt and tilt rate by eq. (const_Vec_ub) with H_P = 4
-            and c_in = 1; the rest are intervals. Voltage and current are outputs C x + D u + F.
+            and c_in = cos(pi/4); the rest are intervals. Voltage and current are outputs
+            C x + D u + F.
             """,
         ),
         (
@@ -59,7 +60,7 @@ def test_dynamics(request):
     ],
 )
 def test_capabilities(request, name, families, heading):
-    milp, _ = written(toy(NORTHBOUND, horizon=1, physical_sides=4), Capabilities())
+    milp, _ = written(toy(NORTHBOUND, horizon=1, physical_sides=4, limit_sides=4), Capabilities())
     compare(request, name, readable(milp, heading, families))
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Wrench
 
 
 def flown(directory, scenario, planner, **keywords):
@@ -124,6 +125,41 @@ def test_it_sees_a_summary_that_was_tampered_with(copied, key, value):
     path = copied / "summary.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
     assert key in problems(copied)
+
+
+class _Somersault:
+    """The largest torque about pitch, which leads beyond tilt, rate and speed."""
+
+    def reset(self, brief, seed):
+        self.torque_Nm = 0.0165 * 0.5
+
+    def act(self, swarm):
+        return dict.fromkeys(swarm.active, Wrench(0.0, 0.0, -self.torque_Nm, 0.0))
+
+
+@pytest.fixture(scope="module")
+def somersault(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("flights") / "somersault"
+    return flown(directory, "open_field", _Somersault(), max_steps=4)
+
+
+def test_it_agrees_which_limits_were_exceeded_and_from_when_on(somersault):
+    report = independent_check.check(somersault)
+    assert {(time_s, name) for time_s, _, _, name in report.limits} == {
+        (2.0, "tilt"), (2.0, "tilt_rate"), (3.0, "speed"),
+    }  # fmt: skip
+    assert "violations are" not in "; ".join(report.problems)
+
+
+def test_it_sees_a_limit_that_the_summary_hides_and_an_input_beyond_its_own(somersault, tmp_path):
+    for path in somersault.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    hidden = [one for one in summary["violations"] if one["with"] != "speed"]
+    (tmp_path / "summary.json").write_text(json.dumps(summary | {"violations": hidden}))
+    rewrite(tmp_path / "flight.csv", lambda rows: rows[2].update(tau_x_Nm=0.0083))
+    assert "violations are" in problems(tmp_path)
+    assert "tau_x_Nm = 0.0083, beyond its limits -0.00825 to 0.00825" in problems(tmp_path)
 
 
 def test_it_sees_that_a_uas_was_taken_home_by_hand(copied):

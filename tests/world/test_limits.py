@@ -1,10 +1,13 @@
 """The paper's X and U: inputs are saturated, states beyond a limit are noted."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from small_worlds import meadow
 
-from uas_coverage_env.vehicle import LIMIT_NAMES, limit_names, load_vehicle
+from uas_coverage_env.vehicle import LIMIT_NAMES, LIMITS, limit_names, load_vehicle
+from uas_coverage_env.vehicle.limits import LPV_TOLERANCE, NONLINEAR_TOLERANCE
 from uas_coverage_env.world import FLYING, Acceleration, Velocity, World, Wrench
 
 S500 = load_vehicle("s500_v2")
@@ -125,3 +128,11 @@ def test_who_has_landed_rests_and_exceeds_nothing():
         outcome = world.step({"uas_1": Wrench(0.0, 0.0, 0.0, 0.0, mode=mode)})
         assert outcome["landed"][0] == (mode == "return")
         assert exceeded(outcome) == (set() if mode == "return" else {"yaw_rate"})
+
+
+def test_the_limits_are_told_in_the_documentation_as_they_are():
+    text = Path(__file__).parents[2].joinpath("docs", "environment.md").read_text(encoding="utf-8")
+    for bit, limit in enumerate(LIMITS):
+        assert f"| {bit} | `{limit.name}` | {limit.unit} | {limit.meaning} |" in text
+    assert f"tolerance is {LPV_TOLERANCE:.0%} of the limit" in text.replace(" %", "%")
+    assert f'With `dynamics="nonlinear"` it is {NONLINEAR_TOLERANCE:.0%}' in text.replace(" %", "%")

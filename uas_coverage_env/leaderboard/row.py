@@ -33,10 +33,10 @@ class Row:
         safety_filter: Whether the filter was on for everybody.
         status: `flown`, or `failed` where there is no flight.
         reason: Why it failed.
-        accomplished: Everything covered, everybody home, nothing touched.
+        accomplished: Everything covered, everybody home, nothing touched, no limit exceeded.
         coverage: Fraction of the waypoints; 0 where the flight failed.
         all_home: Whether everybody has landed.
-        violations: Contacts.
+        violations: Contacts, and limits exceeded by UAS.
         breaches: Samples closer than the safe distances.
         steps: Steps until the last UAS was home, lost, or the flight ended.
         energy_Wh: Energy of the swarm.
@@ -163,7 +163,7 @@ class Row:
 
     @property
     def ranked(self) -> bool:
-        """Whether its energy counts: it was flown, and nothing was touched."""
+        """Whether its energy counts: it was flown, and nothing was violated."""
         return self.status == FLOWN and not self.violations
 
 

@@ -33,7 +33,7 @@ class Scores:
         accomplished: Flights in which everything was covered, everybody home, nothing touched.
         all_home: Flights after which everybody was home.
         violating: Flights with a violation.
-        violations: Contacts in all flights.
+        violations: Contacts and limits exceeded, in all flights.
         breaches: Samples closer than the safe distances, in all flights.
         fallbacks: Decisions flown on a fallback, in all flights.
         filtered_percent: Mean over flights of the share of commands that the filter replaced.

@@ -36,6 +36,8 @@ export interface Violation {
   uas: string;
   kind: string;
   with: string | null;
+  value?: number;
+  limit?: number;
 }
 
 export interface FlightData {

@@ -124,20 +124,24 @@ function title(flight: Flight): string {
 
 function outcome(flight: Flight): string {
   const { summary, covered, violations } = flight.data;
-  const contacts = violations.length;
+  const count = violations.length;
   const { seed, dynamics } = flight.data;
   return [
     `${covered.at(-1)} of ${flight.scene.waypoints.length} waypoints`,
     `${summary.steps} steps`,
     summary.all_home ? "all home" : "not all home",
     `${summary.energy_Wh.toFixed(2)} Wh`,
-    contacts === 0 ? "no violation" : `${contacts} violation${contacts === 1 ? "" : "s"}`,
+    count === 0 ? "no violation" : `${count} violation${count === 1 ? "" : "s"}`,
     `${summary.breaches || "no"} breach${summary.breaches === 1 ? "" : "es"}`,
     `seed ${seed}, ${dynamics}`,
   ].join(" · ");
 }
 
-function words({ t_s, uas, kind, with: partner }: Violation): string {
+function words({ t_s, uas, kind, with: partner, value, limit }: Violation): string {
+  if (kind === "limit") {
+    const numbers = `${value?.toPrecision(3)} of ${limit?.toPrecision(3)}`;
+    return `${t_s} s: ${uas} beyond its limit of ${partner?.replaceAll("_", " ")}, ${numbers}`;
+  }
   const what = kind.replaceAll("_", " ");
   return `${t_s} s: ${uas}, ${what} contact${partner ? ` with ${partner}` : ""}`;
 }

@@ -37,6 +37,13 @@ class MovingHorizonOptions(PlannerOptions):
         default=False,
         description="limit work by nodes, not by the clock: the same seed flies the same",
     )
+    limit_sides: int = Field(
+        default=16,
+        ge=4,
+        le=64,
+        multiple_of=4,
+        description="H_P of the polygons inside the limits of speed, tilt and tilt rate",
+    )
     obstacle_sides: int = Field(default=8, ge=4, le=32, multiple_of=2, description="H_O")
     waypoint_sides: int = Field(default=4, ge=4, le=16, multiple_of=4, description="H_WP")
     margin_m: float = Field(

@@ -168,6 +168,7 @@ class ProblemBuilder:
             targets=(None,) * len(names),
             dt_s=self.dt_s,
             weights=weights,
+            limit_sides=options.limit_sides,
             obstacle_sides=options.obstacle_sides,
             waypoint_sides=options.waypoint_sides,
         )

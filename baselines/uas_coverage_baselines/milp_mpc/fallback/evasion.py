@@ -16,14 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
+from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.vehicle import (
-    compile_vehicle,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
-)
+from uas_coverage_env.vehicle import compile_vehicle
 
 FloatArray = NDArray[np.float64]
 _PUSHES_S = (2.0, 5.0, 10.0)  # how long a direction is held
@@ -77,7 +72,7 @@ def _flights(
     pushes = [int(np.ceil(push_s / dt_s)) for push_s in _PUSHES_S]
     ways = [(0.0, 0.0, 0.0, 0)]
     ways += [(*a, d, push) for a, d, push in product(level, down, pushes) if (*a, d) != (0, 0, 0)]
-    flown = [_pushed(record, problem.x0[uas], *way, steps) for way in ways]
+    flown = [pushed(record, problem.x0[uas], *way, steps) for way in ways]
     return np.array([x for x, _ in flown]), np.array([u for _, u in flown])
 
 
@@ -108,20 +103,3 @@ def _dense(path: FloatArray) -> FloatArray:
 
 def _squared(short_m: FloatArray) -> FloatArray:
     return (np.maximum(short_m, 0.0) ** 2).sum(axis=1)
-
-
-@allocating_kernel
-def _pushed(vehicle, start, north_mps, east_mps, down_mps, push, steps):
-    """States (steps+1, 14) and inputs (steps, 5): a velocity for some steps, then braking."""
-    states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
-    x, reference = start.copy(), np.empty(2)
-    reseed_reference(x, reference)
-    states[0] = x
-    for step in range(steps):
-        go = 1.0 if step < push else 0.0
-        velocity_climb_wrench(
-            vehicle, x, reference, go * north_mps, go * east_mps, go * down_mps, inputs[step]
-        )
-        lpv_step(vehicle, x, inputs[step], x)
-        states[step + 1] = x
-    return states, inputs

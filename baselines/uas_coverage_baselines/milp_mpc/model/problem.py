@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.milp import Columns
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import NormBounds, norm_bounds
 from uas_coverage_baselines.milp_mpc.model.reachability import Reach
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.vehicle import LinearModel, VehicleParams
@@ -155,7 +156,8 @@ class PlanningProblem:
             where no UAS has one.
         dt_s: sampling time.
         weights: see `Weights`.
-        physical_sides: H_P, a multiple of 4.
+        physical_sides: H_P of what is no limit, a multiple of 4.
+        limit_sides: H_P of the limits of speed, tilt and tilt rate, a multiple of 4.
         obstacle_sides: H_O.
         waypoint_sides: H_WP.
         prune: whether reachable sets drop what cannot matter; False keeps every row and column,
@@ -186,14 +188,17 @@ class PlanningProblem:
     dt_s: float = 1.0
     weights: Weights = field(default_factory=Weights)
     physical_sides: int = 8
+    limit_sides: int = 16
     obstacle_sides: int = 8
     waypoint_sides: int = 4
     prune: bool = True
 
     def __post_init__(self) -> None:
         # tilt and the way it moves a UAS are turned by a quarter against each other
-        if self.physical_sides < 4 or self.physical_sides % 4:
-            raise ValueError(f"physical_sides = {self.physical_sides}: give a multiple of 4")
+        for name in ("physical_sides", "limit_sides"):
+            sides = getattr(self, name)
+            if sides < 4 or sides % 4:
+                raise ValueError(f"{name} = {sides}: give a multiple of 4")
 
     @property
     def n_uas(self) -> int:
@@ -222,6 +227,15 @@ class PlanningProblem:
             *(self.x0, self.vehicles, self.models, self.horizon, self.fence),
             prune=self.prune,
             sides=self.physical_sides,
+            beyond=np.array([bounds.beyond for bounds in self.norm_bounds]),
+        )
+
+    @cached_property
+    def norm_bounds(self) -> tuple[NormBounds, ...]:
+        """(U) the bounds of speed, tilt and tilt rate."""
+        return tuple(
+            norm_bounds(vehicle, x, self.horizon, self.dt_s, self.limit_sides)
+            for vehicle, x in zip(self.vehicles, self.x0, strict=True)
         )
 
     @cached_property

@@ -37,7 +37,7 @@ _ARRAYS = (
 )
 _NUMBERS = ("horizon", "dt_s", "fence_margin_m", "n_scenario_waypoints")
 _OF_A_TOUR = ("aims_m", "radius_m", "onward_s")
-_SIDES = ("physical_sides", "obstacle_sides", "waypoint_sides")
+_SIDES = ("physical_sides", "limit_sides", "obstacle_sides", "waypoint_sides")
 
 
 def write_problems(
@@ -128,7 +128,8 @@ def _problem(
     vehicles = tuple(known[name] for name in row["vehicles"])
     fields: dict[str, Any] = {name: np.array(row[name], float) for name in _ARRAYS}
     fields["waypoints_m"] = fields["waypoints_m"].reshape(-1, 3)
-    fields |= {name: row[name] for name in (*_NUMBERS, *_SIDES)}
+    # files from before the limits had sides of their own do not say how many
+    fields |= {name: row[name] for name in (*_NUMBERS, *_SIDES) if name in row}
     return PlanningProblem(
         names=tuple(row["names"]),
         vehicles=vehicles,

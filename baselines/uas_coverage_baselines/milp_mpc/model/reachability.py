@@ -63,10 +63,17 @@ class Reach:
         fence: ConvexPolytope,
         prune: bool = True,
         sides: int = 8,
+        beyond: FloatArray | None = None,
     ) -> Reach:
-        """Reachable sets from the states `x0` (U, 14), norms being limited by `sides` faces."""
+        """Reachable sets from the states `x0` (U, 14).
+
+        Norms are limited by `sides` faces at the limits times `beyond` (U, 3), for speed, tilt
+        and rate; at the limits where None.
+        """
+        beyond = np.ones((len(x0), 3)) if beyond is None else beyond
         chains = tuple(
-            _Chain.of(v, m, horizon, sides) for v, m in zip(vehicles, models, strict=True)
+            _Chain.of(v, m, horizon, sides, grown)
+            for v, m, grown in zip(vehicles, models, beyond, strict=True)
         )
         vertical = np.array(
             [_vertical(x, v, m, horizon) for x, v, m in zip(x0, vehicles, models, strict=True)]
@@ -155,7 +162,14 @@ class _Chain:
     climb_limits_mps: tuple[float, float]  # down, up
 
     @classmethod
-    def of(cls, vehicle: VehicleParams, model: LinearModel, horizon: int, sides: int) -> _Chain:
+    def of(
+        cls,
+        vehicle: VehicleParams,
+        model: LinearModel,
+        horizon: int,
+        sides: int,
+        beyond: FloatArray,
+    ) -> _Chain:
         index = [X, VX, THETA, WY]
         sign = np.array([1.0, 1.0, -1.0, -1.0])  # tilt forward is negative pitch
         a = model.A[np.ix_(index, index)] * np.outer(sign, sign)
@@ -168,9 +182,9 @@ class _Chain:
             a,
             b,
             horizon,
-            limits.v_xy_max_mps * polygon,
-            limits.tilt_max_rad * polygon,
-            limits.rate_max_radps * polygon,
+            beyond[0] * limits.v_xy_max_mps * polygon,
+            beyond[1] * limits.tilt_max_rad * polygon,
+            beyond[2] * limits.rate_max_radps * polygon,
             alpha,
             float(model.A[Z, VZ]),
             (limits.v_down_max_mps, limits.v_up_max_mps),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle import (
@@ -21,8 +22,6 @@ from uas_coverage_env.vehicle import (
     VX,
     VY,
     VZ,
-    WX,
-    WY,
     WZ,
 )
 
@@ -30,8 +29,9 @@ from uas_coverage_env.vehicle import (
 class Capabilities:
     """x(n) in X, u(n) in U: what airframe, power train and battery can do (Sec. III-C.1, OCP_3).
 
-    Euclidean norms of horizontal velocity, tilt and tilt rate are bounded by H_P-sided polygons
-    (eq. (const_Vec_ub), outer approximation, c_in = 1); everything else by intervals. The thrust
+    Euclidean norms of horizontal velocity, tilt and tilt rate are bounded by polygons inside the
+    limits (eq. (const_Vec_ub), c_in = cos(pi / H), see `norm_bounds`), so that no plan exceeds
+    what the world allows; everything else by intervals. The thrust
     correction Delta T is bounded below by the same piecewise-linear form the world computes it
     with, and is driven onto that bound by its cost through the depth of discharge.
     """
@@ -44,14 +44,10 @@ class Capabilities:
         self._battery(milp, v, problem)
 
     def _norms(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
-        faces = cylinder_faces(problem.physical_sides)[:, :2]
-        for name, first, second, limit in (
-            ("speed", VX, VY, "v_xy_max_mps"),
-            ("tilt", PHI, THETA, "tilt_max_rad"),
-            ("rate", WX, WY, "rate_max_radps"),
-        ):
+        faces = cylinder_faces(problem.limit_sides)[:, :2]
+        for row, (name, first, second, _) in enumerate(NORMS):
             pair = v.x[:, 1:, None, [first, second]]
-            bound = problem.limit(limit)[:, None, None]
+            bound = np.array([bounds.upper[row] for bounds in problem.norm_bounds])
             milp.subject_to(f"capabilities.{name}", (faces, pair), upper=bound)
 
     def _intervals(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

@@ -1,0 +1,25 @@
+"""Flights of the vehicle's own inner loop in the LPV model, which need no solver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.vehicle import lpv_step, reseed_reference, velocity_climb_wrench
+
+
+@allocating_kernel
+def pushed(vehicle, start, north_mps, east_mps, down_mps, push, steps):
+    """States (steps+1, 14) and inputs (steps, 5): a velocity for some steps, then braking."""
+    states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
+    x, reference = start.copy(), np.empty(2)
+    reseed_reference(x, reference)
+    states[0] = x
+    for step in range(steps):
+        go = 1.0 if step < push else 0.0
+        velocity_climb_wrench(
+            vehicle, x, reference, go * north_mps, go * east_mps, go * down_mps, inputs[step]
+        )
+        lpv_step(vehicle, x, inputs[step], x)
+        states[step + 1] = x
+    return states, inputs

@@ -1,0 +1,76 @@
+"""Bounds of the norms in the OCP: speed, tilt and tilt rate, by polygons (eq. (const_Vec_ub)).
+
+The polygons lie inside the vehicle's limits, c_in = cos(pi / H), so that no plan exceeds them.
+
+A UAS may begin outside of its polygons: what the inner loop flies (each fallback does) keeps the
+norms themselves, and the nonlinear plant does not end a step where the plan does. Then no plan
+could satisfy the rows at once. As far as two flights of the inner loop are outside, too, one that
+brakes and one that goes on with the velocity there is, the bounds give way; these flights, so
+something at least, satisfy them, and they lead back inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.milp_mpc.model.flown import pushed
+from uas_coverage_env.geometry import cylinder_faces, inner_factor
+from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, WX, WY, VehicleParams, compile_vehicle
+
+FloatArray = NDArray[np.float64]
+
+NORMS = (
+    ("speed", VX, VY, "v_xy_max_mps"),
+    ("tilt", PHI, THETA, "tilt_max_rad"),
+    ("rate", WX, WY, "rate_max_radps"),
+)
+"""Name, two states, and the limit of their norm."""
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class NormBounds:
+    """The bounds of one UAS.
+
+    Attributes:
+        upper: (3, N, H) of face h of each norm's polygon at n = 1..N, in the order of NORMS.
+        beyond: (3,) by what factor the polygons of faces at the limits have to grow to hold
+            everything that satisfies the bounds; 1 where nothing gives way.
+    """
+
+    upper: FloatArray
+    beyond: FloatArray
+
+
+def norm_bounds(
+    vehicle: VehicleParams, x0: FloatArray, horizon: int, dt_s: float, sides: int
+) -> NormBounds:
+    """The bounds over a horizon from a state.
+
+    Args:
+        vehicle: parameters.
+        x0: (14,) state.
+        horizon: N.
+        dt_s: sampling time.
+        sides: H, a multiple of 4.
+    """
+    faces, inner = cylinder_faces(sides)[:, :2], inner_factor(sides, 2)
+    limits = np.array([getattr(vehicle.limits, name) for *_, name in NORMS])
+    pairs = [[first, second] for _, first, second, _ in NORMS]
+    upper = np.broadcast_to(inner * limits[:, None, None], (len(NORMS), horizon, sides))
+    if (faces @ x0[pairs].T <= inner * limits * (1.0 + _ROUNDING)).all():
+        return NormBounds(upper, np.ones(len(NORMS)))
+    record = compile_vehicle(vehicle, dt_s)[()]
+    speed_mps = max(float(np.hypot(x0[VX], x0[VY])), 1e-9)
+    share = min(1.0, inner * limits[0] / speed_mps)
+    for north, east, down in ((0.0, 0.0, 0.0), (share * x0[VX], share * x0[VY], x0[VZ])):
+        states = pushed(record, x0, north, east, down, horizon, horizon)[0][1:]
+        reached = np.array([states[:, pair] @ faces.T for pair in pairs])
+        # free of rounding, so that the flight itself satisfies them
+        upper = np.maximum(upper, reached * (1.0 + _ROUNDING))
+    grown = upper.max(axis=(1, 2)) / limits / inner
+    return NormBounds(upper, np.maximum(grown, 1.0))
