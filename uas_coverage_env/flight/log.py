@@ -21,6 +21,7 @@ from uas_coverage_env.flight.record import (
     Violation,
     last_samples,
 )
+from uas_coverage_env.kernels import interpreted
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import (
     DOD,
@@ -160,7 +161,9 @@ class FlightLog:
             return
         values, bounds = np.empty(N_LIMITS), self._world.arena.vehicles[i].bounds
         nonlinear = self._world.dynamics == "nonlinear"
-        write_limited(step.sample.x[i], entry["voltage_V"], entry["current_A"], nonlinear, values)
+        interpreted(write_limited)(
+            step.sample.x[i], entry["voltage_V"], entry["current_A"], nonlinear, values
+        )
         for bit, limit in enumerate(LIMIT_NAMES):
             if mask >> bit & 1:
                 yield limit, float(values[bit]), float(bounds[bit])

@@ -29,6 +29,13 @@ class Options(MovingHorizonOptions):
     """Options of `milp-mpc-guided`."""
 
     waypoint_sides: int = Field(default=12, ge=4, le=16, multiple_of=4, description="H_WP")
+    limit_sides: int = Field(
+        default=32,
+        ge=4,
+        le=64,
+        multiple_of=4,
+        description="H_P of the limits",
+    )
     early_s: float = Field(
         default=0.05,
         ge=0.0,
