@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from toy_problems import S500, TO_OPTIMALITY, flown, state, toy, written
-from uas_coverage_baselines.milp_mpc.blocks import Capabilities, Dynamics
-from uas_coverage_baselines.milp_mpc.norm_bounds import NORMS
+from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import ConvexPolytope, inner_factor

@@ -15,10 +15,9 @@ from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 
 ENERGY, CONTACT, CONTACT_WITH, LIMITS, STATUS, FILTERED, RETURNING, COVERED, REWARD = range(9)
-"""Columns of a report: energy drawn since t = 0 [Wh], outcome of the step (LIMITS: a
-mask, see `vehicle.LIMIT_NAMES`), number of waypoints that
-the swarm has covered so far, and the reward: the sum of its terms, added up in their order
-(Python's own `sum` rounds in another way since 3.12)."""
+"""Columns of a report: energy drawn since t = 0 [Wh], outcome of the step (LIMITS is a mask, see
+`vehicle.LIMIT_NAMES`), number of waypoints that the swarm has covered so far, and the reward: the
+sum of its terms, added up in their order (Python's own `sum` rounds in another way since 3.12)."""
 
 REPORT_SIZE = REWARD + 1
 
