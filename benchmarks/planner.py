@@ -36,6 +36,7 @@ from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env import Flight, generate_scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import SwarmState
 
@@ -341,23 +342,23 @@ def _numbers(text: str) -> list[int]:
 class _Recording(MilpMpc):
     """`milp-mpc` that keeps the problems of some samples, with every open waypoint in them."""
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
-        super().reset(scenario, seed)
-        self.scenario, self.kept = scenario, {}
+    def reset(self, brief: MissionBrief, seed: int) -> None:
+        super().reset(brief, seed)
+        self.brief, self.kept = brief, {}
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         problem = super().problem(swarm)
         if swarm.step in STORED:
-            self.kept[swarm.step] = _with_all_open(problem, swarm, self.scenario)
+            self.kept[swarm.step] = _with_all_open(problem, swarm, self.brief)
         return problem
 
 
 def _with_all_open(
-    problem: PlanningProblem, swarm: SwarmState, scenario: Scenario
+    problem: PlanningProblem, swarm: SwarmState, brief: MissionBrief
 ) -> PlanningProblem:
     """The problem before waypoints out of reach were left out."""
     left_out = np.setdiff1d(np.flatnonzero(swarm.uncovered), problem.waypoint_index)
-    rows = [scenario.waypoints[row] for row in left_out]
+    rows = [brief.waypoints[row] for row in left_out]
     factor = inner_factor(problem.waypoint_sides, 3)
     return replace(
         problem,

@@ -35,7 +35,7 @@ from scipy.stats import beta
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 
-from uas_coverage_env import Scenario
+from uas_coverage_env import MissionBrief, Scenario
 from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import CONTACT_NAMES, Command, SwarmState, World
@@ -51,7 +51,7 @@ _HELD_S = (5.0, 20.0)
 class Player(Protocol):
     """What is asked of a planner here."""
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int, /) -> None:
         """Start a mission."""
         ...
 
@@ -154,7 +154,7 @@ def fly(case: Case, seed: int, steps: int) -> Tally:
         scenario = with_movers(scenario, seed)
     world = World(scenario, safety_filter=case.safety_filter)
     player = _player(case.player)
-    player.reset(scenario, seed)
+    player.reset(MissionBrief.of(scenario), seed)
     tally = Tally(uas_flights=len(world.names), lost=Counter())
     for _ in range(steps):
         if world.done:

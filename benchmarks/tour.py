@@ -33,7 +33,7 @@ from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
-from uas_coverage_env import Scenario, load_scenario
+from uas_coverage_env import MissionBrief, Scenario, load_scenario
 from uas_coverage_env.flight import energy_Wh, rollout
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
@@ -58,7 +58,7 @@ def problem(scenario: Scenario) -> Task:
         blocked=np.zeros_like(swarm.uncovered),
         time_s=0.0,
     )
-    return Schedule(scenario, build_arena(scenario), 0).task(view)
+    return Schedule(MissionBrief.of(scenario), build_arena(scenario), 0).task(view)
 
 
 def annealed(task: Task, seconds: float) -> Order:

@@ -12,6 +12,7 @@ from uas_coverage_env.flight import (
     planner_names,
     rollout,
 )
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario, scenario_names
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.vehicle import (
@@ -42,6 +43,7 @@ __all__ = [
     "GoTo",
     "InputError",
     "LinearModel",
+    "MissionBrief",
     "Planner",
     "Scenario",
     "SwarmState",

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pydantic import Field
 
 from uas_coverage_env.flight import PlannerOptions
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState, Velocity
 
 
@@ -23,7 +23,7 @@ class Hover:
     def __init__(self, options: HoverOptions | None = None) -> None:
         self.options = options or HoverOptions()
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Nothing to prepare."""
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.targets import Targets
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
 
 # Share of the cruise speed that is left on average by turns, climbs and stops.
@@ -25,11 +25,11 @@ class Lawnmower:
         self.options = options or AssistedOptions()
         self.assistants = self.options.assistants
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Order the waypoints and cut the order into runs of about equal time."""
-        self._targets = Targets(scenario)
-        waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
-        self._runs = plan_runs(scenario, back_and_forth(waypoints_m))
+        self._targets = Targets(brief)
+        waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
+        self._runs = plan_runs(brief, back_and_forth(waypoints_m))
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly the own run in order; who has finished helps with what is nearest."""
@@ -53,14 +53,14 @@ def back_and_forth(waypoints_m: NDArray[np.float64]) -> list[int]:
     return np.lexsort([waypoints_m[:, along] * forth, row]).tolist()
 
 
-def plan_runs(scenario: Scenario, order: Sequence[int]) -> list[list[int]]:
+def plan_runs(brief: MissionBrief, order: Sequence[int]) -> list[list[int]]:
     """Cut an order of waypoints into one run per UAS: the slowest one as quick as can be.
 
     No run takes longer than the charge of its UAS allows, unless all charges together are too
     little: then the cut is that of a fleet with endless batteries.
     """
-    cuts = _Cuts(scenario, order)
-    allowed_s = _allowed_times_s(scenario)
+    cuts = _Cuts(brief, order)
+    allowed_s = _allowed_times_s(brief)
     if not cuts.complete(cuts.within(allowed_s)):
         allowed_s = np.full(len(allowed_s), np.inf)
     best = cuts.within(allowed_s)
@@ -78,11 +78,11 @@ def plan_runs(scenario: Scenario, order: Sequence[int]) -> list[list[int]]:
 class _Cuts:
     """Ways to cut an order of waypoints; times are those of straight flight."""
 
-    def __init__(self, scenario: Scenario, order: Sequence[int]) -> None:
-        limits = [vehicle.limits for vehicle in scenario.vehicles]
+    def __init__(self, brief: MissionBrief, order: Sequence[int]) -> None:
+        limits = [vehicle.limits for vehicle in brief.vehicles]
         speed_mps = _PACE * min(limit.v_cruise_mps for limit in limits)
-        route_m = np.array([scenario.waypoints[waypoint].position_m for waypoint in order])
-        homes_m = np.array([uas.start_m for uas in scenario.uas])
+        route_m = np.array([brief.waypoints[waypoint].position_m for waypoint in order])
+        homes_m = np.array([uas.start_m for uas in brief.uas])
         between_m = np.linalg.norm(np.diff(route_m, axis=0), axis=1)
         self._at_s = np.concatenate([[0.0], np.cumsum(between_m)]) / speed_mps
         self._home_s = np.linalg.norm(route_m - homes_m[:, None], axis=2) / speed_mps
@@ -113,7 +113,7 @@ class _Cuts:
         return sum(map(len, runs)) == len(self._order)
 
 
-def _allowed_times_s(scenario: Scenario) -> NDArray[np.float64]:
+def _allowed_times_s(brief: MissionBrief) -> NDArray[np.float64]:
     """(U,) [s] flight that the charge of each UAS allows, at the power of hovering."""
     return np.array(
         [
@@ -123,6 +123,6 @@ def _allowed_times_s(scenario: Scenario) -> NDArray[np.float64]:
             * vehicle.battery.voltage_nominal_V
             * 3600.0
             / vehicle.power.hover_W
-            for uas, vehicle in zip(scenario.uas, scenario.vehicles, strict=True)
+            for uas, vehicle in zip(brief.uas, brief.vehicles, strict=True)
         ]
     )

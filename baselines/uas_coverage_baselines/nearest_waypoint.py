@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from uas_coverage_baselines.targets import Targets
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
 
 
@@ -17,9 +17,9 @@ class NearestWaypoint:
         self.options = options or AssistedOptions()
         self.assistants = self.options.assistants
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Forget the targets of the mission before."""
-        self._targets = Targets(scenario)
+        self._targets = Targets(brief)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Keep a target until it is covered or blocked, then take the nearest one."""

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 
 
@@ -26,14 +26,14 @@ class RandomWalk:
         self.options = options or RandomWalkOptions()
         self.assistants = self.options.assistants
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Seed the lots; note the speeds of the vehicles and the heights inside the fence."""
         self._random = np.random.default_rng(seed)
-        self._hold_steps = max(1, round(self.options.hold_s / scenario.dt_s))
-        limits_mps = np.array([vehicle.limits.v_xy_max_mps for vehicle in scenario.vehicles])
+        self._hold_steps = max(1, round(self.options.hold_s / brief.dt_s))
+        limits_mps = np.array([vehicle.limits.v_xy_max_mps for vehicle in brief.vehicles])
         self._speed_mps = self.options.speed * limits_mps
-        down_m = scenario.fence.vertices_m[:, 2]
-        room_m = scenario.geofence.margin_m + max(uas.radius_m for uas in scenario.uas)
+        down_m = brief.fence.vertices_m[:, 2]
+        room_m = brief.geofence.margin_m + max(uas.radius_m for uas in brief.uas)
         self._altitudes_m = (room_m - down_m.max(), -down_m.min() - room_m)
         self._held: dict[str, Command] = {}
 

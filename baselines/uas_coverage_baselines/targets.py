@@ -5,24 +5,24 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 
 class Targets:
     """One target per UAS, kept until it is covered, or blocked by a moving obstacle."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    def __init__(self, brief: MissionBrief) -> None:
+        self._waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         # how near to the centre of a moving obstacle nobody should come
-        radius_m = max(uas.radius_m for uas in scenario.uas)
+        radius_m = max(uas.radius_m for uas in brief.uas)
         self._keep_out_m = np.array(
             [
                 (
                     obstacle.radius_m + obstacle.safe_distance_m + radius_m,
                     obstacle.height_m / 2 + obstacle.safe_distance_m + radius_m,
                 )
-                for obstacle in scenario.moving_obstacles
+                for obstacle in brief.moving_obstacles
             ]
         ).reshape(-1, 2)
         self._target: dict[str, int] = {}

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from uas_coverage_env import generate_scenario, load_scenario
+from uas_coverage_env import MissionBrief, generate_scenario, load_scenario
 from uas_coverage_env.env import CoverageParallelEnv, Observer, observation_columns
 from uas_coverage_env.world import FLYING
 
@@ -19,7 +19,7 @@ def test_a_player_sees_what_a_learner_sees(name, assisted):
     env = CoverageParallelEnv(scenario, return_mode=assisted, safety_filter=assisted)
     env.reset(seed=0)
     episode = env._episode
-    observer = Observer(scenario)
+    observer = Observer(MissionBrief.of(scenario))
     lots = np.random.default_rng(4)
     held = {}
     for k in range(120):

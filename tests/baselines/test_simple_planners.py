@@ -11,6 +11,7 @@ from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 
 from uas_coverage_env.flight import Assistants, AssistedOptions, accomplished, rollout
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
 from uas_coverage_env.strict_toml import parse
 from uas_coverage_env.world import GoTo, World
@@ -43,7 +44,7 @@ def distances_m(scenario, swarm, name):
 
 
 def ready(planner, scenario):
-    planner.reset(scenario, 0)
+    planner.reset(MissionBrief.of(scenario), 0)
     return planner
 
 
@@ -117,7 +118,7 @@ def test_the_order_back_and_forth_is_as_short_as_a_grid_allows(columns, rows):
 def test_runs_share_out_every_waypoint_once(seed, n_uas, n_waypoints):
     scenario = generate_scenario(seed, n_uas=n_uas, n_waypoints=n_waypoints, n_obstacles=0)
     order = list(np.random.default_rng(seed).permutation(n_waypoints))
-    runs = plan_runs(scenario, order)
+    runs = plan_runs(MissionBrief.of(scenario), order)
     assert len(runs) == n_uas
     assert sorted(chain.from_iterable(runs)) == list(range(n_waypoints))
 
@@ -125,7 +126,7 @@ def test_runs_share_out_every_waypoint_once(seed, n_uas, n_waypoints):
 def test_runs_are_of_about_equal_time_where_charge_allows(village):
     full = [{**uas.model_dump(), "soc_0": 1.0} for uas in village.uas]
     order = back_and_forth(np.array([waypoint.position_m for waypoint in village.waypoints]))
-    first, second = map(len, plan_runs(changed(village, uas=full), order))
+    first, second = map(len, plan_runs(MissionBrief.of(changed(village, uas=full)), order))
     assert 49 / 3 < first < 2 * 49 / 3
     assert first + second == 49
 
@@ -133,13 +134,14 @@ def test_runs_are_of_about_equal_time_where_charge_allows(village):
 def test_a_uas_with_little_charge_gets_a_short_run(village):
     order = list(range(49))
     weak = [village.uas[0].model_dump(), {**village.uas[1].model_dump(), "soc_0": 0.3}]
-    lengths = [len(run) for run in plan_runs(changed(village, uas=weak), order)]
+    lengths = [len(run) for run in plan_runs(MissionBrief.of(changed(village, uas=weak)), order)]
     assert lengths[1] < 10 < lengths[0]
 
 
 def test_charges_that_are_too_little_together_still_give_everybody_a_run(village):
     weak = [{**uas.model_dump(), "soc_0": 0.28} for uas in village.uas]
-    lengths = [len(run) for run in plan_runs(changed(village, uas=weak), list(range(49)))]
+    brief = MissionBrief.of(changed(village, uas=weak))
+    lengths = [len(run) for run in plan_runs(brief, list(range(49)))]
     assert sum(lengths) == 49
     assert min(lengths) > 10
 
@@ -147,7 +149,7 @@ def test_charges_that_are_too_little_together_still_give_everybody_a_run(village
 def test_lawnmower_flies_its_own_run_and_helps_when_it_is_done(village, at_start):
     planner = ready(Lawnmower(), village)
     order = back_and_forth(np.array([waypoint.position_m for waypoint in village.waypoints]))
-    own, others = plan_runs(village, order)
+    own, others = plan_runs(MissionBrief.of(village), order)
     assert planner.act(at_start)["uas_1"].waypoint == own[0]
     planner = ready(Lawnmower(), village)
     assert planner.act(leaving(at_start, *others))["uas_1"].waypoint in others
@@ -172,7 +174,7 @@ def test_hover_covers_nothing_and_is_lost_with_its_battery():
 def test_a_random_walk_is_repeated_by_its_seed_alone(village, at_start):
     def walk(seed):
         planner = RandomWalk()
-        planner.reset(village, seed)
+        planner.reset(MissionBrief.of(village), seed)
         return [planner.act(dataclasses.replace(at_start, step=k)) for k in range(30)]
 
     assert walk(1) == walk(1)
@@ -181,7 +183,7 @@ def test_a_random_walk_is_repeated_by_its_seed_alone(village, at_start):
 
 def test_a_random_walk_holds_its_lots_and_keeps_to_its_speed_and_the_fence(village, at_start):
     planner = RandomWalk(RandomWalkOptions(hold_s=4.0, speed=0.5))
-    planner.reset(village, 3)
+    planner.reset(MissionBrief.of(village), 3)
     drawn = [planner.act(dataclasses.replace(at_start, step=k))["uas_1"] for k in range(40)]
     assert all(len(set(drawn[k : k + 4])) == 1 for k in range(0, 40, 4))
     assert len(set(drawn)) == 10

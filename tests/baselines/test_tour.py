@@ -7,6 +7,7 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.flight import Assistants, accomplished
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import LOST, World, build_arena
@@ -43,7 +44,7 @@ def view_of(scenario, **changes):
 
 
 def schedule_of(scenario, view, moves=20_000):
-    schedule = Schedule(scenario, build_arena(scenario), moves)
+    schedule = Schedule(MissionBrief.of(scenario), build_arena(scenario), moves)
     schedule.begin(view, 0)
     return schedule
 
@@ -133,7 +134,7 @@ def test_a_short_clock_leaves_out_what_nobody_comes_home_from_in_time(village):
 
 def test_a_lost_uas_gets_no_command_and_the_other_goes_on(small_town):
     planner = Tour(TourOptions(**QUICK))
-    planner.reset(small_town, 0)
+    planner.reset(MissionBrief.of(small_town), 0)
     world = World(small_town)
     assert set(planner.act(world.swarm_state())) == {"uas_1", "uas_2"}
     world.state.status[1] = LOST
@@ -142,7 +143,7 @@ def test_a_lost_uas_gets_no_command_and_the_other_goes_on(small_town):
 
 def test_a_predicted_flight_begins_where_the_uas_is_and_comes_true(small_town):
     planner = Tour(TourOptions(**QUICK))
-    planner.reset(small_town, 0)
+    planner.reset(MissionBrief.of(small_town), 0)
     world = World(small_town, safety_filter=True)
     for _ in range(6):
         swarm = world.swarm_state()

@@ -6,6 +6,7 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, Options
 from uas_coverage_baselines.milp_mpc.search.decision import Effort
 
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import parse
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
@@ -69,7 +70,7 @@ def with_uas(scenario, row, **fields):
 def planner(scenario, **options):
     """A planner that works by nodes, on a short horizon, ready for the mission."""
     made = MilpMpc(Options(**({"deterministic": True, "horizon": 8, "teams": 1} | options)))
-    made.reset(scenario, 0)
+    made.reset(MissionBrief.of(scenario), 0)
     return made
 
 

@@ -24,6 +24,7 @@ from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import World
 
@@ -54,7 +55,7 @@ def made(planner, scenario, *added, **options):
     """The planner with blocks added, ready for the mission."""
     options = {"deterministic": True, "horizon": 8, "teams": 1} | options
     result = planner(planner.Options(**options), blocks=(*OCP, *added))
-    result.reset(scenario, 0)
+    result.reset(MissionBrief.of(scenario), 0)
     return result
 
 

@@ -9,6 +9,7 @@ from uas_coverage_baselines.milp_mpc.planner import Options
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.search.decision import decide
 
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.vehicle import DELTA_THRUST
 from uas_coverage_env.world import Velocity, World
@@ -35,7 +36,7 @@ def planned(request):
     for _ in range(4):
         world.step({name: Velocity(3.0, 4.0, 7.0) for name in world.names})
     swarm = world.swarm_state()
-    around = ProblemBuilder(scenario, Options(horizon=HORIZON))
+    around = ProblemBuilder(MissionBrief.of(scenario), Options(horizon=HORIZON))
     problem = around.problem(swarm, dict.fromkeys(world.names), Weights(), 0.15)
     plan = decide(problem, None, scenario.dt_s, LITTLE)
     assert plan is not None

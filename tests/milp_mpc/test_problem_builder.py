@@ -9,6 +9,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 from uas_coverage_baselines.milp_mpc.planner import Options
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import LANDED, Velocity, World
 
 PLACES = [((60.0, 50.0, -6.0), 8.0), ((50.0, 75.0, -6.0), 8.0), ((190.0, 190.0, -20.0), 8.0)]
@@ -32,7 +33,7 @@ def scenario():
 
 @pytest.fixture
 def around(scenario):
-    return ProblemBuilder(scenario, Options(horizon=9))
+    return ProblemBuilder(MissionBrief.of(scenario), Options(horizon=9))
 
 
 def seen(scenario, **changes):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from uas_coverage_baselines.order import Legs
 
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import parse
 
@@ -63,7 +64,7 @@ LOW = ((50.0, 190.0, -30.0), (350.0, 210.0, 0.0))
 
 def test_free_legs_take_the_distance_over_the_speed():
     made = scenario(FIELD)
-    legs, speed = Legs(made), made.vehicles[0].limits.v_xy_max_mps
+    legs, speed = Legs(MissionBrief.of(made)), made.vehicles[0].limits.v_xy_max_mps
     exact = [[octagon_m(a, b) / speed for b in FIELD] for a in FIELD]
     assert legs.between_s[0] == pytest.approx(np.array(exact))
     here = np.array([100.0, 100.0, -20.0])
@@ -71,33 +72,33 @@ def test_free_legs_take_the_distance_over_the_speed():
 
 
 def test_level_legs_are_symmetric():
-    between = Legs(scenario([*FIELD, WEST, EAST], obstacles=[TALL])).between_s[0]
+    between = Legs(MissionBrief.of(scenario([*FIELD, WEST, EAST], obstacles=[TALL]))).between_s[0]
     assert between == pytest.approx(between.T, rel=0.05)
     assert (np.diag(between) == 0.0).all()
 
 
 @pytest.mark.parametrize("obstacle", [TALL, LOW], ids=["round", "over"])
 def test_a_leg_past_an_obstacle_takes_longer(obstacle):
-    free = Legs(scenario([WEST, EAST])).between_s[0]
-    past = Legs(scenario([WEST, EAST], obstacles=[obstacle])).between_s[0]
+    free = Legs(MissionBrief.of(scenario([WEST, EAST]))).between_s[0]
+    past = Legs(MissionBrief.of(scenario([WEST, EAST], obstacles=[obstacle]))).between_s[0]
     if obstacle is TALL:
         assert past[0, 1] > free[0, 1] + 1.0
     else:
         near = [(200.0, 180.0, -5.0), (200.0, 220.0, -5.0)]
-        low = Legs(scenario(near, obstacles=[LOW])).between_s[0]
-        assert low[0, 1] > Legs(scenario(near)).between_s[0][0, 1] + 1.0
+        low = Legs(MissionBrief.of(scenario(near, obstacles=[LOW]))).between_s[0]
+        assert low[0, 1] > Legs(MissionBrief.of(scenario(near))).between_s[0][0, 1] + 1.0
 
 
 def test_a_leg_that_climbs_takes_as_long_as_the_climb():
     made = scenario([(100.0, 100.0, -5.0), (101.0, 100.0, -55.0)], radius_m=4.0)
-    limits, between = made.vehicles[0].limits, Legs(made).between_s[0]
+    limits, between = made.vehicles[0].limits, Legs(MissionBrief.of(made)).between_s[0]
     # half the radius is near enough
     assert between[0, 1] == pytest.approx(48.0 / limits.v_up_max_mps)
     assert between[1, 0] == pytest.approx(48.0 / limits.v_down_max_mps)
 
 
 def test_the_way_home_ends_at_ones_own_start():
-    legs = Legs(scenario(FIELD, ("s500_v2", "s500_v2")))
+    legs = Legs(MissionBrief.of(scenario(FIELD, ("s500_v2", "s500_v2"))))
     for uas in range(2):
         assert legs.way_home_s(uas, legs.starts_m[uas]) == 0.0
         alone = [legs.way_home_s(uas, np.array(place)) for place in FIELD]
@@ -107,7 +108,7 @@ def test_the_way_home_ends_at_ones_own_start():
 
 def test_waypoints_at_the_same_place_are_each_others_neighbours():
     twice = [FIELD[0], FIELD[0], FIELD[0], FIELD[1]]
-    legs = Legs(scenario(twice))
+    legs = Legs(MissionBrief.of(scenario(twice)))
     assert legs.neighbours.shape == (4, 3)
     for row, near in enumerate(legs.neighbours):
         assert sorted(near) == [w for w in range(4) if w != row]
@@ -115,7 +116,7 @@ def test_waypoints_at_the_same_place_are_each_others_neighbours():
 
 
 def test_a_single_waypoint_has_no_neighbours():
-    legs = Legs(scenario(FIELD[:1]))
+    legs = Legs(MissionBrief.of(scenario(FIELD[:1])))
     assert legs.neighbours.shape == (1, 0)
     assert legs.between_s.tolist() == [[[0.0]]]
 
@@ -123,7 +124,7 @@ def test_a_single_waypoint_has_no_neighbours():
 def test_every_kind_of_vehicle_has_its_own_times():
     heights = [(100.0, 100.0, -5.0), (101.0, 100.0, -55.0)]
     made = scenario(heights, ("s500_v2", "hexacopter", "s500_v2"), radius_m=4.0)
-    legs = Legs(made)
+    legs = Legs(MissionBrief.of(made))
     assert legs.kind.tolist() == [0, 1, 0]
     for row, vehicle in enumerate(made.vehicles[:2]):
         climb_s = 48.0 / vehicle.limits.v_up_max_mps

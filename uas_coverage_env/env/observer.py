@@ -12,7 +12,7 @@ from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import learners_sizes, tables_of
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import FLYING, SwarmState, build_arena, initial_state
 from uas_coverage_env.world.arena import ARENA
 
@@ -25,7 +25,7 @@ class Observer:
     nothing.
 
     Args:
-        scenario: The mission.
+        brief: The mission.
         observation: The blocks of the observation.
 
     Attributes:
@@ -34,10 +34,16 @@ class Observer:
     """
 
     def __init__(
-        self, scenario: Scenario, observation: Sequence[ObservationBlock] = OBSERVATION
+        self, brief: MissionBrief, observation: Sequence[ObservationBlock] = OBSERVATION
     ) -> None:
         settings = MissionSettings(observation=checked_blocks(observation))
-        self._arena = build_arena(scenario)
+        scenario = brief.as_scenario()
+        arena = build_arena(scenario)
+        # one row: where moving obstacles are seen
+        self._arena = arena._replace(
+            moving_path_m=arena.moving_path_m[:1].copy(),
+            moving_velocity_mps=arena.moving_velocity_mps[:1].copy(),
+        )
         self._state = initial_state(scenario)
         self._landing_distance_m = scenario.landing_distance_m
         actions = actions_of(settings.action, scenario)
@@ -68,6 +74,8 @@ class Observer:
         state.reference[:] = swarm.reference_mps
         state.uncovered[:] = swarm.uncovered
         state.step[0] = swarm.step
+        self._arena.moving_path_m[0] = swarm.moving_position_m
+        self._arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
         away_m = np.linalg.norm(swarm.x[:, :3] - swarm.home_m, axis=1)
         state.departed[:] |= away_m > self._landing_distance_m
         count_company(state.uncovered, self._tables.neighbours, self._learners.company)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.strict_toml import StrictModel
 from uas_coverage_env.world import Command, SwarmState
 
@@ -42,7 +42,7 @@ class Planner(Protocol):
     """Anything that flies a swarm: two methods are all that is needed.
 
     A rollout reads more where a planner has it:
-        `warm_up(scenario)`: compiles what needs compiling; called once, before `reset`, untimed.
+        `warm_up(brief)`: compiles what needs compiling; called once, before `reset`, untimed.
         `last_decision`: a `Decision` about the last `act`, or None.
         `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
         `options`: the pydantic model it was made with; goes into the record.
@@ -54,8 +54,14 @@ class Planner(Protocol):
     see `registry`.
     """
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
-        """Start a new mission; a planner that draws lots draws them from the seed alone."""
+    def reset(self, brief: MissionBrief, seed: int, /) -> None:
+        """Start a new mission; a planner that draws lots draws them from the seed alone.
+
+        Args:
+            brief: The mission as far as a planner may know it: the fields of `Scenario` under
+                their names, without the schedules of moving obstacles.
+            seed: Of whatever is drawn.
+        """
         ...
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:

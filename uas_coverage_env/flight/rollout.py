@@ -15,6 +15,7 @@ from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.planner import Assistants, Planner, PlannerError
 from uas_coverage_env.flight.record import Flight
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Command, Dynamics, SwarmState, Velocity, World, pack
@@ -77,7 +78,7 @@ def rollout(
     if safety_filter is None:
         safety_filter = assistants.safety_filter
     world = World(scenario, dynamics=dynamics, return_mode=return_mode, safety_filter=safety_filter)
-    _make_ready(world, planner, scenario, seed)
+    _make_ready(world, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
     log = FlightLog(world, scenario)
@@ -100,7 +101,7 @@ def rollout(
     )
 
 
-def _make_ready(world: World, planner: Planner, scenario: Scenario, seed: int) -> None:
+def _make_ready(world: World, planner: Planner, brief: MissionBrief, seed: int) -> None:
     """Compile world and planner, then put both at the start: no decision pays for compilation."""
     state = world.swarm_state()
     world.step({name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)})
@@ -108,10 +109,10 @@ def _make_ready(world: World, planner: Planner, scenario: Scenario, seed: int) -
     warm_up = getattr(planner, "warm_up", None)
     try:
         if warm_up is not None:
-            warm_up(scenario)
-        planner.reset(scenario, seed)
+            warm_up(brief)
+        planner.reset(brief, seed)
     except ValueError as error:
-        reason = f"planner {name_of(planner)!r} refuses scenario {scenario.name!r}: {error}"
+        reason = f"planner {name_of(planner)!r} refuses scenario {brief.name!r}: {error}"
         raise InputError(reason) from error
 
 

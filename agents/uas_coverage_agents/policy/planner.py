@@ -8,7 +8,7 @@ from uas_coverage_agents.policy.directory import Policy, load_policy
 from uas_coverage_agents.velocity.pilot import VelocityPilot
 from uas_coverage_agents.waypoint.pilot import WaypointPilot
 from uas_coverage_env.flight import Assistants, AssistedOptions
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Command, SwarmState
 
@@ -16,11 +16,11 @@ from uas_coverage_env.world import Command, SwarmState
 class Pilot(Protocol):
     """Flies a swarm with a policy of its interface; a planner without options."""
 
-    def warm_up(self, scenario: Scenario) -> None:
+    def warm_up(self, brief: MissionBrief) -> None:
         """Compile what needs compiling."""
         ...
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission."""
         ...
 
@@ -68,13 +68,13 @@ class PolicyPlanner:
         """What the flights depend on beside the options: the checksum of the weights."""
         return self.policy.description.weights_sha256
 
-    def warm_up(self, scenario: Scenario) -> None:
+    def warm_up(self, brief: MissionBrief) -> None:
         """Compile what needs compiling."""
-        self._pilot.warm_up(scenario)
+        self._pilot.warm_up(brief)
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission."""
-        self._pilot.reset(scenario, seed)
+        self._pilot.reset(brief, seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Let the policy decide."""

@@ -11,7 +11,7 @@ from uas_coverage_agents.velocity.patience import Patience
 from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState, Velocity, World
 
 LAYOUT = "uas_coverage_v0"
@@ -52,15 +52,15 @@ class VelocityPilot:
             raise ValueError(f"network.outputs is {description.network.outputs}, not {OUTPUTS}")
         self._policy = policy
 
-    def warm_up(self, scenario: Scenario) -> None:
+    def warm_up(self, brief: MissionBrief) -> None:
         """Compile the observation."""
-        Observer(scenario).observe(World(scenario).swarm_state())
+        Observer(brief).observe(World(brief.as_scenario()).swarm_state())
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; nothing is drawn."""
-        self._observer = Observer(scenario)
-        self._patience = Patience(len(scenario.uas), len(scenario.waypoints), scenario.dt_s)
-        ranges = actions_of("velocity", scenario).ranges
+        self._observer = Observer(brief)
+        self._patience = Patience(len(brief.uas), len(brief.waypoints), brief.dt_s)
+        ranges = actions_of("velocity", brief.as_scenario()).ranges
         self._middle = ranges["middle"][:, :OUTPUTS]
         self._below = self._middle - ranges["lowest"][:, :OUTPUTS]
         self._above = ranges["highest"][:, :OUTPUTS] - self._middle

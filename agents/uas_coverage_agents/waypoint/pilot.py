@@ -24,7 +24,7 @@ from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Desk, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NOBODY, choose, next_to_decide
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
@@ -87,22 +87,21 @@ class WaypointPilot:
         self._assistants = assistants
         self._simulations = simulations
 
-    def warm_up(self, scenario: Scenario) -> None:
+    def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
-        self.reset(scenario, 0)
-        self.act(World(scenario).swarm_state())
+        self.reset(brief, 0)
+        self.act(World(brief.as_scenario()).swarm_state())
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; simulations draw from the seed."""
-        # what moving obstacles are going to do is for nobody to know
-        arena = build_arena(scenario)
+        arena = build_arena(brief.as_scenario())
         self._moving = arena.moving
         self._still = arena._replace(
             moving=arena.moving[:0], moving_path_m=_NOWHERE, moving_velocity_mps=_NOWHERE
         )
         self._legs = legs_of(self._still)
-        self._departed = np.zeros(len(scenario.uas), dtype=np.bool_)
-        n_uas, n_waypoints = len(scenario.uas), len(scenario.waypoints)
+        self._departed = np.zeros(len(brief.uas), dtype=np.bool_)
+        n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
         self._blocked = np.zeros(n_waypoints, dtype=np.bool_)

@@ -19,7 +19,7 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Mode, SwarmState, World
 
 _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is left to visit
@@ -63,18 +63,18 @@ class MilpMpcGuided(MovingHorizon[Options]):
         super().__init__(options or Options(), blocks)
         self._weights = self.options.weights
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission: the first order is searched here, before take-off.
 
         Args:
-            scenario: the mission.
+            brief: the mission.
             seed: of the search.
         """
-        super().reset(scenario, seed)
-        self._builder = ProblemBuilder(scenario, self.options)
+        super().reset(brief, seed)
+        self._builder = ProblemBuilder(brief, self.options)
         decision_s = self.options.threads * self.options.time_limit_s
-        self._guide = OrderGuide(scenario, self._builder, TourShape(), decision_s)
-        world = World(scenario)
+        self._guide = OrderGuide(brief, self._builder, TourShape(), decision_s)
+        world = World(brief.as_scenario())
         world.reset()
         self._guide.begin(world.swarm_state(), seed)
         self._returning: set[str] = set()

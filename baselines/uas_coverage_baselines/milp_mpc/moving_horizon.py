@@ -19,7 +19,7 @@ from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
 from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, World, Wrench
 
@@ -56,25 +56,25 @@ class MovingHorizon(ABC, Generic[Chosen]):
         """The same planner with time enough to compile everything."""
         return type(self)(self.options.model_copy(update={"time_limit_s": 10.0}), self._given)
 
-    def warm_up(self, scenario: Scenario) -> None:
-        """Compile what a decision compiles, on the scenario's first one."""
-        world = World(scenario)
+    def warm_up(self, brief: MissionBrief) -> None:
+        """Compile what a decision compiles, on the mission's first one."""
+        world = World(brief.as_scenario())
         world.reset()
         rehearsal = self.rehearsal()
-        rehearsal.reset(scenario, 0)
+        rehearsal.reset(brief, 0)
         swarm = world.swarm_state()
         rehearsal.act(swarm)
         problem = rehearsal.problem(swarm)
-        evasion(problem, scenario.dt_s)
-        last = dataclasses.replace(swarm, step=scenario.max_steps)
+        evasion(problem, brief.dt_s)
+        last = dataclasses.replace(swarm, step=brief.max_steps)
         rehearsal._return_home.apply(problem, last, None, ())
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission."""
-        self.dt_s = scenario.dt_s
+        self.dt_s = brief.dt_s
         self.plan = self._backup = None
         self._round_robin = RoundRobin()
-        self._return_home = ReturnHome(scenario, self.options.margin_m, self.blocks)
+        self._return_home = ReturnHome(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
         self.last_decision = None
 

@@ -19,7 +19,7 @@ from uas_coverage_baselines.order import (
     improved,
     no_order,
 )
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import SwarmState
 
@@ -62,17 +62,17 @@ class OrderGuide:
 
     def __init__(
         self,
-        scenario: Scenario,
+        brief: MissionBrief,
         builder: ProblemBuilder,
         shape: TourShape,
         decision_s: float = np.inf,
     ) -> None:
         self._builder, self._shape = builder, shape
         self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
-        self._legs = Legs(scenario)
-        self._names = tuple(uas.name for uas in scenario.uas)
-        self._radius_m = np.array([w.radius_m for w in scenario.waypoints])
-        self._weight = np.array([w.weight for w in scenario.waypoints], float)
+        self._legs = Legs(brief)
+        self._names = tuple(uas.name for uas in brief.uas)
+        self._radius_m = np.array([w.radius_m for w in brief.waypoints])
+        self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._order: Order | None = None
         self._waits = False  # whether blocked waypoints are waited for, once little else is left
 

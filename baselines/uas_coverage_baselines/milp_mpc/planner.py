@@ -19,7 +19,7 @@ from uas_coverage_baselines.milp_mpc.modes import (
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import Mode, SwarmState
 
@@ -57,11 +57,11 @@ class MilpMpc(MovingHorizon[Options]):
         super().__init__(options or Options(), blocks)
         self._weights, self._choice = self.options.weights, TargetChoice()
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
-        super().reset(scenario, seed)
-        self._builder = ProblemBuilder(scenario, self.options)
-        self._memories = {uas.name: Memory() for uas in scenario.uas}
+        super().reset(brief, seed)
+        self._builder = ProblemBuilder(brief, self.options)
+        self._memories = {uas.name: Memory() for uas in brief.uas}
 
     def mode(self, name: str) -> Mode:
         """The operation mode."""

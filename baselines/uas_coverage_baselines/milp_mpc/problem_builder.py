@@ -1,4 +1,4 @@
-"""From the scenario and what is seen now to the `PlanningProblem` of one decision."""
+"""From the brief and what is seen now to the `PlanningProblem` of one decision."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 )
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_env.geometry import inner_factor
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model, return_threshold
 from uas_coverage_env.world import SwarmState
 
@@ -30,20 +30,20 @@ FloatArray = NDArray[np.float64]
 class ProblemBuilder:
     """What stays the same over a mission, and the view of it at one sample."""
 
-    def __init__(self, scenario: Scenario, options: MovingHorizonOptions) -> None:
-        self.scenario, self._options = scenario, options
-        self.dt_s = scenario.dt_s
-        self.waypoints_m = np.array([w.position_m for w in scenario.waypoints], float)
-        self.home_m = {uas.name: np.array(uas.start_m, float) for uas in scenario.uas}
-        self._vehicles = dict(zip((u.name for u in scenario.uas), scenario.vehicles, strict=True))
-        self._uas = {uas.name: uas for uas in scenario.uas}
+    def __init__(self, brief: MissionBrief, options: MovingHorizonOptions) -> None:
+        self.brief, self._options = brief, options
+        self.dt_s = brief.dt_s
+        self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
+        self.home_m = {uas.name: np.array(uas.start_m, float) for uas in brief.uas}
+        self._vehicles = dict(zip((u.name for u in brief.uas), brief.vehicles, strict=True))
+        self._uas = {uas.name: uas for uas in brief.uas}
         self._obstacles = tuple(
             (obstacle.name, hull)
-            for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+            for obstacle, hull in zip(brief.obstacles, brief.hulls, strict=True)
         )
         factor = inner_factor(options.waypoint_sides, 3)
-        self._waypoint_reach_m = np.array([w.radius_m * factor for w in scenario.waypoints])
-        self._waypoint_weight = np.array([w.weight for w in scenario.waypoints], float)
+        self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
+        self._waypoint_weight = np.array([w.weight for w in brief.waypoints], float)
 
     def vehicle(self, name: str) -> VehicleParams:
         """Parameters of a UAS's vehicle."""
@@ -55,7 +55,7 @@ class ProblemBuilder:
         D_r,max, the overestimated way home, is `detour` times the way to the fence's far corner.
         """
         vehicle, uas = self._vehicles[name], self._uas[name]
-        corners = self.scenario.fence.vertices_m - self.home_m[name]
+        corners = self.brief.fence.vertices_m - self.home_m[name]
         farthest_m = float(np.linalg.norm(corners, axis=1).max())
         way_s = detour * farthest_m / vehicle.limits.v_cruise_mps
         return return_threshold(vehicle, uas.dod_max, way_s)
@@ -80,8 +80,8 @@ class ProblemBuilder:
     def blocked_waypoints(self, swarm: SwarmState) -> set[int]:
         """Waypoints whose whole inner polyhedron lies in a moving obstacle's keep-out, now."""
         blocked: set[int] = set()
-        for row, obstacle in enumerate(self.scenario.moving_obstacles):
-            keep_out = obstacle.safe_distance_m + max(u.radius_m for u in self.scenario.uas)
+        for row, obstacle in enumerate(self.brief.moving_obstacles):
+            keep_out = obstacle.safe_distance_m + max(u.radius_m for u in self.brief.uas)
             away = np.abs(self.waypoints_m - swarm.moving_position_m[row])
             reach = self._waypoint_reach_m
             level = np.hypot(away[:, 0] + reach, away[:, 1] + reach)
@@ -137,8 +137,8 @@ class ProblemBuilder:
         x0 = swarm.x[rows]
         uas = [self._uas[name] for name in names]
         radius = np.array([u.radius_m for u in uas])
-        fixed = np.array([self.scenario.obstacles[o].safe_distance_m for o in obstacles])
-        moving = np.array([o.safe_distance_m for o in self.scenario.moving_obstacles])
+        fixed = np.array([self.brief.obstacles[o].safe_distance_m for o in obstacles])
+        moving = np.array([o.safe_distance_m for o in self.brief.moving_obstacles])
         vehicles = tuple(self._vehicles[name] for name in names)
         return PlanningProblem(
             names=names,
@@ -149,14 +149,14 @@ class ProblemBuilder:
             ),
             x0=x0,
             horizon=options.horizon,
-            fence=self.scenario.fence,
-            fence_margin_m=self.scenario.geofence.margin_m + min(options.margin_m, 0.1),
+            fence=self.brief.fence,
+            fence_margin_m=self.brief.geofence.margin_m + min(options.margin_m, 0.1),
             obstacles=tuple(self._obstacles[o] for o in obstacles),
             obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
             moving=self._predicted(swarm),
             moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
             separation_m=(
-                radius[:, None] + radius + self.scenario.uas_safe_distance_m + options.margin_m
+                radius[:, None] + radius + self.brief.uas_safe_distance_m + options.margin_m
             ),
             waypoints_m=self.waypoints_m[waypoints],
             waypoint_reach_m=self._waypoint_reach_m[waypoints],
@@ -178,14 +178,14 @@ class ProblemBuilder:
 
         By boxes: a UAS that flies straight at full speed all the time does not get to the others.
         """
-        near_m = max(u.radius_m for u in self.scenario.uas) + self._options.margin_m
+        near_m = max(u.radius_m for u in self.brief.uas) + self._options.margin_m
         result = []
         rows = [swarm.names.index(name) for name in swarm.active]
         speed = [self._vehicles[name].limits.v_xy_max_mps for name in swarm.active]
         # at most: the corners of the speed's polygon, and what a UAS flies while it brakes
         way_m = 1.1 * np.array(speed) * (self.horizon_s + BRAKING_S)
         for o, (obstacle, (_, hull)) in enumerate(
-            zip(self.scenario.obstacles, self._obstacles, strict=True)
+            zip(self.brief.obstacles, self._obstacles, strict=True)
         ):
             low, high = hull.vertices_m.min(axis=0)[:2], hull.vertices_m.max(axis=0)[:2]
             here = swarm.x[rows, 0:2]
@@ -203,7 +203,7 @@ class ProblemBuilder:
                 obstacle.radius_m,
                 0.5 * obstacle.height_m,
             )
-            for row, obstacle in enumerate(self.scenario.moving_obstacles)
+            for row, obstacle in enumerate(self.brief.moving_obstacles)
         )
 
 

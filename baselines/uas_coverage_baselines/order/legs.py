@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
 
@@ -28,7 +28,7 @@ _OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi 
 
 
 class Legs:
-    """The leg times of a scenario; what does not change during a mission is computed once.
+    """The leg times of a mission; what does not change during a mission is computed once.
 
     Attributes:
         between_s: (V, W, W) between waypoints, for each kind of vehicle.
@@ -42,28 +42,27 @@ class Legs:
         turn_s: (U, W) time that the radius of a waypoint is worth.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self.waypoints_m = np.array([w.position_m for w in scenario.waypoints], float)
-        self._credit_m = np.array([0.5 * w.radius_m for w in scenario.waypoints])
-        # a planner must not know what the moving obstacles are going to do
-        self._arena = build_arena(scenario.model_copy(update={"moving_obstacles": ()}))
-        kinds = list(dict.fromkeys(scenario.vehicles))
-        self.kind = np.array([kinds.index(vehicle) for vehicle in scenario.vehicles])
+    def __init__(self, brief: MissionBrief) -> None:
+        self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
+        self._credit_m = np.array([0.5 * w.radius_m for w in brief.waypoints])
+        self._arena = build_arena(brief.as_scenario())
+        kinds = list(dict.fromkeys(brief.vehicles))
+        self.kind = np.array([kinds.index(vehicle) for vehicle in brief.vehicles])
         self._speeds = np.array([_speeds(vehicle) for vehicle in kinds])
-        limits = [vehicle.limits for vehicle in scenario.vehicles]
-        gravity = [vehicle.airframe.gravity_mps2 for vehicle in scenario.vehicles]
+        limits = [vehicle.limits for vehicle in brief.vehicles]
+        gravity = [vehicle.airframe.gravity_mps2 for vehicle in brief.vehicles]
         self.speed_mps = np.array([limit.v_xy_max_mps for limit in limits])
         self.acceleration_mps2 = _AGILITY * np.array(
             [g * np.tan(limit.tilt_max_rad) for g, limit in zip(gravity, limits, strict=True)]
         )
-        radius_m = np.array([w.radius_m for w in scenario.waypoints])
+        radius_m = np.array([w.radius_m for w in brief.waypoints])
         self.turn_s = radius_m / self.speed_mps[:, None]
         n = len(self.waypoints_m)
         nearest = min(_NEIGHBOURS, n - 1)
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]
         self.neighbours = _without_self(np.reshape(found, (n, nearest + 1)))
         self.between_s = np.array([self._between(speeds) for speeds in self._speeds])
-        self.starts_m = np.array([uas.start_m for uas in scenario.uas], float)
+        self.starts_m = np.array([uas.start_m for uas in brief.uas], float)
         self.home_s = np.array(
             [self._towards_home(u, start) for u, start in enumerate(self.starts_m)]
         )

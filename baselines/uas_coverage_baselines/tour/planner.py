@@ -14,7 +14,7 @@ from uas_coverage_baselines.tour.pursuit import LEGS, Task, brake_seconds, empty
 from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     FLYING,
@@ -66,29 +66,28 @@ class Tour:
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
 
-    def warm_up(self, scenario: Scenario) -> None:
+    def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
         quick = Tour(TourOptions(moves=10, changes=1))
-        quick.reset(scenario, 0)
-        quick.act(World(scenario).swarm_state())
+        quick.reset(brief, 0)
+        quick.act(World(brief.as_scenario()).swarm_state())
 
-    def reset(self, scenario: Scenario, seed: int) -> None:
+    def reset(self, brief: MissionBrief, seed: int) -> None:
         """Search the order from the starts."""
-        still = build_arena(scenario.model_copy(update={"moving_obstacles": ()}))
-        # the schedule of moving obstacles is not for players: row 0 is where they are seen
-        n_moving = len(scenario.moving_obstacles)
-        self._arena = still._replace(
-            moving=build_arena(scenario).moving,
+        scenario = brief.as_scenario()
+        # row 0 is where moving obstacles are seen
+        n_moving = len(brief.moving_obstacles)
+        self._arena = build_arena(scenario)._replace(
             moving_path_m=np.zeros((1, n_moving, 3)),
             moving_velocity_mps=np.zeros((1, n_moving, 3)),
         )
-        self._scenario = scenario
-        n_uas = len(scenario.uas)
-        self._n_steps = min(max(round(_HORIZON_S / scenario.dt_s), 1), _STEPS_AT_MOST)
+        self._brief = brief
+        n_uas = len(brief.uas)
+        self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
         self._command = np.zeros(1, dtype=COMMAND_DTYPE)[0]
         self._plans = [empty_plan(self._n_steps) for _ in range(n_uas)]
-        for plan, uas in zip(self._plans, scenario.uas, strict=True):
+        for plan, uas in zip(self._plans, brief.uas, strict=True):
             plan.path_m[:] = uas.start_m
         self._trial = empty_plan(self._n_steps)
         self._is_flown = np.zeros(n_uas, np.bool_)
@@ -100,11 +99,11 @@ class Tour:
         self._keep_out_m = np.array(
             [
                 (o.radius_m + o.safe_distance_m, o.height_m / 2 + o.safe_distance_m)
-                for o in scenario.moving_obstacles
+                for o in brief.moving_obstacles
             ]
-        ).reshape(-1, 2) + (max(u.radius_m for u in scenario.uas) + _MOVING_MARGIN_M)
+        ).reshape(-1, 2) + (max(u.radius_m for u in brief.uas) + _MOVING_MARGIN_M)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self._schedule = Schedule(scenario, self._arena, self.options.moves)
+        self._schedule = Schedule(brief, self._arena, self.options.moves)
         self._find_order(self._view(World(scenario).swarm_state()), seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
@@ -117,7 +116,7 @@ class Tour:
         commands: dict[str, Command] = {}
         predicted_m: dict[str, FloatArray] = {}
         for i in np.flatnonzero(view.flies).tolist():
-            name = self._scenario.uas[i].name
+            name = self._brief.uas[i].name
             commands[name] = self._fly(i, view, others_m)
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
@@ -199,7 +198,7 @@ class Tour:
         return paths_m
 
     def _view(self, swarm: SwarmState) -> View:
-        names = [swarm.names.index(uas.name) for uas in self._scenario.uas]
+        names = [swarm.names.index(uas.name) for uas in self._brief.uas]
         x, flies = swarm.x[names], swarm.status[names] == FLYING
         self._state.x[:] = x
         self._state.uncovered[:] = swarm.uncovered

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.order import Effort, Legs, Order, Task, improved, no_order
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import Arena
 
@@ -53,15 +53,15 @@ class View:
 class Schedule:
     """The order of the swarm, kept up to date."""
 
-    def __init__(self, scenario: Scenario, arena: Arena, moves: int) -> None:
-        self.legs = Legs(scenario)
+    def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
+        self.legs = Legs(brief)
         self._arena = arena
         self._moves = moves
-        self._weight = np.array([w.weight for w in scenario.waypoints], float)
-        self._until_s = scenario.max_steps * scenario.dt_s
-        self.order = no_order(len(scenario.uas))
-        self._flown_s = np.full(len(scenario.uas), _PACE_KNOWN_S * _PACE)
-        self._legs_flown_s = np.full(len(scenario.uas), _PACE_KNOWN_S)
+        self._weight = np.array([w.weight for w in brief.waypoints], float)
+        self._until_s = brief.max_steps * brief.dt_s
+        self.order = no_order(len(brief.uas))
+        self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
+        self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""

@@ -20,7 +20,7 @@ from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import (
     DOD,
     VX,
@@ -40,29 +40,27 @@ _LONGEST_WAY_S = 900.0
 
 
 class ReturnHome:
-    """The guidance's ways home in a scenario.
+    """The guidance's ways home in a mission.
 
     Args:
-        scenario: the mission; what its moving obstacles are going to do is not looked at.
+        brief: the mission.
         margin_m: kept in addition to every safe distance.
         blocks: of the OCP; what of their rows the guidance breaks is not flown.
     """
 
-    def __init__(self, scenario: Scenario, margin_m: float, blocks: Sequence[Block] = OCP) -> None:
+    def __init__(self, brief: MissionBrief, margin_m: float, blocks: Sequence[Block] = OCP) -> None:
         self._blocks = blocks
         wider = [
             obstacle.model_copy(update={"safe_distance_m": obstacle.safe_distance_m + margin_m})
-            for obstacle in scenario.obstacles
+            for obstacle in brief.obstacles
         ]
-        fence = scenario.geofence
+        fence = brief.geofence
         fence = fence.model_copy(update={"margin_m": fence.margin_m + margin_m})
         self._arena = build_arena(
-            scenario.model_copy(
-                update={"obstacles": tuple(wider), "geofence": fence, "moving_obstacles": ()}
-            )
+            brief.model_copy(update={"obstacles": tuple(wider), "geofence": fence}).as_scenario()
         )
-        self._scenario = scenario
-        self._row = {uas.name: row for row, uas in enumerate(scenario.uas)}
+        self._brief = brief
+        self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
 
     def apply(
         self,
@@ -102,7 +100,7 @@ class ReturnHome:
 
     def _left_at_home_s(self, problem: PlanningProblem, swarm: SwarmState, uas: int) -> float:
         """Flight time that battery and mission still give once it is home; -inf: never there."""
-        rules, x = self._scenario, problem.x0[uas]
+        rules, x = self._brief, problem.x0[uas]
         per_s, most = dod_per_s(problem.vehicles[uas]), float(problem.dod_max[uas])
         clock_s = (rules.max_steps - swarm.step) * rules.dt_s
         roughly_s = 3.0 * seconds_home(problem.vehicles[uas], problem.home_m[uas] - x[:3])
@@ -123,7 +121,7 @@ class ReturnHome:
         self, problem: PlanningProblem, backup: Plan | None, uas: int, pursued_s: float
     ) -> Plan:
         """The backup trajectories with that of one UAS replaced by its way home."""
-        dt_s = self._scenario.dt_s
+        dt_s = self._brief.dt_s
         pursued = max(round(pursued_s / dt_s), 1)
         steps = pursued + int(np.ceil(BRAKING_S / dt_s))
         steps = steps if backup is None else max(steps, backup.u.shape[1])

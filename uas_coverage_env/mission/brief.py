@@ -1,0 +1,136 @@
+"""What a planner may know about a mission before it is flown."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.scenario import (
+    Decoration,
+    Geofence,
+    MovingObstacle,
+    Obstacle,
+    Scenario,
+    ScheduledVelocity,
+    Uas,
+    Waypoint,
+)
+from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.vehicle import VehicleParams
+
+
+class MovingObstacleBrief(StrictModel):
+    """A moving obstacle as a planner knows it: an upright cylinder, and where it is at t = 0.
+
+    Where it is later, and how fast, each `SwarmState` shows; its schedule stays with the world.
+
+    Attributes:
+        name: Unique among the moving obstacles.
+        kind: Free label.
+        radius_m: Radius [m].
+        height_m: Full height [m].
+        safe_distance_m: Kept from the cylinder in addition to the radius of the UAS [m].
+        start_m: Centre of the cylinder at t = 0, as the first `SwarmState` shows it [m].
+    """
+
+    name: str
+    kind: str | None
+    radius_m: float
+    height_m: float
+    safe_distance_m: float
+    start_m: tuple[float, float, float]
+
+
+class MissionBrief(StrictModel):
+    """Everything about a mission that a planner may know, and nothing that only the world knows.
+
+    The fields are those of `Scenario` under the same names. They are the whole list: a field that
+    `Scenario` gains is hidden until it is added here. Immutable, hashable, can be pickled.
+
+    Attributes:
+        schema_version: Version of the scenario's file format.
+        name: Name of the scenario.
+        dt_s: Length of a time step [s].
+        max_steps: Steps after which a flight ends.
+        landing_distance_m: A UAS this close to its start can land [m].
+        landing_speed_mps: ... when it is slower than this [m/s].
+        uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
+        geofence: The volume to stay in.
+        obstacles: Fixed obstacles.
+        moving_obstacles: Moving obstacles, without their schedules.
+        uas: The fleet, with home positions and charge at t = 0.
+        vehicles: The vehicle of each UAS, in their order.
+        waypoints: What is to be covered.
+        decorations: Drawn only.
+    """
+
+    schema_version: int
+    name: str
+    dt_s: float
+    max_steps: int
+    landing_distance_m: float
+    landing_speed_mps: float
+    uas_safe_distance_m: float
+    geofence: Geofence
+    obstacles: tuple[Obstacle, ...]
+    moving_obstacles: tuple[MovingObstacleBrief, ...]
+    uas: tuple[Uas, ...]
+    vehicles: tuple[VehicleParams, ...]
+    waypoints: tuple[Waypoint, ...]
+    decorations: tuple[Decoration, ...]
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_"):
+                return super().__getattr__(name)
+            raise AttributeError(
+                f"a MissionBrief has no {name!r}; it has {', '.join(type(self).model_fields)}, "
+                f"fence and hulls. To simulate the mission, take as_scenario()"
+            )
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> MissionBrief:
+        """The brief of a scenario."""
+        known = {name: getattr(scenario, name) for name in cls.model_fields}
+        known["moving_obstacles"] = tuple(
+            MovingObstacleBrief(
+                **{name: getattr(obstacle, name) for name in MovingObstacleBrief.model_fields}
+            )
+            for obstacle in scenario.moving_obstacles
+        )
+        return cls(**known)
+
+    @property
+    def fence(self) -> ConvexPolytope:
+        """The geofence as plane inequalities."""
+        return self.geofence.hull
+
+    @cached_property
+    def hulls(self) -> tuple[ConvexPolytope, ...]:
+        """One hull per fixed obstacle, in their order."""
+        return tuple(obstacle.hull for obstacle in self.obstacles)
+
+    def as_scenario(self) -> Scenario:
+        """A scenario to simulate: that of the brief, in which moving obstacles never move.
+
+        They stand at `start_m`. A planner that simulates more writes its own prediction of them
+        into the arrays that it simulates with.
+        """
+        return self._motionless
+
+    @cached_property
+    def _motionless(self) -> Scenario:
+        still = (ScheduledVelocity(from_s=0.0, velocity_mps=(0.0, 0.0, 0.0)),)
+        known = {name: getattr(self, name) for name in type(self).model_fields}
+        vehicles = known.pop("vehicles")
+        known["schema"] = known.pop("schema_version")
+        known["moving_obstacles"] = tuple(
+            MovingObstacle.model_construct(**obstacle.model_dump(), schedule=still)
+            for obstacle in self.moving_obstacles
+        )
+        # checked before, when the scenario was read; and a vehicle file may be elsewhere by now
+        scenario = Scenario.model_construct(**known)
+        vars(scenario)["vehicles"] = vehicles
+        return scenario
