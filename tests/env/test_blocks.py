@@ -22,6 +22,7 @@ from uas_coverage_env.env import (
     observation_bounds,
     observation_columns,
 )
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import VX, VY, X, Y
 
 BEACON = beacon(30.0, -20.0)
@@ -149,7 +150,7 @@ def test_a_planner_gets_the_same_observation_from_an_observer():
     ground = practice_ground(n_uas=2)
     env = uas_coverage_v0.parallel_env(ground, observation=OBSERVED)
     observations, _ = env.reset(seed=0)
-    observer = Observer(ground, OBSERVED)
+    observer = Observer(MissionBrief.of(ground), OBSERVED)
     np.testing.assert_array_equal(observer.observe(env.swarm_state()), list(observations.values()))
 
 

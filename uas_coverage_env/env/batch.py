@@ -282,6 +282,8 @@ class CoverageBatch:
             x=self.worlds.x[lane, :n_uas].copy(),
             reference_mps=self.worlds.reference[lane, :n_uas].copy(),
             status=self.worlds.status[lane, :n_uas].copy(),
+            departed=self.worlds.departed[lane, :n_uas].copy(),
+            returning=self.worlds.returning[lane, :n_uas].copy(),
             uncovered=self.worlds.uncovered[lane, : len(scenario.waypoints)].copy(),
             home_m=np.array([uas.start_m for uas in scenario.uas]),
             moving_position_m=np.array(scenario.moving_positions(time_s)).reshape(-1, 3),

@@ -12,17 +12,15 @@ from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import learners_sizes, tables_of
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.world import FLYING, SwarmState, build_arena, initial_state
+from uas_coverage_env.mission import MissionBrief, WorldView
+from uas_coverage_env.world import FLYING, SwarmState
 from uas_coverage_env.world.arena import ARENA
 
 
 class Observer:
     """Computes what the environments show, number for number, with their own kernel.
 
-    For a planner that flies a trained policy: one observer per mission, asked once per sample.
-    What a UAS observes once return mode has taken it over is its former observation: it decides
-    nothing.
+    For a planner that flies a trained policy: one observer per mission.
 
     Args:
         brief: The mission.
@@ -38,17 +36,10 @@ class Observer:
     ) -> None:
         settings = MissionSettings(observation=checked_blocks(observation))
         scenario = brief.as_scenario()
-        arena = build_arena(scenario)
-        # one row: where moving obstacles are seen
-        self._arena = arena._replace(
-            moving_path_m=arena.moving_path_m[:1].copy(),
-            moving_velocity_mps=arena.moving_velocity_mps[:1].copy(),
-        )
-        self._state = initial_state(scenario)
-        self._landing_distance_m = scenario.landing_distance_m
+        self._view = WorldView(brief)
         actions = actions_of(settings.action, scenario)
         self._tables = tables_of(scenario, actions)
-        sizes = ARENA.sizes_of(self._arena, learners_sizes(settings, actions.size))
+        sizes = ARENA.sizes_of(self._view.arena, learners_sizes(settings, actions.size))
         self._learners = LEARNERS.zeros(sizes)
         self._learners.targets[:] = NO_TARGET
         self._learners.candidates[:] = -1
@@ -62,27 +53,19 @@ class Observer:
         """What the UAS observe now.
 
         Args:
-            swarm: At this sample; every sample of a mission has to be shown, in order.
+            swarm: At this sample.
             targets: (U,) waypoints that they fly to, see `nearest`; None: none.
 
         Returns:
             (U, V), an array of its own; rows of UAS that do not fly stay.
         """
-        state = self._state
-        state.x[:] = swarm.x
-        state.status[:] = swarm.status
-        state.reference[:] = swarm.reference_mps
-        state.uncovered[:] = swarm.uncovered
-        state.step[0] = swarm.step
-        self._arena.moving_path_m[0] = swarm.moving_position_m
-        self._arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
-        away_m = np.linalg.norm(swarm.x[:, :3] - swarm.home_m, axis=1)
-        state.departed[:] |= away_m > self._landing_distance_m
+        self._view.update(swarm)
+        state = self._view.state
         count_company(state.uncovered, self._tables.neighbours, self._learners.company)
         self._learners.targets[:] = NO_TARGET if targets is None else targets
         flying = state.status == FLYING
         observe(
-            self._arena, state, self._tables, self._learners, self._observing, flying,
+            self._view.arena, state, self._tables, self._learners, self._observing, flying,
             self._observation,
         )  # fmt: skip
         return self._observation.copy()

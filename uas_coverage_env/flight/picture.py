@@ -80,6 +80,8 @@ def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState
         x=flight.x[now],
         reference_mps=np.zeros((len(flight.names), 2)),
         status=status,
+        departed=np.zeros(len(status), dtype=np.bool_),
+        returning=np.zeros(len(status), dtype=np.bool_),
         uncovered=uncovered,
         home_m=flight.x[0, :, 0:3],
         moving_position_m=flight.moving_position_m[now],

@@ -1,5 +1,6 @@
 """What planners and learners share: the brief of a mission, and what follows from it."""
 
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.views import WorldView, first_sight
 
-__all__ = ["MissionBrief", "MovingObstacleBrief"]
+__all__ = ["MissionBrief", "MovingObstacleBrief", "WorldView", "first_sight"]

@@ -177,6 +177,8 @@ class World:
             x=state.x.copy(),
             reference_mps=state.reference.copy(),
             status=state.status.copy(),
+            departed=state.departed.copy(),
+            returning=state.returning.copy(),
             uncovered=state.uncovered.copy(),
             home_m=self.arena.uas["home_m"].copy(),
             moving_position_m=self.arena.moving_path_m[sample].copy(),

@@ -55,6 +55,8 @@ class SwarmState:
         x: (U, 14) states, in the order of `vehicle.layout`.
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST.
+        departed: (U,) has been farther from its start than the landing distance.
+        returning: (U,) return mode has taken over: commands are replaced by the way home.
         uncovered: (W,) waypoint still to be covered.
         home_m: (U, 3) [m] the starts.
         moving_position_m: (M, 3) [m] centres of moving obstacles, now.
@@ -67,6 +69,8 @@ class SwarmState:
     x: NDArray[np.float64]
     reference_mps: NDArray[np.float64]
     status: NDArray[np.int64]
+    departed: NDArray[np.bool_]
+    returning: NDArray[np.bool_]
     uncovered: NDArray[np.bool_]
     home_m: NDArray[np.float64]
     moving_position_m: NDArray[np.float64]

@@ -11,8 +11,8 @@ from uas_coverage_agents.velocity.patience import Patience
 from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.world import Command, SwarmState, Velocity, World
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.world import Command, SwarmState, Velocity
 
 LAYOUT = "uas_coverage_v0"
 OUTPUTS = 3
@@ -54,7 +54,7 @@ class VelocityPilot:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile the observation."""
-        Observer(brief).observe(World(brief.as_scenario()).swarm_state())
+        Observer(brief).observe(first_sight(brief))
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; nothing is drawn."""

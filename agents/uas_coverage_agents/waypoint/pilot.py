@@ -24,8 +24,7 @@ from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Desk, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NOBODY, choose, next_to_decide
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     HOME,
@@ -33,10 +32,8 @@ from uas_coverage_env.world import (
     Command,
     GoTo,
     SwarmState,
-    World,
     WorldState,
     assistants,
-    build_arena,
 )
 from uas_coverage_env.world.state import STATE
 
@@ -90,17 +87,17 @@ class WaypointPilot:
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
         self.reset(brief, 0)
-        self.act(World(brief.as_scenario()).swarm_state())
+        self.act(first_sight(brief))
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; simulations draw from the seed."""
-        arena = build_arena(brief.as_scenario())
-        self._moving = arena.moving
-        self._still = arena._replace(
-            moving=arena.moving[:0], moving_path_m=_NOWHERE, moving_velocity_mps=_NOWHERE
+        self._view = WorldView(brief)
+        self._still = self._view.arena._replace(
+            moving=self._view.arena.moving[:0],
+            moving_path_m=_NOWHERE,
+            moving_velocity_mps=_NOWHERE,
         )
         self._legs = legs_of(self._still)
-        self._departed = np.zeros(len(brief.uas), dtype=np.bool_)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
@@ -130,12 +127,9 @@ class WaypointPilot:
 
     def _decide(self, swarm: SwarmState) -> None:
         """Let everybody choose who needs a target now."""
-        arena = self._still._replace(
-            moving=self._moving,
-            moving_path_m=swarm.moving_position_m[None].copy(),
-            moving_velocity_mps=swarm.moving_velocity_mps[None].copy(),
-        )
-        state = self._state(swarm)
+        self._view.update(swarm)
+        arena, state = self._view.arena, self._view.state
+        state.returning[:] |= self._returning
         desk = self._desk
         looked_ahead = self._simulations == 0
         while True:
@@ -166,16 +160,3 @@ class WaypointPilot:
         )  # fmt: skip
         self._plan, self._best = self._best, self._plan
         self._desk.candidates[:], self._desk.legal[:] = kept
-
-    def _state(self, swarm: SwarmState) -> WorldState:
-        away_m = np.linalg.norm(swarm.x[:, [X, Y, Z]] - swarm.home_m, axis=1)
-        self._departed |= away_m > self._still.rules["landing_distance_m"][0]
-        return WorldState(
-            x=swarm.x.copy(),
-            reference=swarm.reference_mps.copy(),
-            status=swarm.status.copy(),
-            departed=self._departed.copy(),
-            returning=self._returning.copy(),
-            uncovered=swarm.uncovered.copy(),
-            step=np.array([swarm.step]),
-        )

@@ -19,8 +19,8 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.world import Mode, SwarmState, World
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.world import Mode, SwarmState
 
 _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is left to visit
 
@@ -74,9 +74,7 @@ class MilpMpcGuided(MovingHorizon[Options]):
         self._builder = ProblemBuilder(brief, self.options)
         decision_s = self.options.threads * self.options.time_limit_s
         self._guide = OrderGuide(brief, self._builder, TourShape(), decision_s)
-        world = World(brief.as_scenario())
-        world.reset()
-        self._guide.begin(world.swarm_state(), seed)
+        self._guide.begin(first_sight(brief), seed)
         self._returning: set[str] = set()
 
     def mode(self, name: str) -> Mode:

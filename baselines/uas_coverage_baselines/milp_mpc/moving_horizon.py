@@ -19,9 +19,9 @@ from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
-from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, World, Wrench
+from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, Wrench
 
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
 
@@ -58,11 +58,9 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what a decision compiles, on the mission's first one."""
-        world = World(brief.as_scenario())
-        world.reset()
         rehearsal = self.rehearsal()
         rehearsal.reset(brief, 0)
-        swarm = world.swarm_state()
+        swarm = first_sight(brief)
         rehearsal.act(swarm)
         problem = rehearsal.problem(swarm)
         evasion(problem, brief.dt_s)

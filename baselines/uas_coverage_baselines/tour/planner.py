@@ -14,7 +14,7 @@ from uas_coverage_baselines.tour.pursuit import LEGS, Task, brake_seconds, empty
 from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     FLYING,
@@ -22,10 +22,7 @@ from uas_coverage_env.world import (
     GoTo,
     SwarmState,
     Velocity,
-    World,
-    build_arena,
     has_to_return,
-    initial_state,
 )
 
 FloatArray = NDArray[np.float64]
@@ -70,18 +67,12 @@ class Tour:
         """Compile everything."""
         quick = Tour(TourOptions(moves=10, changes=1))
         quick.reset(brief, 0)
-        quick.act(World(brief.as_scenario()).swarm_state())
+        quick.act(first_sight(brief))
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Search the order from the starts."""
-        scenario = brief.as_scenario()
-        # row 0 is where moving obstacles are seen
-        n_moving = len(brief.moving_obstacles)
-        self._arena = build_arena(scenario)._replace(
-            moving_path_m=np.zeros((1, n_moving, 3)),
-            moving_velocity_mps=np.zeros((1, n_moving, 3)),
-        )
-        self._brief = brief
+        self._world = WorldView(brief)
+        self._arena = self._world.arena
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
@@ -95,7 +86,6 @@ class Tour:
         self._reference_mps = np.zeros((n_uas, 2))
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._returns = np.zeros(n_uas, np.bool_)
-        self._state = initial_state(scenario)
         self._keep_out_m = np.array(
             [
                 (o.radius_m + o.safe_distance_m, o.height_m / 2 + o.safe_distance_m)
@@ -104,19 +94,17 @@ class Tour:
         ).reshape(-1, 2) + (max(u.radius_m for u in brief.uas) + _MOVING_MARGIN_M)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(brief, self._arena, self.options.moves)
-        self._find_order(self._view(World(scenario).swarm_state()), seed)
+        self._find_order(self._view(first_sight(brief)), seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Plan for each flying UAS, in order, and fly the first command of each plan."""
-        self._arena.moving_path_m[0] = swarm.moving_position_m
-        self._arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
         view = self._view(swarm)
         self._schedule.update(view)
         others_m = self._where_others_go(view)
         commands: dict[str, Command] = {}
         predicted_m: dict[str, FloatArray] = {}
         for i in np.flatnonzero(view.flies).tolist():
-            name = self._brief.uas[i].name
+            name = swarm.names[i]
             commands[name] = self._fly(i, view, others_m)
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
@@ -198,15 +186,12 @@ class Tour:
         return paths_m
 
     def _view(self, swarm: SwarmState) -> View:
-        names = [swarm.names.index(uas.name) for uas in self._brief.uas]
-        x, flies = swarm.x[names], swarm.status[names] == FLYING
-        self._state.x[:] = x
-        self._state.uncovered[:] = swarm.uncovered
-        self._state.step[0] = swarm.step
+        self._world.update(swarm)
+        flies = swarm.status == FLYING
         for i in np.flatnonzero(flies & ~self._returns):
-            self._returns[i] = has_to_return(self._arena, self._state, i)
+            self._returns[i] = has_to_return(self._arena, self._world.state, i)
         return View(
-            x=x,
+            x=swarm.x,
             may_work=flies & ~self._returns,
             flies=flies,
             uncovered=swarm.uncovered,

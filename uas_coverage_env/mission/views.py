@@ -1,0 +1,45 @@
+"""What a planner sees, as the arrays that the kernels of the world take."""
+
+from uas_coverage_env.mission.brief import MissionBrief
+from uas_coverage_env.world import SwarmState, World, build_arena, initial_state
+
+
+class WorldView:
+    """Arena and state of a mission as far as a planner sees them, for the world's kernels.
+
+    Moving obstacles are where they were seen last, at every sample.
+
+    Args:
+        brief: The mission.
+
+    Attributes:
+        arena: The mission as arrays; those of moving obstacles have one row, which `update` writes.
+        state: Arrays of its own, at t = 0 until the first `update`.
+    """
+
+    def __init__(self, brief: MissionBrief) -> None:
+        scenario = brief.as_scenario()
+        arena = build_arena(scenario)
+        self.arena = arena._replace(
+            moving_path_m=arena.moving_path_m[:1].copy(),
+            moving_velocity_mps=arena.moving_velocity_mps[:1].copy(),
+        )
+        self.state = initial_state(scenario)
+
+    def update(self, swarm: SwarmState) -> None:
+        """Write what is seen now into arena and state."""
+        state = self.state
+        state.x[:] = swarm.x
+        state.reference[:] = swarm.reference_mps
+        state.status[:] = swarm.status
+        state.departed[:] = swarm.departed
+        state.returning[:] = swarm.returning
+        state.uncovered[:] = swarm.uncovered
+        state.step[0] = swarm.step
+        self.arena.moving_path_m[0] = swarm.moving_position_m
+        self.arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
+
+
+def first_sight(brief: MissionBrief) -> SwarmState:
+    """What a planner will see at t = 0, with moving obstacles at rest, for what it does before."""
+    return World(brief.as_scenario()).swarm_state()
