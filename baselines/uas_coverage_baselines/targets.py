@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 
@@ -14,17 +14,7 @@ class Targets:
 
     def __init__(self, brief: MissionBrief) -> None:
         self._waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
-        # how near to the centre of a moving obstacle nobody should come
-        radius_m = max(uas.radius_m for uas in brief.uas)
-        self._keep_out_m = np.array(
-            [
-                (
-                    obstacle.radius_m + obstacle.safe_distance_m + radius_m,
-                    obstacle.height_m / 2 + obstacle.safe_distance_m + radius_m,
-                )
-                for obstacle in brief.moving_obstacles
-            ]
-        ).reshape(-1, 2)
+        self._view = WorldView(brief)
         self._target: dict[str, int] = {}
 
     def commands(
@@ -38,7 +28,8 @@ class Targets:
         """
         if not swarm.uncovered.any():
             return {name: GoTo(None) for name in swarm.active}
-        free = swarm.uncovered & ~self._blocked(swarm)
+        self._view.update(swarm)
+        free = swarm.uncovered & ~self._view.blocked()
         self._target = {
             name: target
             for name, target in self._target.items()
@@ -66,10 +57,3 @@ class Targets:
             if candidates.any():
                 return candidates
         return swarm.uncovered
-
-    def _blocked(self, swarm: SwarmState) -> NDArray[np.bool_]:
-        """(W,) whether a moving obstacle is now where the waypoint is."""
-        offset_m = np.abs(self._waypoints_m[:, None] - swarm.moving_position_m)
-        beside_m = np.hypot(offset_m[..., 0], offset_m[..., 1])
-        inside = (beside_m < self._keep_out_m[:, 0]) & (offset_m[..., 2] < self._keep_out_m[:, 1])
-        return np.asarray(inside.any(axis=1))

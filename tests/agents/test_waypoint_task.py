@@ -23,10 +23,10 @@ from uas_coverage_agents.waypoint.team import (
     NOBODY,
     NOT_HOME,
     TIME,
-    find_blocked,
 )
 from waypoint_missions import town, with_something_parked
 
+from uas_coverage_env.mission import find_blocked
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import assistants, build_arena, initial_state
 from uas_coverage_env.world.pool import pool_worlds
@@ -153,7 +153,7 @@ def test_what_something_parks_on_comes_last_and_is_covered_once_it_left():
     scenario = SCENARIOS[3]
     arena = build_arena(scenario)
     blocked = np.zeros(len(scenario.waypoints), dtype=bool)
-    find_blocked(arena, 0, blocked)
+    find_blocked(arena, 0, 0.0, 0.0, 0.0, blocked)
     assert list(np.flatnonzero(blocked)) == [4]
     teams = Teams([3])
     while teams.lanes.decider[0] != NOBODY:

@@ -1,6 +1,7 @@
 """What planners and learners share: the brief of a mission, and what follows from it."""
 
+from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.views import WorldView, first_sight
 
-__all__ = ["MissionBrief", "MovingObstacleBrief", "WorldView", "first_sight"]
+__all__ = ["MissionBrief", "MovingObstacleBrief", "WorldView", "find_blocked", "first_sight"]

@@ -1,5 +1,9 @@
 """What a planner sees, as the arrays that the kernels of the world take."""
 
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.world import SwarmState, World, build_arena, initial_state
 
@@ -38,6 +42,18 @@ class WorldView:
         state.step[0] = swarm.step
         self.arena.moving_path_m[0] = swarm.moving_position_m
         self.arena.moving_velocity_mps[0] = swarm.moving_velocity_mps
+
+    def blocked(
+        self, level_share: float = 0.0, up_share: float = 0.0, margin_m: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Which waypoints moving obstacles block now; the arguments are those of `find_blocked`.
+
+        Returns:
+            (W,).
+        """
+        blocked = np.zeros(len(self.state.uncovered), np.bool_)
+        find_blocked(self.arena, 0, level_share, up_share, margin_m, blocked)
+        return blocked
 
 
 def first_sight(brief: MissionBrief) -> SwarmState:

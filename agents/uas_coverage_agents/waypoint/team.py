@@ -1,7 +1,5 @@
 """A team from decision to decision: who needs a target, and the flight until somebody does."""
 
-import math
-
 import numpy as np
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE
@@ -13,6 +11,7 @@ from uas_coverage_agents.waypoint.look import (
     look,
 )
 from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.mission import find_blocked
 from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world import (
     FLYING,
@@ -30,28 +29,6 @@ ENERGY, TIME, FILTERED, LOST_UAS, NOT_HOME, LEFT = range(6)
 which the filter changed the command; at the end: UAS lost, UAS in the air, waypoints left."""
 
 ACCOUNT_SIZE = LEFT + 1
-
-
-@allocating_kernel
-def find_blocked(arena, step, blocked):
-    """Mark in `blocked` (W,) the waypoints that moving obstacles keep everybody out of now."""
-    blocked[:] = False
-    sample = min(step, arena.moving_path_m.shape[0] - 1)
-    radius_m = 0.0
-    for i in range(arena.uas.shape[0]):
-        radius_m = max(radius_m, arena.uas[i].radius_m)
-    for m in range(arena.moving.shape[0]):
-        moving = arena.moving[m]
-        centre_m = arena.moving_path_m[sample, m]
-        keep_m = moving.safe_distance_m + radius_m
-        for w in range(blocked.shape[0]):
-            at_m = arena.waypoints[w].position_m
-            beside_m = math.hypot(at_m[0] - centre_m[0], at_m[1] - centre_m[1])
-            if (
-                beside_m < moving.radius_m + keep_m
-                and abs(at_m[2] - centre_m[2]) < moving.half_height_m + keep_m
-            ):
-                blocked[w] = True
 
 
 @allocating_kernel
@@ -94,7 +71,7 @@ def next_to_decide(
         Index of the UAS, or NOBODY.
     """
     if arena.moving.shape[0] > 0:
-        find_blocked(arena, state.step[0], blocked)
+        find_blocked(arena, state.step[0], 0.0, 0.0, 0.0, blocked)
     n_uas = targets.shape[0]
     for i in range(n_uas):
         if state.status[i] == FLYING and return_mode and not state.returning[i]:

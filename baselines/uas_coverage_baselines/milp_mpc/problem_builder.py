@@ -20,7 +20,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 )
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_env.geometry import inner_factor
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model, return_threshold
 from uas_coverage_env.world import SwarmState
 
@@ -32,6 +32,7 @@ class ProblemBuilder:
 
     def __init__(self, brief: MissionBrief, options: MovingHorizonOptions) -> None:
         self.brief, self._options = brief, options
+        self._view = WorldView(brief)
         self.dt_s = brief.dt_s
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self.home_m = {uas.name: np.array(uas.start_m, float) for uas in brief.uas}
@@ -79,16 +80,11 @@ class ProblemBuilder:
 
     def blocked_waypoints(self, swarm: SwarmState) -> set[int]:
         """Waypoints whose whole inner polyhedron lies in a moving obstacle's keep-out, now."""
-        blocked: set[int] = set()
-        for row, obstacle in enumerate(self.brief.moving_obstacles):
-            keep_out = obstacle.safe_distance_m + max(u.radius_m for u in self.brief.uas)
-            away = np.abs(self.waypoints_m - swarm.moving_position_m[row])
-            reach = self._waypoint_reach_m
-            level = np.hypot(away[:, 0] + reach, away[:, 1] + reach)
-            inside = level < obstacle.radius_m + keep_out
-            inside &= away[:, 2] + reach < 0.5 * obstacle.height_m + keep_out
-            blocked |= set(np.flatnonzero(inside).tolist())
-        return blocked
+        self._view.update(swarm)
+        # its faces are `up` of the radius away, its upright edges `level` of it
+        up = inner_factor(self._options.waypoint_sides, 3)
+        level = inner_factor(self._options.waypoint_sides, 2)
+        return set(np.flatnonzero(self._view.blocked(level, up)).tolist())
 
     def problem(
         self,

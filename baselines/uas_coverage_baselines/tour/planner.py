@@ -30,6 +30,7 @@ _HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improv
 _STEPS_AT_MOST = 60
 _COVERED_WITHIN_M = 0.3  # nearer than the radius by this, or by a fiftieth of it
 _NEAR = 0.7  # share of the radius at which the leg to a waypoint is expected to end
+_FROM_WITHIN = 0.8  # share of the radius from within which a waypoint is covered, beside what moves
 _WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
 _PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putting one off
 _MOVING_MARGIN_M = 6.0
@@ -86,12 +87,6 @@ class Tour:
         self._reference_mps = np.zeros((n_uas, 2))
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._returns = np.zeros(n_uas, np.bool_)
-        self._keep_out_m = np.array(
-            [
-                (o.radius_m + o.safe_distance_m, o.height_m / 2 + o.safe_distance_m)
-                for o in brief.moving_obstacles
-            ]
-        ).reshape(-1, 2) + (max(u.radius_m for u in brief.uas) + _MOVING_MARGIN_M)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(brief, self._arena, self.options.moves)
         self._find_order(self._view(first_sight(brief)), seed)
@@ -195,16 +190,6 @@ class Tour:
             may_work=flies & ~self._returns,
             flies=flies,
             uncovered=swarm.uncovered,
-            blocked=self._blocked(swarm),
+            blocked=self._world.blocked(_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M),
             time_s=swarm.time_s,
         )
-
-    def _blocked(self, swarm: SwarmState) -> NDArray[np.bool_]:
-        """(W,) whether a moving obstacle keeps everybody from covering the waypoint, now."""
-        away_m = np.abs(self._arena.waypoints["position_m"][:, None] - swarm.moving_position_m)
-        reach_m = 0.8 * self._radius_m[:, None]
-        beside_m = np.hypot(away_m[..., 0], away_m[..., 1])
-        inside = (beside_m < self._keep_out_m[:, 0] - reach_m) & (
-            away_m[..., 2] < self._keep_out_m[:, 1] - reach_m
-        )
-        return np.asarray(inside.any(axis=1))
