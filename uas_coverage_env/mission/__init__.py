@@ -2,6 +2,15 @@
 
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.range import Range, ReturnEstimate
 from uas_coverage_env.mission.views import WorldView, first_sight
 
-__all__ = ["MissionBrief", "MovingObstacleBrief", "WorldView", "find_blocked", "first_sight"]
+__all__ = [
+    "MissionBrief",
+    "MovingObstacleBrief",
+    "Range",
+    "ReturnEstimate",
+    "WorldView",
+    "find_blocked",
+    "first_sight",
+]

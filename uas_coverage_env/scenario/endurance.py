@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.vehicle import VehicleParams
+from uas_coverage_env.vehicle import VehicleParams, battery_current_A
 
 if TYPE_CHECKING:
     from uas_coverage_env.scenario.model import Scenario
@@ -83,10 +83,7 @@ def _air_time_s(vehicle: VehicleParams, soc_0: float, dod_max: float) -> float:
     dod = np.linspace(1.0 - soc_0, dod_max, 33)
     voltage_V = float(np.interp(dod, battery.ocv_dod, battery.ocv_V).mean())
     resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    power_W = _POWER * vehicle.power.hover_W
-    # U I - R I² = P; a battery too weak for that gives its largest power, at I = U / 2R
-    root = math.sqrt(max(voltage_V**2 - 4.0 * resistance_ohm * power_W, 0.0))
-    current_A = (voltage_V - root) / (2.0 * resistance_ohm)
+    current_A = battery_current_A(voltage_V, resistance_ohm, _POWER * vehicle.power.hover_W)
     return (dod_max - (1.0 - soc_0)) * battery.capacity_Ah * 3600.0 / current_A
 
 

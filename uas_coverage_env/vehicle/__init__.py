@@ -61,6 +61,11 @@ from uas_coverage_env.vehicle.params import (
     vehicle_names,
 )
 from uas_coverage_env.vehicle.plant import plant_step
+from uas_coverage_env.vehicle.range import (
+    dod_per_s,
+    margin_to_land,
+    seconds_to_land,
+)
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
 
@@ -101,6 +106,7 @@ __all__ = [
     "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
+    "dod_per_s",
     "endurance",
     "exact_delta_thrust",
     "fit_thrust_correction",
@@ -112,11 +118,13 @@ __all__ = [
     "load_vehicle",
     "lpv_step",
     "make_vehicle",
+    "margin_to_land",
     "open_circuit_V",
     "open_circuit_voltage",
     "plant_step",
     "reseed_reference",
     "return_threshold",
+    "seconds_to_land",
     "simulate_battery",
     "vehicle_names",
     "velocity_climb_wrench",

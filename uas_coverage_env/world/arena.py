@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.memory import Memory
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
+from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
 from uas_coverage_env.world.boxes import N_COLUMNS, SURE_M, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
@@ -260,23 +260,10 @@ def _uas(scenario: Scenario) -> NDArray[np.void]:
                 limits.v_xy_max_mps,
                 limits.v_up_max_mps,
                 limits.v_down_max_mps,
-                _dod_per_s(vehicle, entry.dod_max),
+                dod_per_s(vehicle, entry.dod_max),  # the battery is nearly empty then
             )
         )
     return np.array(rows, dtype=UAS_DTYPE)
-
-
-def _dod_per_s(vehicle: VehicleParams, dod_max: float) -> float:
-    """Depth of discharge per second of fast flight [1/s], with the battery nearly empty."""
-    battery = vehicle.battery
-    drag_N = vehicle.thrust_correction.speed_N_per_mps * vehicle.limits.v_xy_max_mps
-    power_W = vehicle.power.hover_W + vehicle.power.slope_W_per_N * drag_N
-    ocv_V = float(np.interp(dod_max, battery.ocv_dod, battery.ocv_V))
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    # U I - R I² = P; where no current gives that power, the largest power does
-    root = math.sqrt(max(ocv_V**2 - 4.0 * resistance_ohm * power_W, 0.0))
-    current_A = (ocv_V - root) / (2.0 * resistance_ohm)
-    return current_A / (3600.0 * battery.capacity_Ah)
 
 
 def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np.void]:

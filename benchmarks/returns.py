@@ -1,0 +1,188 @@
+"""What coming home takes, estimated and flown: returns of a UAS from anywhere in a town.
+
+    python benchmarks/returns.py
+    python benchmarks/returns.py --towns 40 --dynamics nonlinear
+
+A town of a seed is a generated scenario, its steps 0.5 or 1 s long, with one UAS (even seeds
+s500_v2, odd ones hexacopter). For each of its returns the UAS is put at rest at a drawn place and
+altitude with a drawn depth of discharge of 0 to 0.6, flies towards a drawn waypoint for 0 to 14
+steps, and then home (`GoTo(None)`), past the fixed obstacles, until it has landed. Nothing else is
+in the air.
+
+Compared are time and depth of discharge from the moment it turns home with what was estimated then:
+
+- `Range`: `uas_coverage_env.mission.Range`, expected, and with its margin;
+- return mode: what return mode of the world allows for;
+- milp-mpc: what the planner's battery reserve allows for, without its allowance for braking.
+
+Errors are flown less estimated. Exits 0 where fewer than 1 in 200 returns took longer, or more
+charge, than `Range` with its margin, 1 otherwise, 2 where the input is bad.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, cast, get_args
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+from uas_coverage_baselines.milp_mpc.energy import dod_per_s as milp_dod_per_s
+from uas_coverage_baselines.milp_mpc.energy import seconds_home as milp_seconds_home
+
+from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
+from uas_coverage_env.mission import Range
+from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import LANDED, Dynamics, seconds_home
+
+RETURNS_OF_A_TOWN = 5
+_NEAREST_M = 15.0
+_FROM_WALLS_M = 6.0
+_FROM_FENCE_M = 6.0
+_ALTITUDES_M = (3.0, 45.0)
+_DEEPEST = 0.6
+_ASIDE_STEPS = 15
+_ALLOWED = 1 / 200
+
+
+@dataclass(frozen=True)
+class Return:
+    """One flown return.
+
+    Attributes:
+        scenario: The town.
+        x: (14,) the state in which it turned home.
+        time_s: Flown until it had landed [s].
+        dod: Used until then [-].
+    """
+
+    scenario: Scenario
+    x: NDArray[np.float64]
+    time_s: float
+    dod: float
+
+
+def town(seed: int) -> Scenario:
+    """A generated town with one UAS, the battery of which ends no return."""
+    rng = np.random.default_rng([seed, 14])
+    counts = int(rng.integers(4, 100)), int(rng.integers(0, 25))
+    made = generate_scenario(seed, n_uas=4, n_waypoints=counts[0], n_obstacles=counts[1])
+    uas = made.uas[0].model_copy(
+        update={"vehicle": ("s500_v2", "hexacopter")[seed % 2], "soc_0": 1.0, "dod_max": 0.89}
+    )
+    dt_s = float(rng.choice([0.5, 1.0]))
+    return made.model_copy(update={"uas": (uas,), "max_steps": 4000, "dt_s": dt_s})
+
+
+def _place(scenario: Scenario, rng: np.random.Generator) -> NDArray[np.float64]:
+    corners_m = scenario.fence.vertices_m
+    while True:
+        place_m = rng.uniform(corners_m.min(axis=0), corners_m.max(axis=0))
+        place_m[2] = -rng.uniform(*_ALTITUDES_M)
+        from_home_m = np.linalg.norm((place_m - scenario.uas[0].start_m)[:2])
+        if (
+            from_home_m > _NEAREST_M
+            and scenario.fence.signed_distance(place_m) < -_FROM_FENCE_M
+            and all(hull.signed_distance(place_m) > _FROM_WALLS_M for hull in scenario.hulls)
+        ):
+            return place_m
+
+
+def flown_returns(seed: int, dynamics: Dynamics = "lpv") -> Iterator[Return]:
+    """The returns of a town.
+
+    Raises:
+        RuntimeError: A UAS did not come home.
+    """
+    scenario = town(seed)
+    rng = np.random.default_rng([seed, 15])
+    world = World(scenario, dynamics=dynamics)
+    name, state = world.names[0], world.state
+    for _ in range(RETURNS_OF_A_TOWN):
+        world.reset()
+        state.x[0, :3] = _place(scenario, rng)
+        state.x[0, DOD] = rng.uniform(0.0, _DEEPEST)
+        state.departed[0] = True
+        aside = GoTo(int(rng.integers(len(scenario.waypoints))))
+        for _ in range(int(rng.integers(_ASIDE_STEPS))):
+            world.step({name: aside})
+        x, turned_s = state.x[0].copy(), world.time_s
+        while not world.done and world.time_s < scenario.max_steps * scenario.dt_s:
+            world.step({name: GoTo(None)})
+        if state.status[0] != LANDED:
+            raise RuntimeError(f"the UAS of town {seed} did not come home from {x[:3].tolist()}")
+        yield Return(scenario, x, world.time_s - turned_s, float(state.x[0, DOD] - x[DOD]))
+
+
+COLUMNS = ("Range", "Range with margin", "return mode", "milp-mpc")
+
+
+def estimates(flown: Return) -> tuple[list[float], list[float]]:
+    """Time [s] and depth of discharge that the estimators of `COLUMNS` give."""
+    scenario, x = flown.scenario, flown.x
+    brief, world = MissionBrief.of(scenario), World(scenario)
+    home = Range(brief).home(0, x)
+    called_s = float(seconds_home(world.arena, 0, x))
+    vehicle = brief.vehicles[0]
+    planned_s = milp_seconds_home(vehicle, x[:3] - np.array(brief.uas[0].start_m))
+    return (
+        [home.time_s, home.time_s + home.time_margin_s, called_s, planned_s],
+        [
+            home.dod,
+            home.dod + home.dod_margin,
+            called_s * float(world.arena.uas["dod_per_s"][0]),
+            planned_s * milp_dod_per_s(vehicle),
+        ],
+    )
+
+
+def _table(title: str, errors: NDArray[np.float64], digits: int) -> Table:
+    table = Table(title=title)
+    for column in ("estimate", "too low", "least", "5 %", "median", "95 %", "99 %", "largest"):
+        table.add_column(column)
+    for name, error in zip(COLUMNS, errors.T, strict=True):
+        spread = np.percentile(error, [0, 5, 50, 95, 99, 100])
+        low = f"{(error > 0.0).sum()} of {len(error)}"
+        table.add_row(name, low, *(f"{value:+.{digits}f}" for value in spread))
+    return table
+
+
+def main(
+    towns: Annotated[int, typer.Option(min=1, help="How many towns, five returns each.")] = 200,
+    first_seed: Annotated[int, typer.Option(min=0, help="Of the towns.")] = 2000,
+    dynamics: Annotated[str, typer.Option(help="lpv or nonlinear.")] = "lpv",
+) -> None:
+    """Fly returns and print by how much estimates of time and charge err."""
+    if dynamics not in get_args(Dynamics):
+        raise InputError(f"unknown dynamics {dynamics!r}; allowed: {', '.join(get_args(Dynamics))}")
+    times, charges, ways_m = [], [], []
+    for seed in range(first_seed, first_seed + towns):
+        for flown in flown_returns(seed, cast(Dynamics, dynamics)):
+            estimated_s, estimated_dod = estimates(flown)
+            times.append(flown.time_s - np.array(estimated_s))
+            charges.append(100.0 * (flown.dod - np.array(estimated_dod)))
+            ways_m.append(np.linalg.norm((flown.x[:3] - flown.scenario.uas[0].start_m)[:2]))
+    console = Console()
+    console.width = max(console.width, 110)
+    console.print(
+        f"{len(times)} returns ({dynamics}) from {min(ways_m):.0f} to {max(ways_m):.0f} m away"
+    )
+    console.print(_table("time: flown less estimated [s]", np.array(times), 1))
+    console.print(_table("depth of discharge: flown less estimated [%]", np.array(charges), 2))
+    short = (np.array(times)[:, 1] > 0.0) | (np.array(charges)[:, 1] > 0.0)
+    raise typer.Exit(0 if short.mean() < _ALLOWED else 1)
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(main)
+    try:
+        app()
+    except InputError as error:
+        sys.stderr.write(f"error: {error}\n")
+        sys.exit(2)
