@@ -31,13 +31,12 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from uas_coverage_baselines.milp_mpc.energy import dod_per_s as milp_dod_per_s
-from uas_coverage_baselines.milp_mpc.energy import seconds_home as milp_seconds_home
+from uas_coverage_baselines.milp_mpc.model.energy import seconds_home as milp_seconds_home
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
 from uas_coverage_env.mission import Range
 from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, dod_per_s
 from uas_coverage_env.world import LANDED, Dynamics, seconds_home
 
 RETURNS_OF_A_TOWN = 5
@@ -136,7 +135,7 @@ def estimates(flown: Return) -> tuple[list[float], list[float]]:
             home.dod,
             home.dod + home.dod_margin,
             called_s * float(world.arena.uas["dod_per_s"][0]),
-            planned_s * milp_dod_per_s(vehicle),
+            planned_s * dod_per_s(vehicle, brief.uas[0].dod_max),
         ],
     )
 

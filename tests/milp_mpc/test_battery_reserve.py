@@ -9,14 +9,24 @@ from hypothesis import strategies as st
 from toy_problems import S500, box, feasible, flight, flown, state, toy, written
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.model.blocks import BatteryReserve, Capabilities, Dynamics
-from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import cost_per_s, short_s
-from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
+from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
+    _ALLOWANCE_S,
+    cost_per_s,
+    short_s,
+)
+from uas_coverage_baselines.milp_mpc.model.energy import seconds_home
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import (
+    DOD,
+    compile_vehicle,
+    dod_per_s,
+    load_vehicle,
+    seconds_to_land,
+)
 
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
 SKY = box((-2000.0, -2000.0, -100.0), (2000.0, 2000.0, 0.0))
@@ -30,7 +40,7 @@ def with_seconds_to_spare(seconds, horizon=9, **fields):
     x0[DOD] = 0.5
     problem = toy(x0, horizon=horizon, fence=SKY, home_m=HOME, dod_max=0.75, **fields)
     room = -short_s(problem, 0, x0)
-    x0[DOD] += (room - seconds) * dod_per_s(S500)
+    x0[DOD] += (room - seconds) * dod_per_s(S500, 0.75)
     return dataclasses.replace(problem, x0=x0[None])
 
 
@@ -57,9 +67,18 @@ def test_the_way_home_is_never_estimated_shorter_by_the_rows_than_by_the_modes(a
     x = state(np.array(HOME[0]) + away, dod=0.3)
     problem = toy(x, fence=SKY, home_m=HOME)
     way_s = seconds_home(S500, np.array(away))
-    spent_s = (0.3 - 0.75) / dod_per_s(S500)
+    spent_s = (0.3 - 0.75) / dod_per_s(S500, 0.75)
     assert short_s(problem, 0, x, allowance=False) >= way_s + spent_s - 1e-6
     assert short_s(problem, 0, x, allowance=False) <= 1.1 * way_s + spent_s
+
+
+@pytest.mark.parametrize("height_m", [0.0, 15.0, 40.0])
+@pytest.mark.parametrize("vehicle", [S500, load_vehicle("hexacopter")])
+def test_the_reserve_is_no_shorter_than_the_calibrated_way_home_from_a_hover(vehicle, height_m):
+    record = compile_vehicle(vehicle, 1.0)[()]
+    for way_m in np.arange(50.0, 800.0, 50.0):
+        allowed_s = seconds_home(vehicle, np.array([way_m, 0.0, -height_m])) + _ALLOWANCE_S
+        assert allowed_s > seconds_to_land(record, way_m, 0.0, height_m)
 
 
 def test_a_battery_that_suffices_whatever_is_flown_needs_no_rows():

@@ -11,6 +11,7 @@ from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.world import Velocity, World, Wrench
 
@@ -250,7 +251,7 @@ def test_a_reset_forgets_the_last_mission(garden):
     first = made.act(world.swarm_state())
     fly(world, made, 1)
     world.reset()
-    made.reset(garden, 0)
+    made.reset(MissionBrief.of(garden), 0)
     assert made.last_decision is None
     assert made.act(world.swarm_state()) == first
 

@@ -32,17 +32,22 @@ def keep_out_holds(brief, kite_m, points_m, margin_m=0.0):
     return bool((beside & (away_m[:, 2] < HALF_HEIGHT_M + keep_m)).all())
 
 
-def seen_with_kite_at(brief, kite_m):
+@pytest.fixture(scope="module")
+def seen_with_kite_at(brief):
     view, swarm = WorldView(brief), first_sight(brief)
-    swarm.moving_position_m[0] = kite_m
-    view.update(swarm)
-    return view
+
+    def seen(kite_m):
+        swarm.moving_position_m[0] = kite_m
+        view.update(swarm)
+        return view
+
+    return seen
 
 
 @pytest.mark.parametrize("shares", [(0.0, 0.0), (0.8, 0.8), (0.6, 0.3)])
 @pytest.mark.parametrize("margin_m", [0.0, 6.0])
 def test_it_is_blocked_while_the_keep_out_holds_every_place_to_cover_it_from(
-    brief, shares, margin_m
+    brief, seen_with_kite_at, shares, margin_m
 ):
     rng = np.random.default_rng(5)
     turn = np.linspace(0.0, 2.0 * np.pi, 721)
@@ -56,7 +61,7 @@ def test_it_is_blocked_while_the_keep_out_holds_every_place_to_cover_it_from(
         edge = np.vstack(
             [np.column_stack([level_m * ring, np.full(len(ring), s * up_m)]) for s in (-1.0, 1.0)]
         )
-        blocked = seen_with_kite_at(brief, kite_m).blocked(*shares, margin_m)
+        blocked = seen_with_kite_at(kite_m).blocked(*shares, margin_m)
         held = keep_out_holds(brief, kite_m, waypoint.position_m + edge, margin_m)
         assert blocked[w] == held
         seen.add(held)
@@ -68,8 +73,8 @@ def test_nothing_is_blocked_where_nothing_moves(brief):
     assert not WorldView(alone).blocked().any()
 
 
-def test_what_was_blocked_opens_once_the_obstacle_has_left(brief):
+def test_what_was_blocked_opens_once_the_obstacle_has_left(brief, seen_with_kite_at):
     here_m = np.array(brief.waypoints[4].position_m)
-    assert seen_with_kite_at(brief, here_m).blocked()[4]
+    assert seen_with_kite_at(here_m).blocked()[4]
     above_m = here_m - (0.0, 0.0, 40.0)
-    assert not seen_with_kite_at(brief, above_m).blocked()[4]
+    assert not seen_with_kite_at(above_m).blocked()[4]

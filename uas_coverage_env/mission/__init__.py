@@ -2,7 +2,7 @@
 
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
-from uas_coverage_env.mission.range import Range, ReturnEstimate
+from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.views import WorldView, first_sight
 
 __all__ = [
@@ -13,4 +13,5 @@ __all__ = [
     "WorldView",
     "find_blocked",
     "first_sight",
+    "seconds_home",
 ]

@@ -59,8 +59,7 @@ def dod_per_s(vehicle: VehicleParams, dod: float) -> float:
         vehicle: Parameters.
         dod: Depth of discharge at which it flies; deeper, the same power takes more current.
     """
-    battery = vehicle.battery
     drag_N = vehicle.thrust_correction.speed_N_per_mps * vehicle.limits.v_xy_max_mps
     power_W = vehicle.power.hover_W + vehicle.power.slope_W_per_N * drag_N
-    current_A = steady_current_A(battery, dod, power_W)
-    return current_A / (3600.0 * battery.capacity_Ah)
+    current_A = steady_current_A(vehicle.battery, dod, power_W)
+    return current_A / (3600.0 * vehicle.battery.capacity_Ah)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
-from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
+from uas_coverage_baselines.milp_mpc.model.energy import seconds_home
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.model.problem import (
     MovingHull,
@@ -21,7 +21,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model, return_threshold
+from uas_coverage_env.vehicle import DOD, VehicleParams, dod_per_s, linear_model, return_threshold
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -63,7 +63,8 @@ class ProblemBuilder:
 
     def seconds_left(self, name: str, dod: float) -> float:
         """Flight time until DoD_max, at the pace of cruising."""
-        return (self._uas[name].dod_max - dod) / dod_per_s(self._vehicles[name])
+        dod_max = self._uas[name].dod_max
+        return (dod_max - dod) / dod_per_s(self._vehicles[name], dod_max)
 
     def seconds_home(self, name: str, position_m: FloatArray) -> float:
         """Flight time home, with a detour and the landing, see `energy`."""

@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, brake, prolonged
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
-from uas_coverage_baselines.milp_mpc.model.energy import dod_per_s, seconds_home
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, seconds_home
 from uas_coverage_env.vehicle import (
     DOD,
     VX,
     VZ,
     compile_vehicle,
+    dod_per_s,
     lpv_step,
     reseed_reference,
     velocity_climb_wrench,
@@ -101,9 +101,10 @@ class ReturnHome:
     def _left_at_home_s(self, problem: PlanningProblem, swarm: SwarmState, uas: int) -> float:
         """Flight time that battery and mission still give once it is home; -inf: never there."""
         rules, x = self._brief, problem.x0[uas]
-        per_s, most = dod_per_s(problem.vehicles[uas]), float(problem.dod_max[uas])
+        most = float(problem.dod_max[uas])
+        per_s = dod_per_s(problem.vehicles[uas], most)
         clock_s = (rules.max_steps - swarm.step) * rules.dt_s
-        roughly_s = 3.0 * seconds_home(problem.vehicles[uas], problem.home_m[uas] - x[:3])
+        roughly_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
         left_s = min((most - float(x[DOD])) / per_s, clock_s) - roughly_s
         if left_s > _RESERVE_S:
             return left_s

@@ -1,4 +1,8 @@
-"""What the way home takes: flight time and charge, estimated on the safe side."""
+"""What the way home takes, linear in the place: flight time, estimated on the safe side.
+
+How far on the safe side: docs/range.md. What a second takes from the battery is `dod_per_s` of the
+vehicle, at the depth of discharge at which the flight has to end.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +17,6 @@ SPEED_SHARE = 0.9
 """Of the speed limit, kept up on average."""
 LANDING_S = 6.0
 """Coming to rest above the landing site."""
-PACE = 1.1
-"""Power on the way over power in hover."""
-
-
-def dod_per_s(vehicle: VehicleParams) -> float:
-    """Depth of discharge that a second of cruising takes [1/s]."""
-    energy_J = 3600.0 * vehicle.battery.capacity_Ah * vehicle.battery.voltage_nominal_V
-    return PACE * vehicle.power.hover_W / energy_J
 
 
 def seconds_home(vehicle: VehicleParams, away_m: NDArray[np.float64]) -> float:

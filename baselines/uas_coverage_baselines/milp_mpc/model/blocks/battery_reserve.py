@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.model.energy import DETOUR, LANDING_S, SPEED_SHARE, dod_per_s
+from uas_coverage_baselines.milp_mpc.model.energy import DETOUR, LANDING_S, SPEED_SHARE
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.vehicle import DELTA_THRUST, DOD, U_TH, LinearModel
+from uas_coverage_env.vehicle import DELTA_THRUST, DOD, U_TH, LinearModel, dod_per_s
 
 FloatArray = NDArray[np.float64]
 _BATTERY = [DOD, U_TH]
@@ -42,7 +42,7 @@ class BatteryReserve:
         """Add the rows and the cost of each UAS whose reserve could fall short."""
         for uas, name in enumerate(problem.names):
             vehicle, model = problem.vehicles[uas], problem.models[uas]
-            faces, rate = _time_faces(problem, uas), dod_per_s(vehicle)
+            faces, rate = _time_faces(problem, uas), _rate(problem, uas)
             start, gain = _last_dod(model, problem.x0[uas, _BATTERY], problem.horizon)
             room = _room_s(problem, uas) - start / rate + faces @ problem.home_m[uas]
             thrust = vehicle.limits.delta_thrust_max_N, vehicle.limits.delta_thrust_min_N
@@ -87,14 +87,19 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
         allowance: whether it still has to brake to a hover.
     """
     way_s = float((_time_faces(problem, uas) @ (x[:3] - problem.home_m[uas])).max())
-    spent_s = float(x[DOD]) / dod_per_s(problem.vehicles[uas])
+    spent_s = float(x[DOD]) / _rate(problem, uas)
     result = spent_s + way_s - _room_s(problem, uas)
     return result if allowance else result - _ALLOWANCE_S
 
 
+def _rate(problem: PlanningProblem, uas: int) -> float:
+    """Depth of discharge that a second of flight takes, at the end of the way home [1/s]."""
+    return dod_per_s(problem.vehicles[uas], float(problem.dod_max[uas]))
+
+
 def _room_s(problem: PlanningProblem, uas: int) -> float:
     """Seconds of cruising in a battery that is full, less landing and allowance."""
-    full_s = float(problem.dod_max[uas]) / dod_per_s(problem.vehicles[uas])
+    full_s = float(problem.dod_max[uas]) / _rate(problem, uas)
     return full_s - LANDING_S - _ALLOWANCE_S
 
 
