@@ -2,10 +2,12 @@
 
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.views import WorldView, first_sight
 
 __all__ = [
+    "Legs",
     "MissionBrief",
     "MovingObstacleBrief",
     "Range",

@@ -13,13 +13,12 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.order import (
     Beginning,
     Effort,
-    Legs,
     Order,
     Task,
     improved,
     no_order,
 )
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import SwarmState
 

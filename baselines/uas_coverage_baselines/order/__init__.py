@@ -1,8 +1,7 @@
 """A global order of the open waypoints for the whole swarm: who visits what, and when."""
 
 from uas_coverage_baselines.order.beginning import Beginning
-from uas_coverage_baselines.order.legs import Legs
 from uas_coverage_baselines.order.search import Effort, Order, improved, no_order
 from uas_coverage_baselines.order.task import Task
 
-__all__ = ["Beginning", "Effort", "Legs", "Order", "Task", "improved", "no_order"]
+__all__ = ["Beginning", "Effort", "Order", "Task", "improved", "no_order"]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.order import Effort, Legs, Order, Task, improved, no_order
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
+from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import Arena
 

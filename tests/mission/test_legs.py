@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from uas_coverage_baselines.order import Legs
 
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.strict_toml import parse
 

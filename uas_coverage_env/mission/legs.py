@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
 
