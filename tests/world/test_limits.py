@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_worlds import meadow
 
-from uas_coverage_env.vehicle import LIMIT_NAMES, LIMITS, limit_names, load_vehicle
+from uas_coverage_env.vehicle import DOD, LIMIT_NAMES, LIMITS, U_TH, limit_names, load_vehicle
 from uas_coverage_env.vehicle.limits import LPV_TOLERANCE, NONLINEAR_TOLERANCE
 from uas_coverage_env.world import FLYING, Acceleration, Velocity, World, Wrench
 
@@ -112,13 +112,15 @@ def with_battery(**changed):
 
 @pytest.mark.parametrize(
     ("limit", "battery"),
-    [("current", {"current_max_A": 10.0}), ("voltage", {"voltage_min_V": 16.75})],
+    [("current", {"current_max_A": 14.6}), ("voltage", {"voltage_min_V": 14.2})],
 )
 def test_a_battery_that_gives_too_much_is_noticed(limit, battery):
     scenario = meadow([(100.0, 100.0, -10.0)])
     scenario.__dict__["vehicles"] = (with_battery(**battery),)
-    outcome = World(scenario).step({"uas_1": Velocity(0.0, 0.0, 10.0)})
-    assert exceeded(outcome) == {limit}
+    world = World(scenario)
+    # nearly empty, after a long climb
+    world.state.x[0, [DOD, U_TH]] = 0.72, 0.3
+    assert exceeded(world.step({"uas_1": Velocity(9.0, 6.0, 40.0)})) == {limit}
 
 
 def test_who_has_landed_rests_and_exceeds_nothing():
