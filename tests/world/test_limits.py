@@ -119,7 +119,7 @@ def test_a_battery_that_gives_too_much_is_noticed(limit, battery):
     scenario.__dict__["vehicles"] = (with_battery(**battery),)
     world = World(scenario)
     # nearly empty, after a long climb
-    world.state.x[0, [DOD, U_TH]] = 0.72, 0.3
+    world.state.x[0, [DOD, U_TH]] = 0.72, 0.6
     assert exceeded(world.step({"uas_1": Velocity(9.0, 6.0, 40.0)})) == {limit}
 
 
