@@ -9,7 +9,7 @@ import pytest
 from own_blocks import SLOW, beacon
 from practice_grounds import practice_ground
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import load_planner, uas_coverage_v0
 from uas_coverage_env.env import (
     OBSERVATION,
     OBSERVATION_SIZE,
@@ -204,3 +204,21 @@ def test_what_is_no_block_is_refused_in_one_line(settings, message):
     with pytest.raises(ValueError, match=message) as error:
         uas_coverage_v0.parallel_env(practice_ground(), **settings)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
+def test_a_planner_flies_inside_of_an_environment(dynamics):
+    ground = practice_ground(n_uas=2)
+    env = uas_coverage_v0.parallel_env(ground, dynamics=dynamics)
+    env.reset(seed=0)
+    planner = load_planner("nearest-waypoint")
+    planner.reset(env.brief, 0)
+    limit_mps = env.scenario.vehicles[0].limits.v_xy_max_mps
+    for _ in range(20):
+        commands = planner.act(env.swarm_state())
+        assert set(commands) == set(env.agents)
+        target = ground.waypoints[commands["uas_1"].waypoint].position_m
+        away = np.array(target[:2]) - env.swarm_state().x[0, :2]
+        towards = away / max(np.linalg.norm(away), limit_mps)
+        env.step({agent: np.array([*towards, 0.0]) for agent in env.agents})
+    assert np.linalg.norm(env.swarm_state().x[0, :2] - ground.uas[0].start_m[:2]) > 5.0

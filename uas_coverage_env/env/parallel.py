@@ -18,6 +18,7 @@ from uas_coverage_env.env.memory import REWARD, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING, SwarmState
 
@@ -250,6 +251,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._episode.actions.accept(agent, action, asked, 0)
         if not np.isfinite(asked).all():
             raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
+
+    @property
+    def brief(self) -> MissionBrief:
+        """What a planner may know of the mission: `planner.reset(env.brief, seed)`."""
+        return MissionBrief.of(self.scenario)
 
     def swarm_state(self) -> SwarmState:
         """What a planner sees now, in arrays of its own: its commands can be learned from."""

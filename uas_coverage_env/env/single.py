@@ -17,6 +17,7 @@ from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import FLYING, SwarmState
 
@@ -133,6 +134,11 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             self._see()
         reward = reduce(add, info["reward_terms"].values())
         return episode.observation.ravel(), reward, not flies, truncated, info
+
+    @property
+    def brief(self) -> MissionBrief:
+        """What a planner may know of the mission: `planner.reset(env.brief, seed)`."""
+        return MissionBrief.of(self.scenario)
 
     def swarm_state(self) -> SwarmState:
         """What a planner sees now, in arrays of its own: its commands can be learned from."""
