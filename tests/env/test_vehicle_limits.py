@@ -44,9 +44,9 @@ def test_so_do_the_reports_of_a_batch():
     for step in range(3):
         actions[1, 0] = turning(step)
         batch.step(actions)
-        masks.append(int(batch.lanes.report[1, 0, LIMITS]))
-        assert not batch.lanes.report[[0, 2], :, LIMITS].any()
-        assert not batch.lanes.report[1, 1, LIMITS]
+        masks.append(int(batch.learners.report[1, 0, LIMITS]))
+        assert not batch.learners.report[[0, 2], :, LIMITS].any()
+        assert not batch.learners.report[1, 1, LIMITS]
     assert names(masks) == EXPECTED
 
 

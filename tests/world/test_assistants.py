@@ -96,7 +96,7 @@ def test_a_call_with_other_arguments_is_refused_when_it_is_compiled():
 
     arena, state = build_arena(SCENARIO), initial_state(SCENARIO)
     outcome = np.zeros((3, 2), OUTCOME_DTYPE)[:, 0]
-    with pytest.raises(TypingError, match="an assistant takes"):
+    with pytest.raises(TypingError, match="a kernel here takes"):
         call(assistants(False, True)[-1], arena, state, outcome)
 
 
