@@ -105,7 +105,21 @@ class _PartLibrary(JITCodeLibrary):
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._simplify()
         self._make_known()
+
+    def _simplify(self) -> None:
+        """Inline and shorten; vectors and the rest are left to the kernel that this is a part of.
+
+        What is linked is smaller than it would be otherwise, and the machine code faster.
+        """
+        manager, builder = self._codegen._module_pass_manager(
+            loop_vectorize=False,
+            slp_vectorize=False,
+            opt=self._codegen._opt_level,
+            cost="cheap",
+        )
+        manager.run(self._final_module, builder)
 
     def _make_known(self) -> None:
         """Define the variables in which numba keeps the environment of each function."""

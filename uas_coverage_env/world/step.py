@@ -86,7 +86,7 @@ def _fly(arena, state, nonlinear, outcome):
             continue
         x = state.x[i]
         event = outcome[i]
-        u = event.u
+        u = event.u[:]
         command = event.applied_command
         vehicle = arena.vehicles[i]
         command_wrench(vehicle, x, state.reference[i], command, u)
