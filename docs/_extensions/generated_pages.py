@@ -20,6 +20,7 @@ from uas_coverage_env import Acceleration, Velocity, Wrench, load_scenario, uas_
 from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
 from uas_coverage_env.env.rewards import rewards_table
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.registry import describe_planners
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -112,10 +113,17 @@ def arguments() -> str:
     """The arguments of the environment as a table, with their defaults."""
     text = docstring_section("Arguments")()
     meanings = dict(re.findall(r"^(\w+): (.*(?:\n +.*)*)", text, re.MULTILINE))
-    rows = [
-        (f"`{name}`", f"`{parameter.default!r}`", " ".join(meanings[name].split()))
+    named = {"observation": "OBSERVATION", "reward": "REWARD"}
+    defaults = {
+        name: repr(parameter.default)
         for name, parameter in inspect.signature(CoverageParallelEnv.__init__).parameters.items()
-        if name != "self"
+        if parameter.kind is not parameter.VAR_KEYWORD and name != "self"
+    }
+    for field in fields(MissionSettings):
+        defaults[field.name] = named.get(field.name, repr(field.default))
+    rows = [
+        (f"`{name}`", f"`{default}`", " ".join(meanings[name].split()))
+        for name, default in defaults.items()
     ]
     return table(("argument", "default", "meaning"), rows)
 
