@@ -1,4 +1,4 @@
-"""The step of the world once more, in plain NumPy, written from CONTRACT.md and MODEL.md.
+"""The step of the world once more, in plain NumPy, written from `docs/rules.md`.
 
 It shares no kernel with the package: `linear_model` gives the matrices, `ConvexPolytope` the
 planes, and everything else is done here in the most literal way, whatever it costs. The inner loop
@@ -16,7 +16,7 @@ FLYING, LANDED, LOST = 0, 1, 2
 
 
 def thrust_correction(vehicle, x, lift_N):
-    """MODEL.md Sec. 6, the affine lower bounds with one plane per face of an octagon."""
+    """ΔT of the LPV world: the affine lower bounds with one plane per face of an octagon."""
     fit = vehicle.thrust_correction
     weight_N = vehicle.airframe.mass_kg * vehicle.airframe.gravity_mps2
     trim = vehicle.airframe.drag_kgps / weight_N

@@ -1,4 +1,4 @@
-"""What happens: state, commands, and the one compiled step (CONTRACT, "What counts")."""
+"""What happens: state, commands, and the one compiled step (rules: `docs/rules.md`)."""
 
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.assist import AssistantCode, assistants

@@ -128,7 +128,7 @@ def carry_out(arena, state, nonlinear, outcome):
 
 @kernel
 def advance(arena, state, commands, nonlinear, assistants, outcome):
-    """Fly all UAS for one step and judge what happened (CONTRACT, "What counts").
+    """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
 
     All decide from the state at sample k; then all fly; then contacts are judged on the straight
     segments between the samples, and breaches, coverage and landing at sample k+1.
