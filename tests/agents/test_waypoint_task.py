@@ -6,13 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import (
-    CANDIDATE_HIGH,
-    CANDIDATE_LOW,
+    CANDIDATE_AT,
+    CANDIDATE_TABLE,
+    HIGH,
     HOME_CHOICE,
+    LOW,
     N_CANDIDATE,
     N_TEAM,
-    TEAM_HIGH,
-    TEAM_LOW,
+    TEAM_TABLE,
     K,
 )
 from uas_coverage_agents.waypoint.legs import legs_of
@@ -94,13 +95,13 @@ def test_masks_and_observations_are_sound_whatever_is_chosen(seed, covered):
             team = lanes.observation[lane, :N_TEAM]
             each = lanes.observation[lane, N_TEAM:].reshape(K, N_CANDIDATE)
             assert np.isfinite(team).all()
-            assert (team >= TEAM_LOW).all()
-            assert (team <= TEAM_HIGH).all()
-            assert (each >= CANDIDATE_LOW).all()
-            assert (each <= CANDIDATE_HIGH).all()
-            assert (each[:, 0] == there).all()
+            assert (team >= TEAM_TABLE[:, LOW]).all()
+            assert (team <= TEAM_TABLE[:, HIGH]).all()
+            assert (each >= CANDIDATE_TABLE[:, LOW]).all()
+            assert (each <= CANDIDATE_TABLE[:, HIGH]).all()
+            assert (each[:, CANDIDATE_AT.there] == there).all()
             assert (each[~there] == 0.0).all()
-            assert (np.diff(each[there, 1]) >= 0.0).all()  # nearest first
+            assert (np.diff(each[there, CANDIDATE_AT.way]) >= 0.0).all()  # nearest first
         return choose(lanes)
 
     account = teams.fly(checked)

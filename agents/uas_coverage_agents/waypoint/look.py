@@ -5,13 +5,17 @@ import math
 import numpy as np
 
 from uas_coverage_agents.waypoint.layout import (
-    CANDIDATE_HIGH,
-    CANDIDATE_LOW,
+    CANDIDATE_AT,
+    CANDIDATE_TABLE,
+    HIGH,
     HOME_CHOICE,
+    LOW,
     N_CANDIDATE,
     N_TEAM,
-    TEAM_HIGH,
-    TEAM_LOW,
+    SCALE,
+    TEAM_AT,
+    TEAM_TABLE,
+    UNIT,
     K,
 )
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
@@ -216,7 +220,8 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
     centre_x /= max(n_open, 1)
     centre_y /= max(n_open, 1)
 
-    row[:] = 0.0
+    team = np.empty(N_TEAM)
+    rows = np.empty((n_candidates, N_CANDIDATE))
     legal[:] = False
     n_legal = 0
     total_s = np.zeros(K + 1)
@@ -250,30 +255,29 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
                 if todo[t] != w:
                     trial_todo[n_trial] = todo[t]
                     n_trial += 1
-            c = N_TEAM + k * N_CANDIDATE
-            row[c] = 1.0
-            row[c + 1] = way_m[k] / (2.0 * unit_m)
-            row[c + 2] = (flying_s + turning_s) / (2.0 * unit_s)
-            row[c + 3] = turning_s / unit_s
-            row[c + 4] = legs.home_s[i, w] / (20.0 * unit_s)
-            row[c + 5] = to_spare_s / 300.0
-            row[c + 6] = blocked[w]
-            row[c + 7] = claimed[w]
-            _company(legs, state, w, row, c + 8)
+            values = rows[k]
+            values[CANDIDATE_AT.there] = 1.0
+            values[CANDIDATE_AT.way] = way_m[k]
+            values[CANDIDATE_AT.time] = flying_s + turning_s
+            values[CANDIDATE_AT.turn] = turning_s
+            values[CANDIDATE_AT.home] = legs.home_s[i, w]
+            values[CANDIDATE_AT.margin] = to_spare_s
+            values[CANDIDATE_AT.blocked] = blocked[w]
+            values[CANDIDATE_AT.claimed] = claimed[w]
+            _company(legs, state, w, values)
             first_s = math.inf
             for j in range(n_uas):
                 if j != i and place[j] != ABSENT:
                     on_s = from_s[j, w] if place[j] == IN_THE_AIR else legs.between_s[place[j], w]
                     first_s = min(first_s, ready_s[j] + on_s)
-            row[c + 13] = (min(first_s, 1e6) - flying_s - turning_s) / (3.0 * unit_s)
-            outside_m = math.hypot(
+            values[CANDIDATE_AT.lead] = min(first_s, 1e6) - flying_s - turning_s
+            values[CANDIDATE_AT.outside] = math.hypot(
                 waypoint.position_m[0] - centre_x, waypoint.position_m[1] - centre_y
             )
-            row[c + 14] = outside_m / (5.0 * unit_m)
             speed_mps = math.hypot(x[VX], x[VY])
             length_m = math.hypot(towards[k, 0], towards[k, 1])
             along = x[VX] * towards[k, 0] + x[VY] * towards[k, 1]
-            row[c + 19] = along / max(speed_mps * length_m, 1e-6)
+            values[CANDIDATE_AT.ahead] = along / max(speed_mps * length_m, 1e-6)
         total_s[k], longest_s[k], left[k] = outlook(
             legs, from_s, here_home_s, budgets_s, trial_ready_s, trial_place, trial_todo, n_trial
         )
@@ -284,13 +288,11 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
         best = K
     fewest = left[best]
     for k in range(n_candidates):
-        c = N_TEAM + k * N_CANDIDATE
-        row[c + 15] = (total_s[k] - total_s[best]) / (2.0 * unit_s)
-        row[c + 16] = (longest_s[k] - longest_s[best]) / (2.0 * unit_s)
-        row[c + 17] = (left[k] - fewest) / 5.0
-        row[c + 18] = k == best
-        for f in range(N_CANDIDATE):
-            row[c + f] = min(max(row[c + f], CANDIDATE_LOW[f]), CANDIDATE_HIGH[f])
+        values = rows[k]
+        values[CANDIDATE_AT.total] = total_s[k] - total_s[best]
+        values[CANDIDATE_AT.longest] = longest_s[k] - longest_s[best]
+        values[CANDIDATE_AT.left] = left[k] - fewest
+        values[CANDIDATE_AT.first] = k == best
 
     n_mates = 0
     n_away = 0
@@ -308,34 +310,47 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
     # nobody leaves work behind that the others are not reckoned to finish
     legal[HOME_CHOICE] = n_legal == 0 or (n_mates > 0 and left[K] <= left[best])
     n_legal += legal[HOME_CHOICE]
-    row[0] = math.hypot(x[VX], x[VY]) / uas.speed_mps
-    row[1] = here_home_s[i] / (20.0 * unit_s)
-    row[2] = (budgets_s[i] - here_home_s[i]) / 300.0
-    row[3] = (arena.rules[0].max_steps - state.step[0]) * arena.rules[0].dt_s / 500.0
-    row[4] = n_open / 25.0
-    row[5] = n_open / (n_mates + 1) / 15.0
-    row[6] = n_mates / 4.0
-    row[7] = n_mates == 0
-    row[8] = n_away / 4.0
-    row[9] = n_blocked / max(n_open, 1)
-    row[10] = mates_s / 300.0
-    row[11] = mate_m / (5.0 * unit_m)
-    row[12] = total_s[best] / 600.0
-    row[13] = longest_s[best] / 300.0
-    row[14] = left[best] / 5.0
-    row[15] = (total_s[K] - total_s[best]) / (5.0 * unit_s)
-    row[16] = (longest_s[K] - longest_s[best]) / (5.0 * unit_s)
-    row[17] = (left[K] - left[best]) / 5.0
+    team[TEAM_AT.speed] = math.hypot(x[VX], x[VY]) / uas.speed_mps
+    team[TEAM_AT.way_home] = here_home_s[i]
+    team[TEAM_AT.margin] = budgets_s[i] - here_home_s[i]
+    team[TEAM_AT.time_left] = (arena.rules[0].max_steps - state.step[0]) * arena.rules[0].dt_s
+    team[TEAM_AT.open] = n_open
+    team[TEAM_AT.share] = n_open / (n_mates + 1)
+    team[TEAM_AT.mates] = n_mates
+    team[TEAM_AT.alone] = n_mates == 0
+    team[TEAM_AT.away] = n_away
+    team[TEAM_AT.blocked] = n_blocked / max(n_open, 1)
+    team[TEAM_AT.mates_margin] = mates_s
+    team[TEAM_AT.nearest_mate] = mate_m
+    team[TEAM_AT.total] = total_s[best]
+    team[TEAM_AT.longest] = longest_s[best]
+    team[TEAM_AT.left] = left[best]
+    team[TEAM_AT.home_total] = total_s[K] - total_s[best]
+    team[TEAM_AT.home_longest] = longest_s[K] - longest_s[best]
+    team[TEAM_AT.home_left] = left[K] - left[best]
     spread_m = 0.0
     for w in range(n_waypoints):
         if state.uncovered[w]:
             position_m = arena.waypoints[w].position_m
             spread_m += math.hypot(position_m[0] - centre_x, position_m[1] - centre_y)
-    row[18] = spread_m / max(n_open, 1) / (3.0 * unit_m)
-    row[19] = math.hypot(x[X] - centre_x, x[Y] - centre_y) / (5.0 * unit_m)
-    for f in range(N_TEAM):
-        row[f] = min(max(row[f], TEAM_LOW[f]), TEAM_HIGH[f])
+    team[TEAM_AT.spread] = spread_m / max(n_open, 1)
+    team[TEAM_AT.centre] = math.hypot(x[X] - centre_x, x[Y] - centre_y)
+    _scale(TEAM_TABLE, legs.unit, team, row[:N_TEAM])
+    for k in range(n_candidates):
+        first = N_TEAM + k * N_CANDIDATE
+        _scale(CANDIDATE_TABLE, legs.unit, rows[k], row[first : first + N_CANDIDATE])
+    row[N_TEAM + n_candidates * N_CANDIDATE :] = 0.0
     return n_legal
+
+
+@allocating_kernel
+def _scale(table, unit, numbers, row):
+    """Write numbers as the policy reads them: in units of their scales, within their bounds."""
+    for f in range(numbers.shape[0]):
+        scale = table[f, SCALE]
+        if table[f, UNIT] > 0.0:
+            scale *= unit[int(table[f, UNIT]) - 1]
+        row[f] = min(max(numbers[f] / scale, table[f, LOW]), table[f, HIGH])
 
 
 @allocating_kernel
@@ -346,8 +361,8 @@ def _worth(total_s, longest_s, left, k, best):
 
 
 @allocating_kernel
-def _company(legs, state, w, row, c):
-    """Write what is open around waypoint w: five numbers from column c on."""
+def _company(legs, state, w, values):
+    """Write what is open around waypoint w."""
     unit_s = legs.unit[1]
     nearest_s = math.inf
     second_s = math.inf
@@ -368,8 +383,8 @@ def _company(legs, state, w, row, c):
             nearest_s = on_s
         elif on_s < second_s:
             second_s = on_s
-    row[c] = nearest_s / unit_s
-    row[c + 1] = second_s / unit_s
-    row[c + 2] = near / 6.0
-    row[c + 3] = around / 15.0
-    row[c + 4] = sum_s / max(n, 1) / (5.0 * unit_s)
+    values[CANDIDATE_AT.next] = nearest_s
+    values[CANDIDATE_AT.after_next] = second_s
+    values[CANDIDATE_AT.near] = near
+    values[CANDIDATE_AT.around] = around
+    values[CANDIDATE_AT.remote] = sum_s / max(n, 1)
