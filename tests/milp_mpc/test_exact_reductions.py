@@ -268,6 +268,7 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         dt_s=0.5,
         physical_sides=12,
         obstacle_sides=6,
+        limit_sides=12,
         prune=False,
     )
     for one in fields(problem):
