@@ -25,6 +25,9 @@ from numba.core.serialize import dumps
 
 from uas_coverage_env.source_digest import source_digest
 
+_MOST_VERSIONS = 64
+"""Of one function that are kept: one that is built around numbers has a version for each."""
+
 _NAME = re.compile(r"-\w+\.py\w+\.(?P<stamp>[0-9a-f]{16})\.[0-9a-f]{16}\.nbc$")
 
 
@@ -93,8 +96,11 @@ class _Files:
         self._stem = os.path.join(folder, f"{base}.{self._stamp}")
 
     def flush(self) -> None:
-        for path in glob.glob(f"{glob.escape(self._stem)}.*.nbc"):
+        for path in self._versions():
             _remove(path)
+
+    def _versions(self) -> list[str]:
+        return glob.glob(f"{glob.escape(self._stem)}.*.nbc")
 
     def load(self, key: Any) -> Any:
         try:
@@ -117,6 +123,8 @@ class _Files:
             raise
         folder, name = os.path.split(path)
         _remove_outdated(folder, name.partition(".")[0], self._stamp)
+        for surplus in sorted(self._versions(), key=_written_ns)[:-_MOST_VERSIONS]:
+            _remove(surplus)
 
     def _path(self, key: Any) -> str:
         return f"{self._stem}.{_hash(repr(key))}.nbc"
@@ -133,6 +141,13 @@ def _remove_outdated(folder: str, module: str, stamp: str) -> None:
         name = _NAME.search(path)
         if name is not None and name["stamp"] != stamp:
             _remove(path)
+
+
+def _written_ns(path: str) -> int:
+    try:
+        return os.stat(path).st_mtime_ns
+    except OSError:  # another process has removed it
+        return 0
 
 
 def _remove(path: str) -> None:

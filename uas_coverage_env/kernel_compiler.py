@@ -17,6 +17,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags, compile_result
 from numba.core.registry import CPUDispatcher
 
+from uas_coverage_env.compiling import COMPILATIONS
+
 
 class KernelDispatcher(CPUDispatcher):
     """A kernel: compiled for Python where Python calls it, and as a part where a kernel calls it.
@@ -48,14 +50,17 @@ class KernelDispatcher(CPUDispatcher):
         collecting = gc.isenabled()
         gc.disable()
         try:
-            return super().compile(sig)
+            with COMPILATIONS.one(lambda: len(called_by(self))):
+                return super().compile(sig)
         finally:
             if collecting:
                 gc.enable()
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What numba asks for where a kernel calls this one."""
-        return self.part.get_call_template(args, kws)
+        template = self.part.get_call_template(args, kws)
+        COMPILATIONS.made(self)
+        return template
 
     def get_overload(self, sig: Any) -> Any:
         """What numba asks for where a kernel calls this one."""
@@ -65,6 +70,20 @@ class KernelDispatcher(CPUDispatcher):
     def is_compiling(self) -> Any:
         """Whether a call in a kernel is one of a function to itself."""
         return self.part.is_compiling
+
+
+def called_by(kernel: KernelDispatcher) -> set[KernelDispatcher]:
+    """All kernels that a kernel calls by their names, directly or not."""
+    reached: set[KernelDispatcher] = set()
+    found = [kernel]
+    while found:
+        function = found.pop().py_func
+        cells = (cell.cell_contents for cell in function.__closure__ or ())
+        named = (function.__globals__.get(name) for name in function.__code__.co_names)
+        called = {one for one in (*named, *cells) if isinstance(one, KernelDispatcher)} - reached
+        reached |= called
+        found += called
+    return reached
 
 
 class _Flags(Flags):
@@ -87,6 +106,7 @@ class _KernelCompiler(Compiler):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
+        COMPILATIONS.begun()
 
 
 class _PartCompiler(_KernelCompiler):

@@ -213,7 +213,6 @@ def test_a_terminal_shows_a_line_that_changes_and_a_map_where_it_is_watched(watc
         rollout(scenario, planner, max_steps=3, on_step=on_step)
     assert isinstance(screen.file, io.StringIO)
     text = screen.file.getvalue()
-    assert "compiling" in text
     assert "step 3/3" in text
     assert "100%" in text
     assert ("moving obstacle" in text) is watch

@@ -99,10 +99,10 @@ def called(
             **environment,
         },
         capture_output=True,
-        check=True,
         text=True,
         cwd=folder,
     )
+    assert done.returncode == 0, done.stderr
     return tuple(json.loads(done.stdout))
 
 
@@ -175,6 +175,18 @@ def test_what_was_compiled_from_earlier_sources_is_deleted(craft):
         called(craft, "craft.body", "lift", number=n)
     assert len(list(folder.glob("*.nbc"))) == len(first) == 1
     assert first.isdisjoint(folder.glob("*.nbc"))
+
+
+def test_of_a_function_that_is_built_around_numbers_the_latest_versions_are_kept(craft):
+    (craft / "many.py").write_text(
+        "from uas_coverage_env import kernel_cache\n"
+        "from uas_coverage_env.kernels import kernel\n"
+        "kernel_cache._MOST_VERSIONS = 3\n"
+        "def plus(y):\n    @kernel\n    def inner(x):\n        return x + y\n    return inner\n"
+        "def call(x):\n    return [plus(float(y))(x) for y in range(5)][int(x)]\n"
+    )
+    assert called(craft, "many", "call", 4.0) == (8.0, 0)
+    assert len(list(craft.glob("__pycache__/*.nbc"))) == 3
 
 
 def test_a_folder_that_cannot_be_written_to_leaves_the_choice_to_the_users_cache(craft):

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle
+from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle, warm_up
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.outside import add_outside_commands
 from uas_coverage_env.flight import PlannerError
@@ -48,6 +48,7 @@ def describe(
 
 app.command("run")(run.run)
 app.command("compare")(compare.compare)
+app.command("warm-up")(warm_up.warm_up)
 app.command("planners")(planners.planners)
 app.command("replay")(replay.replay)
 app.command("figure")(figure.figure)

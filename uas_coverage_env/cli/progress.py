@@ -2,12 +2,13 @@
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from rich.console import Console, Group
 from rich.live import Live
 from rich.spinner import Spinner
 
+from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.cli.text_map import TextMap
 from uas_coverage_env.cli.watch import FlightWindow
 from uas_coverage_env.draw import NoDisplayError
@@ -16,7 +17,6 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import LANDED, LOST
 
-_COMPILING = "compiling (the first flight on a machine takes a minute)"
 _SECONDS_BETWEEN_LINES = 5.0
 _NO_CHARGE = {LANDED: "landed", LOST: "lost"}
 
@@ -63,12 +63,18 @@ def _window(out: Console, scenario: Scenario, planner: Planner) -> FlightWindow 
 @contextmanager
 def _lines(out: Console, text_map: TextMap | None) -> Iterator[Callable[[Progress], object]]:
     if not out.is_terminal:
-        out.print(_COMPILING)
         yield _PlainLines(out)
         return
-    with Live(Spinner("dots", _COMPILING), console=out, refresh_per_second=8) as live:
+    live = Live(console=out, refresh_per_second=8)
+    with ExitStack() as ending:
+        compiling = ending.enter_context(ExitStack())
+        compiling.enter_context(compilation_shown())
+        ending.callback(live.stop)
 
         def update(progress: Progress) -> None:
+            if not live.is_started:  # all is compiled
+                compiling.close()
+                live.start()
             line = Spinner("dots", progress_line(progress))
             live.update(line if text_map is None else Group(text_map.drawn(progress.swarm), line))
 

@@ -5,7 +5,7 @@ import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +17,7 @@ from rich.table import Table
 from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.config import load_config, published_names
+from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.folder import prepare_folder
 from uas_coverage_env.strict_toml import InputError
 
@@ -178,7 +179,7 @@ def _note(directory: Path, order: "Order", screen: Console) -> None:
 @contextmanager
 def _shown(screen: Console) -> Iterator[Callable[["TrainingProgress"], object]]:
     """Show how it goes: a bar that moves on a terminal, a line now and then elsewhere."""
-    screen.print("preparing scenarios (a minute more where kernels have to be compiled)")
+    screen.print("preparing scenarios")
     started: list[tuple[float, float]] = []
     said = [-_SECONDS_BETWEEN_LINES]
 
@@ -209,11 +210,20 @@ def _shown(screen: Console) -> Iterator[Callable[["TrainingProgress"], object]]:
         yield say
         return
     columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=screen) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda progress: bar.update(
-            task, completed=progress.share, description=line(progress)
-        )
+    bar = Progress(*columns, console=screen)
+    task = bar.add_task("", total=1.0)
+    with ExitStack() as ending:
+        compiling = ending.enter_context(ExitStack())
+        compiling.enter_context(compilation_shown())
+        ending.callback(bar.stop)
+
+        def move(progress: "TrainingProgress") -> None:
+            if not bar.live.is_started:
+                compiling.close()
+                bar.start()
+            bar.update(task, completed=progress.share, description=line(progress))
+
+        yield move
 
 
 def _report(screen: Console, policy: Policy, directory: Path) -> None:

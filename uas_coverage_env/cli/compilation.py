@@ -1,0 +1,52 @@
+"""Compilation as it shows at a terminal."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from uas_coverage_env.compiling import listening
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import Dynamics, Velocity, World
+
+_DOING = "compiling for this machine, once"
+
+
+@contextmanager
+def compilation_shown(screen: Console | None = None) -> Iterator[None]:
+    """Show compilations as a bar; where there is no terminal, as one line.
+
+    Args:
+        screen: Where; None: on stderr.
+    """
+    screen = screen or Console(stderr=True, highlight=False)
+    if not screen.is_terminal:
+        yield
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    bar = Progress(*columns, TimeElapsedColumn(), console=screen, transient=True)
+    task = bar.add_task(_DOING, total=1.0)
+
+    def listener(share: float | None) -> None:
+        if share is None:
+            bar.stop()
+            return
+        if not bar.live.is_started:
+            bar.start()
+        bar.update(task, completed=share)
+
+    try:
+        with listening(listener):
+            yield
+    finally:
+        bar.stop()
+
+
+def compile_world(
+    scenario: Scenario, *, return_mode: bool, safety_filter: bool, dynamics: Dynamics = "lpv"
+) -> None:
+    """Compile what every flight needs, or see that it is there."""
+    world = World(scenario, dynamics=dynamics, return_mode=return_mode, safety_filter=safety_filter)
+    state = world.swarm_state()
+    world.step({name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)})

@@ -1,0 +1,71 @@
+"""`uas-coverage warm-up`: compile before the first flight."""
+
+import time
+from typing import Annotated
+
+import typer
+
+from uas_coverage_env.cli.compilation import compilation_shown, compile_world
+from uas_coverage_env.cli.output import console
+from uas_coverage_env.compiling import COMPILATIONS
+from uas_coverage_env.env.parallel import CoverageParallelEnv
+from uas_coverage_env.env.vector import CoverageVectorEnv
+from uas_coverage_env.flight import Planner, load_planner, rollout
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import Scenario, load_scenario
+
+_SCENARIO = "village"
+_PLANNER = "milp-mpc"
+_LANES = 2
+
+
+def warm_up(
+    planner: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"Compile for this planner, see `planners`; may be repeated. Default: {_PLANNER}.",
+            show_default=False,
+        ),
+    ] = None,
+    environments: Annotated[
+        bool, typer.Option("--environments", help="Compile the learning environments, too.")
+    ] = False,
+) -> None:
+    """Compile the simulation for this machine, so that the first flight begins at once.
+
+    Otherwise the first flight does it, which takes up to half a minute. What is compiled stays on
+    disk until the package changes, and is not compiled again.
+    """
+    scenario = load_scenario(_SCENARIO)
+    players = [load_planner(name) for name in planner or [_PLANNER]]
+    started, before = time.perf_counter(), COMPILATIONS.n_compiled
+    with compilation_shown():
+        compile_world(scenario, return_mode=True, safety_filter=True)
+        for player in players:
+            _compile_planner(player, scenario)
+        if environments:
+            _compile_environments()
+    n = COMPILATIONS.n_compiled - before
+    took_s = time.perf_counter() - started
+    console().print(
+        f"compiled {n} kernels in {took_s:.0f} s" if n else "everything is compiled already"
+    )
+
+
+def _compile_planner(player: Planner, scenario: Scenario) -> None:
+    prepare = getattr(player, "warm_up", None)
+    if prepare is None:
+        rollout(scenario, player, max_steps=1)
+    else:
+        brief = MissionBrief.of(scenario)
+        prepare(brief)
+        player.reset(brief, 0)
+
+
+def _compile_environments() -> None:
+    for action in ("velocity", "waypoint"):
+        single = CoverageParallelEnv(_SCENARIO, action=action)
+        many = CoverageVectorEnv(_LANES, _SCENARIO, action=action)
+        for env in (single, many):
+            env.reset(seed=0)
+            env.close()
