@@ -57,9 +57,12 @@ def source_digest(path: str) -> str:
     Raises:
         OSError: The file cannot be read.
     """
-    file = os.path.realpath(path)
+    file = _real(path)
     _forget_what_was_edited(file)
     return _digest(file)
+
+
+_real = cache(os.path.realpath)
 
 
 @cache
