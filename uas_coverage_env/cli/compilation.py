@@ -45,8 +45,9 @@ def compilation_shown(screen: Console | None = None) -> Iterator[None]:
 
 def compile_world(
     scenario: Scenario, *, return_mode: bool, safety_filter: bool, dynamics: Dynamics = "lpv"
-) -> None:
-    """Compile what every flight needs, or see that it is there."""
+) -> World:
+    """Compile what every flight needs, or see that it is there; returns a world that has flown."""
     world = World(scenario, dynamics=dynamics, return_mode=return_mode, safety_filter=safety_filter)
     state = world.swarm_state()
     world.step({name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)})
+    return world

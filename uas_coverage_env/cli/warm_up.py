@@ -8,6 +8,7 @@ import typer
 from uas_coverage_env.cli.compilation import compilation_shown, compile_world
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.compiling import COMPILATIONS
+from uas_coverage_env.draw import picture
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv
 from uas_coverage_env.flight import Planner, load_planner, rollout
@@ -40,7 +41,8 @@ def warm_up(
     players = [load_planner(name) for name in planner or [_PLANNER]]
     started, before = time.perf_counter(), COMPILATIONS.n_compiled
     with compilation_shown():
-        compile_world(scenario, return_mode=True, safety_filter=True)
+        world = compile_world(scenario, return_mode=True, safety_filter=True)
+        picture(scenario, world.swarm_state())  # of the flight directory
         for player in players:
             _compile_planner(player, scenario)
         if environments:
