@@ -10,8 +10,8 @@ project = "uas-coverage-env"
 author = "The uas-coverage-env authors"
 release = version = version_of("uas-coverage-env")
 
-extensions = ["myst_parser", "generated_pages", "repository_links", "mathml"]
-exclude_patterns = ["_build", "_extensions", "_generated/parts"]
+extensions = ["myst_parser", "repository_links", "mathml"]
+exclude_patterns = ["_build", "_extensions"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 nitpicky = True
@@ -21,5 +21,5 @@ html_theme = "furo"
 html_title = project
 html_copy_source = False
 html_show_copyright = False
-html_extra_path = ["_generated/served"]
+html_extra_path = ["scenario.schema.json"]
 html_math_renderer = "mathml"

@@ -1,19 +1,23 @@
-"""What the pages say about spaces, scenario files and planners, written from the code itself.
+"""Tables of the pages that say what the code says: spaces, scenario files, planners.
 
-Before a build, parts are written to `docs/_generated/parts`, which pages include, and the JSON
-Schema of scenario files to `docs/_generated/served`, which is put at the root of the site.
+    python docs/tables.py            renew them, and `scenario.schema.json`
+    python docs/tables.py --check    name the pages that are stale, and exit 1 where there are any
+
+Tables are committed, so that a code host shows them too. They stand in any page of `docs/`, and
+in any README, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`; `PARTS` has the names.
 """
 
 import inspect
 import json
 import re
+import sys
+import tomllib
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from gymnasium import spaces
-from sphinx.application import Sphinx
 
 import uas_coverage_env.env.actions as actions
 from uas_coverage_env import Acceleration, Velocity, Wrench, load_scenario, uas_coverage_v0
@@ -21,10 +25,11 @@ from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.flight.registry import describe_planners
+from uas_coverage_env.flight.registry import GROUP, KINDS, describe_planners
 from uas_coverage_env.scenario.schema import scenario_schema
 
-GENERATED = Path(__file__).resolve().parents[1] / "_generated"
+DOCS = Path(__file__).resolve().parent
+SCHEMA = DOCS / "scenario.schema.json"
 COMMANDS = {"velocity": Velocity, "acceleration": Acceleration, "wrench": Wrench}
 SCENARIO = "village"
 
@@ -113,19 +118,19 @@ def arguments() -> str:
     """The arguments of the environment as a table, with their defaults."""
     text = docstring_section("Arguments")()
     meanings = dict(re.findall(r"^(\w+): (.*(?:\n +.*)*)", text, re.MULTILINE))
-    named = {"observation": "OBSERVATION", "reward": "REWARD"}
+    parameters = inspect.signature(CoverageParallelEnv.__init__).parameters.values()
     defaults = {
-        name: repr(parameter.default)
-        for name, parameter in inspect.signature(CoverageParallelEnv.__init__).parameters.items()
-        if parameter.kind is not parameter.VAR_KEYWORD and name != "self"
+        **{parameter.name: parameter.default for parameter in parameters},
+        **{field.name: field.default for field in fields(MissionSettings)},
     }
-    for field in fields(MissionSettings):
-        defaults[field.name] = named.get(field.name, repr(field.default))
     rows = [
-        (f"`{name}`", f"`{default}`", " ".join(meanings[name].split()))
-        for name, default in defaults.items()
+        (f"`{name}`", f"`{_NAMED.get(name, repr(defaults[name]))}`", " ".join(meaning.split()))
+        for name, meaning in meanings.items()
     ]
     return table(("argument", "default", "meaning"), rows)
+
+
+_NAMED = {"observation": "OBSERVATION", "reward": "REWARD"}
 
 
 def scenario_fields() -> str:
@@ -175,9 +180,13 @@ _LIMITS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusi
 
 
 def planners() -> str:
-    """Every installed planner with its options."""
+    """Every planner of this repository with its options."""
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    ours = {name for group in (GROUP, KINDS) for name in project["entry-points"][group]}
     parts = []
     for planner in describe_planners():
+        if planner.name.partition(":")[0] not in ours:
+            continue
         if planner.missing:
             raise ValueError(f"planner {planner.name} cannot be described: {planner.missing}")
         parts += [f"**{planner.name}**: {planner.summary}"]
@@ -205,19 +214,63 @@ PARTS: dict[str, Callable[[], str]] = {
 }
 
 
-def write_generated(*_: object) -> None:
-    """Write all parts, and the schema."""
-    for folder in ("parts", "served"):
-        (GENERATED / folder).mkdir(parents=True, exist_ok=True)
-    for name, text in PARTS.items():
-        (GENERATED / "parts" / f"{name}.md").write_text(text() + "\n", encoding="utf-8")
+_MARKED = re.compile(
+    r"^<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)^<!-- end of (?P=name) -->$",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def renewed(text: str) -> str:
+    """The text of a page with what stands between its marks made anew.
+
+    Raises:
+        ValueError: A mark names no part, or has no end.
+    """
+    found = [match["name"] for match in _MARKED.finditer(text)]
+    opened = re.findall(r"^<!-- generated: (.*) -->$", text, re.MULTILINE)
+    if wrong := [name for name in opened if name not in found or name not in PARTS]:
+        raise ValueError(f"{wrong[0]!r} has no end, or is none of {', '.join(PARTS)}")
+    return _MARKED.sub(
+        lambda match: (
+            f"<!-- generated: {match['name']} -->\n\n"
+            f"{PARTS[match['name']]()}\n\n<!-- end of {match['name']} -->"
+        ),
+        text,
+    )
+
+
+def renewed_files() -> dict[Path, str]:
+    """What every file with something generated in it should hold."""
+    root = DOCS.parent
+    pages = [*sorted(DOCS.glob("*.md")), *(root / name for name in _READMES)]
+    files = {}
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        if "<!-- generated: " in text:
+            files[page] = renewed(text)
     schema = json.dumps(scenario_schema(), indent=2, ensure_ascii=False)
-    served = GENERATED / "served" / "scenario.schema.json"
-    served.write_text(schema + "\n", encoding="utf-8")
+    return {**files, SCHEMA: schema + "\n"}
 
 
-def setup(app: Sphinx) -> dict[str, Any]:
-    """Called by Sphinx."""
-    # early: Sphinx looks whether the folder of the schema exists when the configuration is read
-    app.connect("config-inited", write_generated, priority=100)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+_READMES = ("README.md", "baselines/README.md", "agents/README.md", "benchmarks/README.md")
+
+
+def main(*arguments: str) -> int:
+    """Renew or check all files; the exit code."""
+    if arguments not in ((), ("--check",)):
+        sys.stderr.write("usage: python docs/tables.py [--check]\n")
+        return 2
+    stale = {
+        path: text
+        for path, text in renewed_files().items()
+        if not path.exists() or path.read_text(encoding="utf-8") != text
+    }
+    for path, text in stale.items():
+        sys.stdout.write(f"{path.relative_to(DOCS.parent)}\n")
+        if not arguments:
+            path.write_text(text, encoding="utf-8", newline="\n")
+    return 1 if arguments and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
