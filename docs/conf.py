@@ -2,6 +2,7 @@
 
 import sys
 from importlib.metadata import version as version_of
+from importlib.util import find_spec
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
@@ -10,12 +11,27 @@ project = "uas-coverage-env"
 author = "The uas-coverage-env authors"
 release = version = version_of("uas-coverage-env")
 
-extensions = ["myst_parser", "repository_links", "mathml"]
+extensions = ["myst_parser", "repository_links", "mathml", "public_names"]
 exclude_patterns = ["_build", "_extensions"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 nitpicky = True
 highlight_language = "text"
+
+# signatures name types of other packages, whose sites are not looked up
+nitpick_ignore_regex = [("py:.*", ".*")]
+python_maximum_signature_line_length = 88
+python_use_unqualified_type_names = True
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_mock_imports = [
+    name
+    for name in ("torch", "stable_baselines3", "sb3_contrib", "matplotlib", "imageio_ffmpeg")
+    if find_spec(name) is None  # extras that a site is built without
+]
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
 
 html_theme = "furo"
 html_title = project

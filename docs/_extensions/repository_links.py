@@ -67,7 +67,7 @@ def _write_readmes(app: Sphinx) -> None:
 
 def _on_read(app: Sphinx, docname: str, source: list[str]) -> None:
     path = app.srcdir / f"{docname}.md"
-    if path.parent == DOCS:
+    if READMES not in path.parents:
         source[0] = site_text(source[0], path, path)
     if docname == "index":
         source[0] += _rest(app.env, source[0])

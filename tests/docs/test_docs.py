@@ -1,8 +1,6 @@
 """The documentation: it builds, its code runs, its commands and the names that it cites exist."""
 
 import re
-import subprocess
-import sys
 import tomllib
 
 import pytest
@@ -28,18 +26,11 @@ def shown(page):
     return str(page.relative_to(ROOT))
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("site")
-    build = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "-d", folder / "doctrees"]
-    result = subprocess.run([*build, DOCS, folder / "html"], capture_output=True, text=True)
-    assert result.returncode == 0, result.stdout + result.stderr
-    return folder / "html"
-
-
 def test_the_site_builds_without_a_warning_and_holds_every_page(site):
-    built = {path.stem for path in site.glob("*.html")}
-    assert {page.stem for page in DOCS.glob("*.md")} <= built
+    pages = [*DOCS.glob("*.md"), *DOCS.glob("api/*.md")]
+    assert len(pages) > 30
+    for page in pages:
+        assert (site / page.relative_to(DOCS)).with_suffix(".html").is_file()
 
 
 def test_the_site_fetches_nothing(site):

@@ -42,12 +42,13 @@ class Planner(Protocol):
     """Anything that flies a swarm: two methods are all that is needed.
 
     A rollout reads more where a planner has it:
-        `warm_up(brief)`: compiles what needs compiling; called once, before `reset`, untimed.
-        `last_decision`: a `Decision` about the last `act`, or None.
-        `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
-        `options`: the pydantic model it was made with; goes into the record.
-        `fingerprint`: text that changes with the data it flies by (a policy's weights); part of the
-            identity of its flights in a comparison.
+
+    - `warm_up(brief)`: compiles what needs compiling; called once, before `reset`, untimed.
+    - `last_decision`: a `Decision` about the last `act`, or None.
+    - `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
+    - `options`: the pydantic model it was made with; goes into the record.
+    - `fingerprint`: text that changes with the data it flies by (a policy's weights); part of the
+      identity of its flights in a comparison.
 
     A planner that is found by name (entry-point group `uas_coverage.planners`) is a class with an
     attribute `Options` (see `PlannerOptions`), made as `PlannerClass(options)`; for KIND:ARGUMENT

@@ -1,0 +1,26 @@
+"""The site, built once for all tests that look at it."""
+
+import subprocess
+import sys
+
+import pytest
+from filelock import FileLock
+from markdown_blocks import ROOT
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory, worker_id):
+    """The folder of the site as HTML; workers of one run share it."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base if worker_id == "master" else base.parent) / "site"
+    with FileLock(folder.with_suffix(".lock")):
+        if not folder.exists():
+            _build(folder)
+    return folder / "html"
+
+
+def _build(folder):
+    options = ["-W", "-q", "-b", "html", "-d", folder / "doctrees"]
+    command = [sys.executable, "-m", "sphinx", *options, ROOT / "docs", folder / "html"]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
