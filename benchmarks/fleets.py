@@ -33,7 +33,7 @@ HEAD = ("UAS", "planner", *MEASURED)
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Fly, print and fill the README; the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--fleets", default="1,2,4,8", help="numbers of UAS; default 1,2,4,8")
     parser.add_argument("--missions", type=int, default=20, help="towns for each")
     arguments = parser.parse_args(argv)

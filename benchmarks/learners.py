@@ -70,7 +70,7 @@ STUDIES = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the studies; the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     names = [study.config for study in STUDIES]
     parser.add_argument("studies", nargs="*", metavar="STUDY", help=f"of {', '.join(names)}")
     parser.add_argument("--seeds", type=int, default=3, help="how many; 3 are published")
@@ -219,7 +219,7 @@ def curve_of(directory: Path) -> list[CurvePoint]:
     lines = (directory / curve.TABLE).read_text(encoding="utf-8").splitlines()
     whole = {"steps"}
     return [
-        CurvePoint(**{k: int(v) if k in whole else float(v) for k, v in row.items()})
+        CurvePoint.model_validate({k: int(v) if k in whole else float(v) for k, v in row.items()})
         for row in csv.DictReader(lines)
     ]
 

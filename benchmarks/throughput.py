@@ -289,8 +289,8 @@ def main(
             f"there is no {wrong}; peers: none, all, {', '.join(PEERS)}; clock: wall, cpu"
         )
         raise typer.Exit(2)
-    numbers = [[int(part) for part in text.split(",")] for text in (envs, threads)]
-    cases = cases_of(*numbers, chosen, cuda)
+    n_envs, n_threads = ([int(part) for part in text.split(",")] for text in (envs, threads))
+    cases = cases_of(n_envs, n_threads, chosen, cuda)
     failed = measure(cases, turns, seconds, cache, clock)
     console.print(table_of(cases))
     for _, why in failed:

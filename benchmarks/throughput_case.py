@@ -123,6 +123,7 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
     from uas_coverage_env.env.cuda import CudaMissions
 
     flown = CudaMissions(num_envs)
+    acted: Any = flown.missions.acted  # on the GPU
     rng = np.random.default_rng(0)
     # actions lie on the GPU already, as those of a learner there would
     drawn = [
@@ -131,12 +132,12 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
     ]
 
     def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
-        before = int(flown.missions.acted.copy_to_host().sum())
+        before = int(acted.copy_to_host().sum())
         for step in range(n_steps):
             flown.step(drawn[step % N_ON_GPU])
         cuda.synchronize()
         return lambda: (
-            int(flown.missions.acted.copy_to_host().sum()) - before,
+            int(acted.copy_to_host().sum()) - before,
             n_steps * num_envs * N_AGENTS,
         )
 
@@ -144,7 +145,7 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
 
 
 def _mpe2_dict(num_envs: int, threads: int) -> Steps:
-    from mpe2 import simple_spread_v3
+    from mpe2 import simple_spread_v3  # pyright: ignore[reportMissingImports]
 
     return _parallel(
         simple_spread_v3.parallel_env(N=N_AGENTS, max_cycles=100, continuous_actions=True)
@@ -153,7 +154,7 @@ def _mpe2_dict(num_envs: int, threads: int) -> Steps:
 
 def _vmas(num_envs: int, threads: int) -> Steps:
     import torch
-    import vmas
+    import vmas  # pyright: ignore[reportMissingImports]
 
     torch.set_num_threads(threads)
     env = vmas.make_env(
@@ -179,8 +180,8 @@ def _vmas(num_envs: int, threads: int) -> Steps:
 
 
 def _jaxmarl(num_envs: int, threads: int) -> Steps:
-    import jax
-    import jaxmarl
+    import jax  # pyright: ignore[reportMissingImports]
+    import jaxmarl  # pyright: ignore[reportMissingImports]
 
     env = jaxmarl.make("MPE_simple_spread_v3", num_agents=N_AGENTS, num_landmarks=N_AGENTS)
 
@@ -199,6 +200,7 @@ def _jaxmarl(num_envs: int, threads: int) -> Steps:
 
     def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
         nonlocal state
+        answer = None
         for step in range(n_steps):
             answer = step_all(keys[step % N_DRAWN], state)
             state = answer[1]

@@ -90,7 +90,7 @@ def judged(task: Task, routes: Sequence[NDArray[np.int64]]) -> Order:
 
 def routed(task: Task, seconds: float) -> Order:
     """OR-tools: one vehicle per UAS, from where it is, to its start."""
-    from ortools.constraint_solver import pywrapcp, routing_enums_pb2
+    from ortools.constraint_solver import pywrapcp, routing_enums_pb2  # pyright: ignore[reportMissingImports]
 
     U, W = task.n_uas, task.n_waypoints
     starts, ends = [W + u for u in range(U)], [W + U + u for u in range(U)]
@@ -153,7 +153,7 @@ def main(
 ) -> None:
     """Compare orders, predicted and flown."""
     try:
-        import ortools
+        import ortools  # pyright: ignore[reportMissingImports]
 
         solvers = {"annealing": annealed, f"OR-tools {ortools.__version__}": routed}
     except ImportError:

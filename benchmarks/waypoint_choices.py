@@ -107,7 +107,7 @@ def table(title: str, players: dict[str, NDArray]) -> Table:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Fly and print; the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seeds", default="2000:2020", help="FIRST:END")
     parser.add_argument("--simulations", default="0,32", help="how many; default 0,32")
     parser.add_argument("--filter", default="true", help="false: fly without the safety filter")

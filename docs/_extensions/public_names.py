@@ -12,7 +12,7 @@ import importlib
 import inspect
 import re
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 from docutils import nodes
 from numba.core.dispatcher import Dispatcher
@@ -20,7 +20,7 @@ from pydantic import BaseModel
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
-from sphinx.ext.autodoc.mock import mock
+from sphinx.ext.autodoc.mock import mock  # pyright: ignore[reportPrivateImportUsage]
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 
@@ -49,7 +49,6 @@ class Public(SphinxDirective):
 
     required_arguments = 1
     has_content = True
-    option_spec: ClassVar[dict[str, Any]] = {}
 
     def run(self) -> list[nodes.Node]:
         """What stands in the page for the directive."""
@@ -89,9 +88,10 @@ def _comment(module_name: str, name: str) -> list[str]:
 def _imported_from(module_name: str, name: str) -> Iterator[str]:
     yield module_name
     for statement in ast.walk(ast.parse(ModuleAnalyzer.for_module(module_name).code)):
-        names = statement.names if isinstance(statement, ast.ImportFrom) else []
-        if name in [alias.asname or alias.name for alias in names]:
-            yield from _imported_from(statement.module or module_name, name)
+        if not isinstance(statement, ast.ImportFrom) or statement.module is None:
+            continue
+        if name in [alias.asname or alias.name for alias in statement.names]:
+            yield from _imported_from(statement.module, name)
 
 
 def _restructured(text: str) -> list[str]:

@@ -100,7 +100,7 @@ def test_it_learns_and_explores_less_and_less():
     before = fresh.policy().tensors
     fresh.model.lr_schedule = lambda _: 0.25 * fresh.model.learning_rate
     fresh.model.learn(64)
-    assert np.allclose(fresh.model.policy.log_std.detach(), np.log(0.125))
+    assert np.allclose(fresh.model.policy.get_parameter("log_std").detach(), np.log(0.125))
     after = fresh.policy().tensors
     assert all(not np.array_equal(before[name], after[name]) for name in before)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tiny_policies import describe, weights, write
 from uas_coverage_agents.policy import save_policy
+from uas_coverage_agents.policy.planner import PolicyPlanner
 
 from uas_coverage_env import InputError, generate_scenario, load_planner, rollout
 from uas_coverage_env.cli import main
@@ -34,6 +35,7 @@ def test_a_policy_directory_is_a_planner(directory, scenario):
 
 def test_a_policy_flies_as_its_actions_do_in_the_environment(directory, scenario):
     planner = load_planner(f"policy:{directory}")
+    assert isinstance(planner, PolicyPlanner)
     flight = rollout(scenario, planner, max_steps=40)
     env = CoverageParallelEnv(scenario, return_mode=True, safety_filter=True)
     views, _ = env.reset()

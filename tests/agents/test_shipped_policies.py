@@ -21,6 +21,7 @@ def test_learned_velocity_is_a_planner_with_both_assistants():
     assert planner.assistants.safety_filter
     assert planner.fingerprint == load_policy(SHIPPED).description.weights_sha256
     bare = load_planner("learned-velocity", {"filter": "false", "return_mode": "false"})
+    assert isinstance(bare, LearnedVelocity)
     assert not bare.assistants.return_mode
     assert not bare.assistants.safety_filter
 

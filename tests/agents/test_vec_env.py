@@ -49,7 +49,7 @@ def test_lanes_are_the_uas_of_a_batch():
             observations, batch.step(actions.reshape(3, -1)).reshape(9, -1)
         )
         np.testing.assert_array_equal(rewards, batch.lanes.rewards.ravel().astype(np.float32))
-        assert observations.dtype == rewards.dtype == np.float32
+        assert np.asarray(observations).dtype == rewards.dtype == np.float32
 
 
 def test_lanes_without_a_flying_uas_are_paid_nothing():

@@ -1,10 +1,12 @@
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from stable_baselines3 import PPO, SAC
 from uas_coverage_agents.policy import Policy
-from uas_coverage_agents.training.config import load_config
+from uas_coverage_agents.training.config import SacSettings, load_config
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly
 from uas_coverage_agents.training.trainee import Order, Trainee
@@ -99,6 +101,7 @@ def test_lanes_go_on_where_they_were_put_aside(towns):
 
 def test_only_decisions_are_learned_from():
     trainee = Trainee.untrained(Order("tiny", load_config(TINY), seed=0))
+    assert isinstance(trainee.model, PPO)
     trainee.model.learn(64)
     buffer = trainee.model.rollout_buffer
     batches = list(buffer.get(batch_size=16))
@@ -135,10 +138,13 @@ def test_sac_remembers_decisions_alone_and_what_came_of_them(towns):
 def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays():
     config = load_config("sac", changes=["scenarios.pool=4", "lanes=4"])
     trainee = Trainee.untrained(Order("sac", config, seed=0))
+    assert isinstance(trainee.model, SAC)
+    assert isinstance(config.learning, SacSettings)
+    assert trainee.model.log_ent_coef is not None
     weight = float(trainee.model.log_ent_coef.detach().exp())
     assert weight == pytest.approx(config.learning.first_entropy)
     env = trainee.lanes
-    view = env.reset()
+    view: Any = env.reset()
     paid = []
     for _, actions in zip(range(100), actions_of(env), strict=False):
         decided = view[:, FLYING] > 0

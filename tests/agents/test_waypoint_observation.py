@@ -13,6 +13,7 @@ from uas_coverage_agents.waypoint.layout import (
     TEAM_AT,
     WAY,
     K,
+    Number,
 )
 from uas_coverage_agents.waypoint.legs import legs_of
 from uas_coverage_agents.waypoint.look import NO_TARGET, look
@@ -113,8 +114,9 @@ def test_columns_and_scales_come_from_the_table():
     assert CANDIDATE.features[WAY].name == "way"
     assert CANDIDATE.features[0].name == "there"  # the network looks there for who is there
     for feature in (*TEAM.features, *CANDIDATE.features):
+        assert isinstance(feature, Number)
         assert feature.meaning.endswith(f" / {feature.over}" if feature.over else feature.meaning)
-    scales = {feature.over: feature.scale for feature in CANDIDATE.features}
+    scales = {f.over: f.scale for f in CANDIDATE.features if isinstance(f, Number)}
     assert scales["2 unit_m"] == (2.0, 1)
     assert scales["unit_s"] == (1.0, 2)
     assert scales["300 s"] == (300.0, 0)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from uas_coverage_agents.policy import load_policy
-from uas_coverage_agents.waypoint.planner import SHIPPED
+from uas_coverage_agents.waypoint.planner import SHIPPED, LearnedWaypoint
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight import coverage, energy_Wh, home
@@ -24,9 +24,10 @@ def test_the_shipped_policy_covers_the_village_and_saves_energy_and_time():
 
 def test_its_options_say_what_flies_along():
     planner = load_planner("learned-waypoint", {"filter": "false", "simulations": "7"})
+    assert isinstance(planner, LearnedWaypoint)
     assert not planner.assistants.safety_filter
     assert planner.assistants.return_mode
-    assert planner.options.simulations == 7
+    assert planner.options.model_dump()["simulations"] == 7
     with pytest.raises(InputError, match="simulations"):
         load_planner("learned-waypoint", {"simulations": "-1"})
 

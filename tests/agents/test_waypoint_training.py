@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.training.pointer import PointerPolicy
 from uas_coverage_agents.training.waypoint import WaypointLearner
@@ -125,6 +126,7 @@ def test_what_is_exported_chooses_as_the_model_does():
             parameter.add_(0.2 * torch.randn_like(parameter))
     rows = np.asarray(lanes.reset())
     pointer, tensors = learner.export(model)
+    assert isinstance(pointer, Pointer)
     weights = {name: tensor.astype(np.float64) for name, tensor in tensors.items()}
     assert {name: tensor.shape for name, tensor in tensors.items()} == pointer.shapes()
     scores = policy.mlp_extractor.forward_actor(torch.as_tensor(rows)).detach().numpy()

@@ -1,5 +1,6 @@
 import dataclasses
 from itertools import chain
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def distances_m(scenario, swarm, name):
     return np.linalg.norm(places_m - swarm.x[swarm.names.index(name), :3], axis=1)
 
 
-def ready(planner, scenario):
+def ready(planner, scenario) -> Any:
     planner.reset(MissionBrief.of(scenario), 0)
     return planner
 
@@ -182,7 +183,7 @@ def test_a_random_walk_is_repeated_by_its_seed_alone(village, at_start):
 
 
 def test_a_random_walk_holds_its_lots_and_keeps_to_its_speed_and_the_fence(village, at_start):
-    planner = RandomWalk(RandomWalkOptions(hold_s=4.0, speed=0.5))
+    planner: Any = RandomWalk(RandomWalkOptions(hold_s=4.0, speed=0.5))
     planner.reset(MissionBrief.of(village), 3)
     drawn = [planner.act(dataclasses.replace(at_start, step=k))["uas_1"] for k in range(40)]
     assert all(len(set(drawn[k : k + 4])) == 1 for k in range(0, 40, 4))

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import pytest
@@ -223,7 +224,7 @@ def test_a_watched_flight_is_shown_in_a_window_with_what_is_planned(monkeypatch)
     pygame = pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     scenario = load_scenario("open_field")
-    planner = load_planner("hover")
+    planner: Any = load_planner("hover")
     screen = terminal()
     pictures = []
 

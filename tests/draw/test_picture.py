@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def swarm(village):
     return World(village).swarm_state()
 
 
-def differs(one, other):
+def differs(one, other) -> Any:
     """The box (top, bottom, left, right) in which two pictures differ; None where they do not."""
     rows, columns = np.nonzero((one != other).any(axis=2))
     return (rows.min(), rows.max(), columns.min(), columns.max()) if len(rows) else None

@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+from gymnasium import spaces
 from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
@@ -43,6 +44,7 @@ def close(distance_m):
 def test_the_space_has_the_size_and_bounds_of_the_layout():
     env = uas_coverage_v0.parallel_env(practice_ground())
     space = env.observation_space("uas_1")
+    assert isinstance(space, spaces.Box)
     low, high = observation_bounds()
     assert space.shape == (OBSERVATION_SIZE,) == (234,)
     assert space.dtype == np.float32

@@ -1,6 +1,7 @@
 import copy
 import pickle
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -291,7 +292,7 @@ def test_a_limit_that_is_set_is_the_same_as_one_that_was_given():
 
 
 def test_in_turns_an_invalid_action_is_refused_at_once():
-    env = uas_coverage_v0.env(practice_ground())
+    env: Any = uas_coverage_v0.env(practice_ground())
     env.reset()
     for wrong in (np.array([np.nan, 0, 0]), np.array([np.inf, 0, 0]), np.zeros(2), None, "up"):
         with pytest.raises(ValueError, match="uas_1"):

@@ -1,6 +1,7 @@
 """`make_vec` is what `SyncVectorEnv` over single environments is, only in one compiled call."""
 
 import pickle
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -21,7 +22,7 @@ GROUND = practice_ground(tower=True, n_moving=1, max_steps=25)
 MIXED = [practice_ground(n_uas=n, max_steps=20) for n in (1, 3)]
 
 
-def make(num_envs=3, **settings):
+def make(num_envs=3, **settings) -> Any:
     settings.setdefault("scenario", GROUND)
     return gymnasium.make_vec(
         ID, num_envs=num_envs, vectorization_mode="vector_entry_point", **settings

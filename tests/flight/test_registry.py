@@ -17,11 +17,11 @@ from uas_coverage_env.strict_toml import InputError
 class TunedOptions(PlannerOptions):
     """What can be tuned."""
 
-    horizon: int = Field(18, ge=2, description="steps to look ahead")
-    time_limit_s: float = Field(1.0, gt=0.0, description="per decision [s]")
-    deterministic: bool = Field(False, description="same result on every machine")
-    solver: Literal["highs", "scip"] = Field("highs", description="who solves")
-    seed_s: float | None = Field(None, description="or none")
+    horizon: int = Field(default=18, ge=2, description="steps to look ahead")
+    time_limit_s: float = Field(default=1.0, gt=0.0, description="per decision [s]")
+    deterministic: bool = Field(default=False, description="same result on every machine")
+    solver: Literal["highs", "scip"] = Field(default="highs", description="who solves")
+    seed_s: float | None = Field(default=None, description="or none")
 
 
 class Tuned:
@@ -65,6 +65,7 @@ def test_an_unknown_planner_is_refused_with_the_known_ones():
 def test_options_are_read_from_text():
     given = {"horizon": "12", "time_limit_s": "0.5", "deterministic": "true", "solver": "scip"}
     planner = load_planner("tuned", given)
+    assert isinstance(planner, Tuned)
     assert planner.options == TunedOptions(
         horizon=12, time_limit_s=0.5, deterministic=True, solver="scip"
     )

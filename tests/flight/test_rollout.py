@@ -1,5 +1,6 @@
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def changed(scenario, **fields):
 
 
 def commanding(command):
-    planner = Still()
+    planner: Any = Still()
     planner.act = lambda swarm: dict.fromkeys(swarm.active, command)
     return planner
 
@@ -152,7 +153,7 @@ def test_what_the_safety_filter_replaced_is_kept_step_by_step(yard):
 
 
 def test_a_collision_with_an_obstacle_names_the_obstacle(yard):
-    planner = Still()
+    planner: Any = Still()
     planner.act = lambda swarm: {
         name: Velocity(6.0, 3.0 if name == "left" else -3.0, 3.0) for name in swarm.active
     }
@@ -224,7 +225,7 @@ def test_warming_up_comes_first_and_is_not_timed(yard, listed):
 
 
 def test_decision_time_is_that_of_the_planner_alone(yard):
-    planner = Still()
+    planner: Any = Still()
     act = planner.act
     planner.act = lambda swarm: time.sleep(0.02) or act(swarm)
     flight = rollout(yard, planner, max_steps=2, on_step=lambda progress: time.sleep(0.2))
@@ -235,7 +236,7 @@ def test_decision_time_is_that_of_the_planner_alone(yard):
 
 
 def test_what_a_planner_tells_about_its_decisions_is_kept(yard):
-    planner = Still()
+    planner: Any = Still()
     act = planner.act
 
     def telling(swarm):
@@ -266,7 +267,7 @@ def test_what_a_planner_tells_about_its_decisions_is_kept(yard):
 def test_assistants_are_those_of_the_planner_unless_the_caller_says_otherwise(
     yard, asked, given, flown
 ):
-    planner = Still()
+    planner: Any = Still()
     if asked is not None:
         planner.assistants = asked
     flight = rollout(yard, planner, max_steps=1, return_mode=given, safety_filter=given)
@@ -284,7 +285,7 @@ def test_assistants_are_those_of_the_planner_unless_the_caller_says_otherwise(
     ],
 )
 def test_commands_that_cannot_be_flown_are_reported_with_planner_and_time(yard, commands, reason):
-    planner = Still()
+    planner: Any = Still()
     act = planner.act
     planner.act = lambda swarm: act(swarm) if swarm.step < 2 else commands(swarm)
     with pytest.raises(PlannerError, match=r"'Still' at t = 2 s: ") as error:
@@ -307,7 +308,7 @@ def test_options_of_a_planner_go_into_the_record(yard):
     class Options(PlannerOptions):
         patience_s: float = 2.5
 
-    planner = Still()
+    planner: Any = Still()
     planner.options = Options()
     flight = rollout(yard, planner, seed=11, max_steps=1)
     assert (flight.planner, flight.planner_options, flight.seed) == (

@@ -114,7 +114,7 @@ def test_steps_are_compared_only_where_both_have_accomplished_the_mission(missio
     assert cells["accomplished"] == ["2/2", "1/2"]
     assert cells["pairs"] == ["", "1"]
     assert cells["Δ steps [95 %]"][1] == "-10.0 [-10.0, -10.0]"
-    assert cells["Δ coverage"][1].startswith("-25.0")
+    assert str(cells["Δ coverage"][1]).startswith("-25.0")
 
 
 def run(*arguments):

@@ -6,6 +6,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from uas_coverage_env.flight import MODES, DecisionRecord
 from uas_coverage_env.replay.figures import (
@@ -113,9 +114,10 @@ def test_the_modes_fill_the_time_of_every_uas(flight):
     coverage, bars = modes_figure(dataclasses.replace(flight, mode=mode)).axes
     widths = {0.0: [], 1.0: []}
     for patch in bars.patches:
+        assert isinstance(patch, Rectangle)
         widths[round(patch.get_y() + patch.get_height() / 2)].append(patch.get_width())
     assert widths == {0.0: [40.0, 10.0, 10.0], 1.0: [60.0]}
-    assert coverage.get_lines()[0].get_ydata().tolist() == flight.covered.tolist()
+    assert np.asarray(coverage.get_lines()[0].get_ydata()).tolist() == flight.covered.tolist()
 
 
 def test_decision_times_are_drawn_with_fallbacks_and_the_limit(flight):

@@ -53,7 +53,7 @@ def test_a_gif_has_a_picture_per_sample_and_plays_for_ever(short, tmp_path):
     with Image.open(path) as film:
         assert film.info["loop"] == 0
         durations = []
-        for k in range(film.n_frames):
+        for k in range(getattr(film, "n_frames", 1)):
             film.seek(k)
             durations.append(film.info["duration"])
             if k == 3:

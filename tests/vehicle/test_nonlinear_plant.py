@@ -1,5 +1,7 @@
 """The nonlinear plant: what it shares with the LPV model, its energy, and its robustness."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from flying import (
@@ -393,7 +395,9 @@ def test_a_tricopter_balances_its_yaw_torque_by_tilting_a_rotor():
     np.testing.assert_allclose(x[RIGID], at(20.0)[RIGID], rtol=0, atol=1e-9)
 
 
-MIXERS = {n: compile_vehicle(rotors("s500_v2", n), 1.0)[()] for n in (3, 4, 5, 6, 8)}
+MIXERS: dict[int, Any] = {
+    n: compile_vehicle(rotors("s500_v2", n), 1.0)[()] for n in (3, 4, 5, 6, 8)
+}
 
 
 def test_torques_act_on_the_plant_as_on_the_lpv_model():

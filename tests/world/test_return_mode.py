@@ -94,7 +94,7 @@ def test_a_whole_town_comes_home_from_a_random_walk():
     while not world.done and world.state.step[0] < 140:
         if world.state.step[0] % 5 == 0:
             commands = {
-                name: Velocity(*rng.uniform(-10, 10, 2), rng.uniform(5, 30)) for name in world.names
+                name: Velocity(*rng.uniform([-10, -10, 5], [10, 10, 30])) for name in world.names
             }
         world.step({name: commands[name] for name in world.active})
     assert (world.state.status == LANDED).all()
