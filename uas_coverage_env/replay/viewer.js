@@ -1,6 +1,6 @@
 /*
 Built from viewer/ by "npm ci && npm run build"; do not edit.
-sources sha256:5292a51ef133398dfba4b18fa8aa30fa2de9e55fb53a0886069cf64a8eb0a44d
+sources sha256:7edcaaa707e48718ab8491a7de6e6cb35c8fa9457e90c529000b646be0d0f2e6
 
 Contains three.js 0.187.0:
 

@@ -1,0 +1,71 @@
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { Flight } from "../src/flight";
+import { someFlight } from "./some_flight";
+
+const near = (found: number[], expected: number[], by = 1e-9) => {
+  assert.equal(found.length, expected.length);
+  found.forEach((value, k) => assert.ok(Math.abs(value - expected[k]) <= by, `${found}`));
+};
+
+test("between samples a UAS is on the straight line, and so is its charge", () => {
+  const { vehicles, sample } = new Flight(someFlight()).moment(0.75);
+  assert.equal(sample, 1);
+  near(vehicles[0].position, [2, 2, -3]);
+  near([vehicles[0].soc, vehicles[0].speed], [0.98, 4]);
+});
+
+test("what moves is between samples, too", () => {
+  near(new Flight(someFlight()).moment(0.25).moving[0], [0, 0.5, -10]);
+});
+
+test("times before the start and after the end show the first and the last sample", () => {
+  const flight = new Flight(someFlight());
+  near(flight.moment(-7).vehicles[0].position, [0, 0, 0]);
+  const end = flight.moment(99);
+  assert.equal(end.time, flight.duration);
+  assert.equal(end.sample, 2);
+  near(end.vehicles[0].position, [3, 2, -3]);
+});
+
+test("a time that falls short of its sample by rounding still shows the sample", () => {
+  assert.equal(new Flight(someFlight()).moment(0.5 - 1e-9).sample, 1);
+  assert.equal(new Flight(someFlight()).moment(0.5 - 1e-3).sample, 0);
+});
+
+test("a curve ends where its UAS landed or was lost", () => {
+  const flight = new Flight(someFlight());
+  near(flight.column(flight.data.soc, 0), [1, 0.99, 0.97]);
+  near(flight.column(flight.data.soc, 1), [0.9, 0.89]);
+});
+
+test("predictions are in metres, and none where none was made", () => {
+  const flight = new Flight(someFlight());
+  near(flight.predicted(0, 0), [1, 2, 3]);
+  assert.deepEqual([flight.predicted(0, 1), flight.predicted(1, 0), flight.predicted(9, 0)], [[], [], []]);
+});
+
+test("a violation is shown where its UAS was then", () => {
+  const flight = new Flight(someFlight());
+  near(flight.where(flight.data.violations[0]), [5, 1, 0]);
+  assert.equal(flight.mode(1, 1), "lost");
+});
+
+test("a flight that Python wrote is read as Python recorded it", () => {
+  const path = process.env.FLIGHT;
+  if (!path) return; // tests/replay/test_viewer.py hands one over
+  const { data, expected } = JSON.parse(readFileSync(path, "utf8"));
+  const flight = new Flight(data);
+  assert.equal(flight.duration, expected.duration_s);
+  assert.ok(expected.moments.length > 3);
+  for (const { time_s, position_m, soc, mode, covered } of expected.moments) {
+    const moment = flight.moment(time_s);
+    moment.vehicles.forEach((vehicle, i) => {
+      near(vehicle.position, position_m[i], 0.006);
+      near([vehicle.soc], [soc[i]], 6e-5);
+      assert.equal(vehicle.mode, mode[i]);
+    });
+    assert.equal(moment.covered, covered);
+  }
+});

@@ -1,0 +1,47 @@
+// A flight of two UAS over three samples, one of which is lost at the second.
+
+import type { FlightData } from "../src/flight";
+
+export function someFlight(): FlightData {
+  const body = { corners: [], triangles: [], outline: [] };
+  const series = (unit: number, values: number[]) => ({ unit, values });
+  return {
+    planner: "hover",
+    seed: 0,
+    dynamics: "lpv",
+    dt_s: 0.5,
+    samples: 3,
+    scene: {
+      name: "yard",
+      fence: body,
+      obstacles: [],
+      decorations: [],
+      waypoints: [],
+      moving: [{ name: "balloon", kind: "balloon", radius: 1, height: 2, safe: 3 }],
+      uas: [
+        { name: "uas_1", colour: "#000000", start: [0, 0, 0], lowest_soc: 0.2 },
+        { name: "uas_2", colour: "#ffffff", start: [5, 0, 0], lowest_soc: 0.2 },
+      ],
+    },
+    position: series(0.01, [
+      ...[0, 0, 0, 500, 0, 0],
+      ...[100, 200, -300, 500, 100, 0],
+      ...[300, 200, -300, 500, 100, 0],
+    ]),
+    attitude: series(0.001, new Array(18).fill(0)),
+    soc: series(0.0001, [10000, 9000, 9900, 8900, 9700, 8900]),
+    voltage: series(0.001, new Array(6).fill(15000)),
+    current: series(0.01, new Array(6).fill(1000)),
+    moving: series(0.01, [0, 0, -1000, 0, 100, -1000, 0, 300, -1000]),
+    duration: series(0.00001, [10, 20]),
+    modes: ["covering", "transit", "return", "landed", "lost"],
+    mode: [0, 0, 0, 4, 1, 4],
+    last: [2, 1],
+    covered: [0, 1, 1],
+    covered_at: [1],
+    fallbacks: [],
+    plan: { unit: 0.1, steps: [[[10, 20, 30], []], []] },
+    violations: [{ t_s: 0.5, uas: "uas_2", kind: "geofence", with: null }],
+    summary: { coverage: 1, steps: 2, energy_Wh: 1, all_home: false, breaches: 0 },
+  };
+}
