@@ -1,0 +1,48 @@
+"""The quick part of the suite: what it lists exists, and every package is touched by it."""
+
+import ast
+import re
+from pathlib import Path
+
+from quick_files import QUICK
+
+TESTS = Path(__file__).parent
+ROOT = TESTS.parent
+
+
+def test_what_is_listed_is_there():
+    for name, left_out in QUICK.items():
+        text = (TESTS / name).read_text(encoding="utf-8")
+        functions = set(re.findall(r"^def (test_\w+)", text, re.MULTILINE))
+        assert set(left_out) < functions, name
+
+
+def test_every_folder_of_tests_has_quick_ones():
+    folders = {path.parent.name for path in TESTS.glob("*/test_*.py")}
+    assert len(folders) > 15
+    assert folders <= {name.partition("/")[0] for name in QUICK}
+
+
+def test_every_package_is_imported_by_a_quick_test():
+    """Whatever has an `__init__.py`, but what only training needs: it loads torch."""
+    packages = {
+        ".".join(path.parent.relative_to(root).parts)
+        for root in (ROOT, ROOT / "baselines", ROOT / "agents")
+        for top in root.glob("uas_coverage_*")
+        for path in top.rglob("__init__.py")
+    }
+    imported = set()
+    for name in QUICK:
+        tree = ast.parse((TESTS / name).read_text(encoding="utf-8"))
+        for statement in ast.walk(tree):
+            if isinstance(statement, ast.ImportFrom) and statement.module:
+                imported |= {statement.module}
+                imported |= {f"{statement.module}.{alias.name}" for alias in statement.names}
+            elif isinstance(statement, ast.Import):
+                imported |= {alias.name for alias in statement.names}
+    missing = {
+        package
+        for package in packages
+        if not any(name == package or name.startswith(f"{package}.") for name in imported)
+    }
+    assert missing <= {"uas_coverage_agents.training"}
