@@ -1,8 +1,9 @@
-"""Options of the whole test suite, and its quick part."""
+"""Options of the whole test suite, its quick part, and who runs what where several processes do."""
 
 from pathlib import Path
 
 import pytest
+from distribution import rank_of, scope_of
 from quick_files import QUICK
 
 TESTS = Path(__file__).parent
@@ -23,12 +24,29 @@ def pytest_ignore_collect(collection_path, config):
     return None
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     for item in items:
         left_out = QUICK.get(_name(item.path))
         if left_out is None or item.originalname in left_out or item.get_closest_marker("slow"):
             continue
         item.add_marker(pytest.mark.quick)
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: rank_of(item.nodeid))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """With `-n`, and no other `--dist` asked for: by `distribution`."""
+    if config.getvalue("dist") != "load":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByScope(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            return scope_of(nodeid)
+
+    config.option.loadscopereorder = False  # in the order of the items: longest first
+    return ByScope(config, log)
 
 
 def _name(path):

@@ -1,9 +1,10 @@
-"""The quick part of the suite: what it lists exists, and every package is touched by it."""
+"""What the suite says of itself: its quick part, and how it is shared between processes."""
 
 import ast
 import re
 from pathlib import Path
 
+from distribution import APART, LONGEST_FIRST, rank_of, scope_of
 from quick_files import QUICK
 
 TESTS = Path(__file__).parent
@@ -46,3 +47,19 @@ def test_every_package_is_imported_by_a_quick_test():
         if not any(name == package or name.startswith(f"{package}.") for name in imported)
     }
     assert missing <= {"uas_coverage_agents.training"}
+
+
+def test_tests_of_a_folder_stay_together_but_for_long_ones_that_share_nothing():
+    assert all((TESTS / folder).is_dir() for folder in LONGEST_FIRST)
+    assert all((TESTS / name).is_file() for name in APART)
+    one, other = "tests/env/test_batch.py::test_a[x::y]", "tests/env/test_actions.py::test_b"
+    assert scope_of(one) == scope_of(other) == "env"
+    assert scope_of("tests/test_house.py::test_c") == "test_house.py"
+    page, next_page = (f"tests/{APART[0]}::test_d[{page}]" for page in "pq")
+    assert scope_of(page) != scope_of(next_page)
+
+
+def test_the_longest_come_first():
+    nodes = [f"tests/{folder}/test_x.py::test_y" for folder in ("world", *LONGEST_FIRST[::-1])]
+    ranked = sorted([*nodes, "tests/test_house.py::test_y"], key=rank_of)
+    assert [scope_of(node) for node in ranked] == [*LONGEST_FIRST, "test_house.py", "world"]

@@ -4,18 +4,14 @@ import subprocess
 import sys
 
 import pytest
-from filelock import FileLock
 from markdown_blocks import ROOT
 
 
 @pytest.fixture(scope="session")
-def site(tmp_path_factory, worker_id):
-    """The folder of the site as HTML; workers of one run share it."""
-    base = tmp_path_factory.getbasetemp()
-    folder = (base if worker_id == "master" else base.parent) / "site"
-    with FileLock(folder.with_suffix(".lock")):
-        if not folder.exists():
-            _build(folder)
+def site(tmp_path_factory):
+    """The folder of the site as HTML."""
+    folder = tmp_path_factory.mktemp("site")
+    _build(folder)
     return folder / "html"
 
 

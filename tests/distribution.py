@@ -1,0 +1,27 @@
+"""Which tests stay together where several processes run the suite (`-n 2`), and which come first.
+
+Tests of a folder need the same kernels and fixtures: one process compiles and makes them, instead
+of each. What takes longest comes first, so that all processes end at about the same time.
+"""
+
+LONGEST_FIRST = ("agents", "missions", "docs", "env", "milp_mpc", "baselines", "replay")
+"""Folders by their processor time; the others follow in the order of their names."""
+
+APART = ("docs/test_documented_commands.py", "docs/test_notebooks.py")
+"""Files whose tests have nothing in common and are long: each goes where there is time for it."""
+
+
+def scope_of(nodeid):
+    """What a test stays together with."""
+    path = nodeid.partition("::")[0].removeprefix("tests/")
+    if path in APART:
+        return nodeid
+    folder, slash, _ = path.partition("/")
+    return folder if slash else path
+
+
+def rank_of(nodeid):
+    """Where a test stands in the order of the whole suite."""
+    folder = nodeid.removeprefix("tests/").partition("/")[0]
+    first = LONGEST_FIRST.index(folder) if folder in LONGEST_FIRST else len(LONGEST_FIRST)
+    return first, scope_of(nodeid)
