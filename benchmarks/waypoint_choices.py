@@ -32,7 +32,7 @@ from uas_coverage_env.flight.metrics import decision_time_s
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
 from uas_coverage_env.world import assistants
-from uas_coverage_env.world.pool import n_of, pool_arenas
+from uas_coverage_env.world.pool import pool_worlds
 
 COLUMNS = ("coverage", "all home", "violations", "breaches", "Wh", "steps", "p95 s", "max s")
 WH, STEPS = COLUMNS.index("Wh"), COLUMNS.index("steps")
@@ -56,13 +56,13 @@ def flown(scenarios: Sequence[Scenario], name: str, options: dict[str, Any]) -> 
 
 def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
     """(missions, columns) of who chooses what the greedy outlook says is cheapest."""
-    arenas, legs = pool_arenas(scenarios), pool_legs(scenarios)
+    worlds, legs = pool_worlds(scenarios), pool_legs(scenarios)
     n = len(scenarios)
-    lanes, states = make_lanes(n, arenas)
+    lanes, states = make_lanes(n, worlds)
     covered, discharged = np.zeros(states.uncovered.shape, bool), np.zeros(states.status.shape)
     each = np.arange(n)
     helped = (True, assistants(True, True))
-    begin_lanes(arenas, legs, lanes, states, each, each, covered, discharged, *helped)
+    begin_lanes(worlds, legs, lanes, states, each, each, covered, discharged, *helped)
     candidate = [feature.name for feature in CANDIDATE.features]
     team = [feature.name for feature in TEAM.features]
     # back to seconds / unit_s, see the scales in the layout
@@ -77,11 +77,12 @@ def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
             scale * seen[:, team.index(f)] for f, scale in home_costs.items()
         )
         choices = np.where(lanes.legal, cost, np.inf).argmin(axis=1)
-        step_lanes(arenas, legs, lanes, states, choices, *helped)
+        step_lanes(worlds, legs, lanes, states, choices, *helped)
     account = lanes.account
+    n_waypoints = np.array([len(scenario.waypoints) for scenario in scenarios])
     return np.column_stack(
         [
-            1.0 - account[:, LEFT] / n_of(arenas, "waypoints"), account[:, NOT_HOME] == 0,
+            1.0 - account[:, LEFT] / n_waypoints, account[:, NOT_HOME] == 0,
             account[:, LOST_UAS], np.full(n, np.nan), account[:, ENERGY], account[:, TIME],
             np.full(n, np.nan), np.full(n, np.nan),
         ]

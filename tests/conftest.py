@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from distribution import rank_of, scope_of
-from quick_files import QUICK
+from quick_files import QUICK, is_quick
 
 TESTS = Path(__file__).parent
 
@@ -26,10 +26,9 @@ def pytest_ignore_collect(collection_path, config):
 
 def pytest_collection_modifyitems(config, items):
     for item in items:
-        left_out = QUICK.get(_name(item.path))
-        if left_out is None or item.originalname in left_out or item.get_closest_marker("slow"):
-            continue
-        item.add_marker(pytest.mark.quick)
+        slow = item.get_closest_marker("slow") is not None
+        if not slow and is_quick(_name(item.path), getattr(item, "originalname", item.name)):
+            item.add_marker(pytest.mark.quick)
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: rank_of(item.nodeid))
 

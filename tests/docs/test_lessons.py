@@ -56,7 +56,7 @@ def test_pictures_are_small(lessons):
 def test_links_between_lessons_lead_to_pages(lessons):
     class Cell:
         cell_type = "markdown"
-        source = "[a](2_milp_blocks.ipynb) [b](../docs/x.md) [c](../agents/README.md#d)"
+        source = "[a](2_milp_blocks.ipynb) [b](../docs/rules.md) [c](../agents/README.md#d)"
 
-    shown = "[a](2_milp_blocks.md) [b](../x.md) [c](../../agents/README.md#d)"
+    shown = "[a](2_milp_blocks.md) [b](../rules.md) [c](../../agents/README.md#d)"
     assert lessons.source_of(Cell()) == shown

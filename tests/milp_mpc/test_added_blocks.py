@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from added_blocks import Apart, Ceiling, Doubled, Early, Floor, OneLevel, Thrifty, Turned
 from practice_missions import fly, mission
-from toy_problems import TO_OPTIMALITY, flown, state, toy
+from toy_problems import TO_OPTIMALITY, flown, planned, state, toy
 from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
@@ -225,7 +225,7 @@ def test_waiting_that_is_cheaper_is_the_reason_of_a_fallback():
     assert isinstance(decide(problem, None, 1.0, BY_NODES), Plan)
     outcome = decide(problem, None, 1.0, BY_NODES, blocks=(*OCP, StayLow()))
     # a program's plan to stay is as good as waiting, up to the gap: either may be flown
-    assert outcome is Reason.WAITING_IS_CHEAPER or not outcome.covers.any()
+    assert outcome is Reason.WAITING_IS_CHEAPER or not planned(outcome).covers.any()
 
 
 @pytest.mark.parametrize("wrong", [Ceiling, object(), None])
@@ -241,7 +241,7 @@ def test_what_is_no_block_is_refused_at_once(wrong):
 def test_a_block_is_found_by_its_module(names, height_m):
     flier = MilpMpc(MilpMpc.Options(blocks=names))
     assert flier.blocks[: len(OCP)] == OCP
-    assert flier.blocks[-1].height_m == height_m
-    assert isinstance(flier.blocks[-1], added_blocks.Ceiling)
-    assert flier.rehearsal().blocks[-1].height_m == height_m
+    for blocks in (flier.blocks, flier.rehearsal().blocks):
+        assert isinstance(blocks[-1], added_blocks.Ceiling)
+        assert blocks[-1].height_m == height_m
     assert len(flier.rehearsal().blocks) == len(OCP) + 1

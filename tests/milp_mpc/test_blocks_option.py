@@ -103,6 +103,7 @@ def test_a_block_is_found_by_the_name_under_which_a_package_announces_it(folder,
     monkeypatch.setattr(named_blocks, "entry_points", lambda group: [entry])
     assert named_blocks.block_names() == ("low",)
     planner = load_planner("milp-mpc-guided", {"blocks": "low"})
+    assert isinstance(planner, MilpMpcGuided)
     assert type(planner.blocks[-1]).__name__ == "Low"
     with pytest.raises(InputError, match=r"unknown block 'hgih'.*low"):
         load_planner("milp-mpc", {"blocks": "hgih"})
@@ -110,7 +111,9 @@ def test_a_block_is_found_by_the_name_under_which_a_package_announces_it(folder,
 
 @pytest.mark.parametrize("text", ["", "none"])
 def test_no_block_is_added_where_none_is_named(text):
-    assert load_planner("milp-mpc", {"blocks": text}).options.blocks == ()
+    planner = load_planner("milp-mpc", {"blocks": text})
+    assert isinstance(planner, MilpMpc)
+    assert planner.options.blocks == ()
 
 
 def test_the_weights_are_options_and_what_is_not_given_stays():
@@ -118,6 +121,7 @@ def test_the_weights_are_options_and_what_is_not_given_stays():
     ours = Weights(lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03)
     assert MilpMpcGuided().options.weights == ours
     planner = load_planner("milp-mpc", {"weight_energy": "0.5", "weight_return_home": "4"})
+    assert isinstance(planner, MilpMpc)
     assert planner.options.weights == Weights(energy=0.5, return_home=4.0)
     assert planner._weights == planner.options.weights
 

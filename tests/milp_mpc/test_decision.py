@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from toy_problems import S500, box, flight, flown, state, toy
+from toy_problems import S500, box, flight, flown, planned, state, toy
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -53,7 +53,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def by_nodes(problem):
-    return decide(problem, None, 1.0, BY_NODES)
+    return planned(decide(problem, None, 1.0, BY_NODES))
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_a_waypoint_is_covered_once_by_a_team(by_nodes):
 
 
 def test_no_decision_is_better_than_the_best_one_and_no_bound_above_it(problem, by_nodes, best):
-    with_time = decide(problem, None, 1.0, WITH_TIME)
+    with_time = planned(decide(problem, None, 1.0, WITH_TIME))
     assert by_nodes.objective >= best.objective - 1e-3
     assert best.objective - 1e-3 <= with_time.objective <= by_nodes.objective + 1e-3
     assert with_time.bound <= best.objective + 1e-3
@@ -102,7 +102,7 @@ def test_no_decision_is_better_than_the_best_one_and_no_bound_above_it(problem, 
 
 def test_one_uas_with_time_gets_its_best_plan():
     problem = two_around_a_tower(n_uas=1)
-    plan = decide(problem, None, 1.0, WITH_TIME)
+    plan = planned(decide(problem, None, 1.0, WITH_TIME))
     best = solve(formulate(problem)[0].build(), OPTIMAL)
     assert plan.objective == pytest.approx(best.objective, abs=0.02)
     assert plan.relative_gap() < 0.01
@@ -141,7 +141,7 @@ def test_several_uas_get_plans_by_nodes_where_every_flight_is_blocked():
     )
     for uas in range(2):
         assert all((one.visit == NEVER).all() for one in construct(problem, uas, 1.0))
-    plan = decide(problem, None, 1.0, BY_NODES)
+    plan = planned(decide(problem, None, 1.0, BY_NODES))
     assert first_trouble(problem, plan) is None
 
 
@@ -162,7 +162,7 @@ def nothing_for_b(monkeypatch):
 
 
 def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
-    plan = decide(problem, None, 1.0, BY_NODES)
+    plan = planned(decide(problem, None, 1.0, BY_NODES))
     assert first_trouble(problem, plan) is None
     assert plan.covers[0].any()
     assert not plan.covers[1].any()
@@ -172,7 +172,7 @@ def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
 
 def test_who_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes, nothing_for_b):
     out = backup_trajectory(problem, by_nodes, 1.0)
-    plan = decide(problem, None, 1.0, BY_NODES, backup=out)
+    plan = planned(decide(problem, None, 1.0, BY_NODES, backup=out))
     assert plan.x[1] == pytest.approx(out.x[1, :8])
     assert first_trouble(problem, plan) is None
 
@@ -189,7 +189,7 @@ def test_where_no_team_holds_a_uas_may_leave_its_fallback_plan(problem, by_nodes
         )
         search.collect(uas, [alone])
     search.combine([fallback_plans(problem, uas, None, 1.0) for uas in range(2)])
-    assert search.outcome.x == pytest.approx(by_nodes.x)
+    assert planned(search.outcome).x == pytest.approx(by_nodes.x)
 
 
 @pytest.mark.parametrize("uas", [0, 1])
@@ -223,7 +223,7 @@ def test_what_is_left_of_the_last_plan_can_be_flown_on(problem, by_nodes):
         ],
         targets=problem.targets,
     )
-    plan = decide(moved, by_nodes.advanced(), 1.0, Effort(deterministic=True, teams=1))
+    plan = planned(decide(moved, by_nodes.advanced(), 1.0, Effort(deterministic=True, teams=1)))
     assert first_trouble(moved, plan) is None
     # what was planned is planned still, and one step more of the horizon is gained
     assert plan.covers.any(axis=(0, 1)).sum() >= by_nodes.advanced().covers.any(axis=(0, 1)).sum()
@@ -231,7 +231,7 @@ def test_what_is_left_of_the_last_plan_can_be_flown_on(problem, by_nodes):
 
 def test_a_previous_plan_of_other_uas_does_no_harm(problem, by_nodes):
     alone = problem.only(1)
-    plan = decide(alone, by_nodes, 1.0, BY_NODES)
+    plan = planned(decide(alone, by_nodes, 1.0, BY_NODES))
     assert plan.names == ("b",)
     assert first_trouble(alone, plan) is None
 

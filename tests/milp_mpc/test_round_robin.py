@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from practice_missions import mission
-from toy_problems import state, toy
+from toy_problems import planned, state, toy
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided, Options
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
@@ -44,7 +44,7 @@ def test_one_after_the_other_gets_a_new_plan_and_the_others_go_on(problem):
     turns, renewed = RoundRobin(), []
     out = None
     for _ in range(3):
-        plan = decide(problem, None, 1.0, ONE, backup=out, round_robin=turns)
+        plan = planned(decide(problem, None, 1.0, ONE, backup=out, round_robin=turns))
         assert first_trouble(problem, plan) is None
         assert len(plan.renewed) == 1
         if out is not None:

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from toy_problems import S500, TO_OPTIMALITY, box, flight, state, toy
+from toy_problems import S500, TO_OPTIMALITY, box, flight, planned, state, toy
 from uas_coverage_baselines.milp_mpc import solvers
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
@@ -258,7 +258,7 @@ def test_rows_without_columns_count(solve):
 
 def test_a_decision_is_made_with_every_solver(name):
     problem = turn(8)
-    plan = decide(problem, None, 1.0, Effort(deterministic=True, teams=2, solver=name))
+    plan = planned(decide(problem, None, 1.0, Effort(deterministic=True, teams=2, solver=name)))
     assert first_trouble(problem, plan) is None
     assert plan.covers.any()
 

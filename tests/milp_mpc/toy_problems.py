@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import shared_variables
-from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, PlanningProblem
+from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -134,3 +134,9 @@ def flown(vehicle, x0, commands, dt_s=1.0):
 def flight(vehicle, x0, commands, dt_s=1.0):
     """(T+1, 14) states of such a flight."""
     return flown(vehicle, x0, commands, dt_s)[0]
+
+
+def planned(outcome) -> Plan:
+    """What `decide` answers, where it is a plan and no reason for having none."""
+    assert isinstance(outcome, Plan), outcome
+    return outcome
