@@ -13,17 +13,23 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from rich.table import Table
-from uas_coverage_env.env.nearest import moving_obstacles, nearest_waypoints, others, waypoints
-from uas_coverage_env.env.surroundings import surroundings
 
-from uas_coverage_env.borrow import borrow
+from uas_coverage_env.borrow import borrow, part
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions import write_commands
 from uas_coverage_env.env.kernel import Rules, step_learners
 from uas_coverage_env.env.memory import Learners, Scratch
-from uas_coverage_env.env.observation import OBSERVATION_SIZE, look
+from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE
+from uas_coverage_env.env.observation.block import firsts_of
+from uas_coverage_env.env.observation.moving_obstacles import write_moving_obstacles
+from uas_coverage_env.env.observation.nearest import nearest_waypoints
+from uas_coverage_env.env.observation.others import write_others
+from uas_coverage_env.env.observation.surroundings import write_surroundings
+from uas_coverage_env.env.observation.waypoints import write_waypoints
+from uas_coverage_env.env.observe import observe_one, observing_of
+from uas_coverage_env.env.pay import pay, paying_of
 from uas_coverage_env.env.pool import learners_of, tables_at
-from uas_coverage_env.env.rewards import REWARD_TERMS, pay
+from uas_coverage_env.env.rewards import REWARD
 from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
 from uas_coverage_env.world.contacts import (
@@ -46,6 +52,10 @@ compiled = njit(error_model="numpy")
 NOBODY = np.zeros(0, np.int64)
 """No assistants."""
 
+AT = firsts_of(OBSERVATION)
+SIZE = type(AT)(*(block.size for block in OBSERVATION))
+"""Where the columns of each block begin, and how many they are."""
+
 
 class View(NamedTuple):
     """What `step_learners` needs of one lane."""
@@ -56,30 +66,27 @@ class View(NamedTuple):
 
 
 @compiled
-def _whole(arena, state, tables, view, weights, spare, row):
+def _whole(arena, state, tables, view, rules, spare, row):
     step_learners(
         arena, state, tables, view.learners, Scratch(view.commands, view.outcome),
-        Rules(VELOCITY, weights, False, NOBODY), arena.rules[0].max_steps, row,
+        rules, row,
     )  # fmt: skip
 
 
 @compiled
-def _world(arena, state, tables, view, weights, spare, row):
+def _world(arena, state, tables, view, rules, spare, row):
     advance(arena, state, view.commands, False, NOBODY, view.outcome)
 
 
 @compiled
-def _observation(arena, state, tables, view, weights, spare, row):
+def _observation(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            look(
-                arena, state, tables.scales[i], view.learners.company, i, view.learners.targets,
-                arena.rules[0].max_steps, view.learners.candidates[i], row[i],
-            )  # fmt: skip
+            observe_one(arena, state, tables, view.learners, rules.observing, i, row[i], None)
 
 
 @compiled
-def _actions(arena, state, tables, view, weights, spare, row):
+def _actions(arena, state, tables, view, rules, spare, row):
     write_commands(
         state, VELOCITY, tables.ranges, view.learners.asked, view.learners.candidates,
         view.learners.targets, view.commands,
@@ -87,7 +94,7 @@ def _actions(arena, state, tables, view, weights, spare, row):
 
 
 @compiled
-def _inner_loop(arena, state, tables, view, weights, spare, row):
+def _inner_loop(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             command = view.commands[i]
@@ -96,19 +103,19 @@ def _inner_loop(arena, state, tables, view, weights, spare, row):
 
 
 @compiled
-def _model(arena, state, tables, view, weights, spare, row):
+def _model(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             lpv_step(arena.vehicles[i], state.x[i], view.outcome[i].u, spare)
 
 
 @compiled
-def _obstacles(arena, state, tables, view, weights, spare, row):
+def _obstacles(arena, state, tables, view, rules, spare, row):
     judge_obstacles(arena, state, view.outcome)
 
 
 @compiled
-def _other_contacts(arena, state, tables, view, weights, spare, row):
+def _other_contacts(arena, state, tables, view, rules, spare, row):
     judge_separation(arena, state, view.outcome)
     judge_fence_and_battery(arena, state, view.outcome)
     count_breaches(arena, state, view.outcome)
@@ -116,46 +123,48 @@ def _other_contacts(arena, state, tables, view, weights, spare, row):
 
 
 @compiled
-def _coverage(arena, state, tables, view, weights, spare, row):
+def _coverage(arena, state, tables, view, rules, spare, row):
     cover(arena, state, view.outcome)
     land(arena, state, view.outcome)
 
 
 @compiled
-def _reward(arena, state, tables, view, weights, spare, row):
-    pay(arena, state, view.commands, view.outcome, weights, False, view.learners.report)
+def _reward(arena, state, tables, view, rules, spare, row):
+    scratch = Scratch(view.commands, view.outcome)
+    pay(arena, state, tables, view.learners, scratch, rules.paying, None)
 
 
 @compiled
-def _nearest(arena, state, tables, view, weights, spare, row):
+def _nearest(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
             nearest_waypoints(arena, state, i, view.learners.candidates[i])
 
 
 @compiled
-def _waypoints(arena, state, tables, view, weights, spare, row):
+def _waypoints(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            waypoints(
-                arena, state, tables.scales[i], view.learners.company, i, view.learners.targets,
-                view.learners.candidates[i], row[i], 0,
-            )  # fmt: skip
+            columns = part(row[i], AT.waypoints, SIZE.waypoints)
+            write_waypoints(arena, state, tables, view.learners, i, columns)
 
 
 @compiled
-def _surroundings(arena, state, tables, view, weights, spare, row):
+def _surroundings(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            surroundings(arena, state, i, row[i], 0)
+            columns = part(row[i], AT.surroundings, SIZE.surroundings)
+            write_surroundings(arena, state, i, columns)
 
 
 @compiled
-def _movers(arena, state, tables, view, weights, spare, row):
+def _movers(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            k = others(arena, state, tables.scales[i], i, row[i], 0)
-            moving_obstacles(arena, state, tables.scales[i], i, row[i], k)
+            columns = part(row[i], AT.others, SIZE.others)
+            write_others(arena, state, tables, i, columns)
+            columns = part(row[i], AT.moving_obstacles, SIZE.moving_obstacles)
+            write_moving_obstacles(arena, state, tables, i, columns)
 
 
 PARTS: dict[str, Callable[..., None]] = {
@@ -177,12 +186,12 @@ PARTS: dict[str, Callable[..., None]] = {
 """In the order in which they are timed, each from the same states."""
 
 
-def _over_lanes(part: Any) -> Callable[..., None]:
+def _over_lanes(timed: Any) -> Callable[..., None]:
     # part of the loop, as it is part of a step: to call it with a hundred words takes as long
-    part = njit(error_model="numpy", forceinline=True)(part.py_func)
+    timed = njit(error_model="numpy", forceinline=True)(timed.py_func)
 
     @compiled
-    def run(pool, missions, commands, outcome, weights, spare, observation):
+    def run(pool, missions, commands, outcome, rules, spare, observation):
         arena = arena_of(pool.arenas, 0)
         tables = tables_at(pool.tables, 0)
         n_uas = arena.uas.shape[0]
@@ -195,7 +204,7 @@ def _over_lanes(part: Any) -> Callable[..., None]:
                 borrow(outcome, lane, (n_uas,)),
             )
             row = borrow(observation, lane, (n_uas, OBSERVATION_SIZE))
-            part(arena, state, tables, view, weights, spare, row)
+            timed(arena, state, tables, view, rules, spare, row)
 
     return run
 
@@ -209,18 +218,20 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
     fleet = batch.worlds.status.shape
+    paying = paying_of(REWARD, np.ones(len(REWARD)))
+    rules = Rules(VELOCITY, False, NOBODY, paying, observing_of(OBSERVATION))
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,
         np.zeros(fleet, COMMAND_DTYPE), np.zeros(fleet, OUTCOME_DTYPE),
-        np.ones(len(REWARD_TERMS)), np.zeros(14), batch.observation,
+        rules, np.zeros(14), batch.observation,
     )  # fmt: skip
     # once, so that there are outcomes for the parts to go on from
     _over_lanes(PARTS[WHOLE])(*arguments)
     result = {}
     flying = int(batch.flying.sum())
     kept = batch.worlds.copy()
-    for name, part in PARTS.items():
-        run = _over_lanes(part)
+    for name, timed in PARTS.items():
+        run = _over_lanes(timed)
         run(*arguments)
         best_s = np.inf
         for _ in range(repeats):

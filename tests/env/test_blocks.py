@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -34,7 +35,7 @@ def strength(x):
     return 1.0 / (1.0 + math.hypot(30.0 - x[X], -20.0 - x[Y]) / 100.0)
 
 
-def flown(env, steps=12, seed=3):
+def flown(env, steps=12, seed=3) -> list[Any]:
     """Observations and infos of random steps."""
     rng = np.random.default_rng(seed)
     rows = [env.reset(seed=0)]

@@ -2,6 +2,7 @@ import csv
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_there_is_one_row_per_uas_and_sample_until_it_has_landed(flight, saved):
 
 
 def test_a_lost_uas_has_its_last_row_where_it_is_lost(yard, tmp_path):
-    planner = _Predicting()
+    planner: Any = _Predicting()
     planner.act = lambda swarm: {name: Velocity(12.0, 0.0, 3.0) for name in swarm.active}
     folder = rollout(yard, planner).save(tmp_path / "lost")
     modes = [row["mode"] for row in rows_of(folder / "flight.csv") if row["uas"] == "left"]
@@ -118,7 +119,7 @@ def test_a_lost_uas_has_its_last_row_where_it_is_lost(yard, tmp_path):
 
 
 def test_a_limit_exceeded_is_in_the_summary_and_is_read_back(yard, tmp_path):
-    planner = _Predicting()
+    planner: Any = _Predicting()
     planner.act = lambda swarm: dict.fromkeys(swarm.active, Wrench(0.0, 0.0, -0.00825, 0.0))
     flight = rollout(yard, planner, max_steps=3)
     folder = flight.save(tmp_path / "tilted")

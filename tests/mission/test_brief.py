@@ -4,6 +4,7 @@ import copy
 import pickle
 from importlib import resources
 from types import BuiltinMethodType, FunctionType, MethodType, ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -181,8 +182,9 @@ def test_public_fields_are_those_of_the_scenario(scenario):
 
 
 def test_what_a_brief_does_not_have_says_what_it_has(scenario):
+    brief: Any = MissionBrief.of(scenario)
     with pytest.raises(AttributeError, match=r"no 'moving_positions'; it has .*as_scenario\(\)"):
-        MissionBrief.of(scenario).moving_positions(3.0)
+        brief.moving_positions(3.0)
 
 
 def test_a_brief_is_immutable_and_travels(scenario):

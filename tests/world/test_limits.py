@@ -1,6 +1,7 @@
 """The paper's X and U: inputs are saturated, states beyond a limit are noted."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,7 +67,8 @@ def test_whatever_velocities_and_accelerations_are_asked_for_no_limit_is_exceede
             north, east = 40.0 * rng.uniform(-1.0, 1.0, 2)
             down = rng.uniform(-8.0, 8.0)
             velocity = Velocity(north, east, rng.uniform(-40.0, 90.0))
-            command = rng.choice([velocity, Acceleration(north, east, down)])
+            asked: list[Any] = [velocity, Acceleration(north, east, down)]
+            command = rng.choice(asked)
         outcome = world.step({"uas_1": command})
         assert exceeded(outcome) == set()
         # on a meadow without an end
@@ -116,7 +118,7 @@ def with_battery(**changed):
 )
 def test_a_battery_that_gives_too_much_is_noticed(limit, battery):
     scenario = meadow([(100.0, 100.0, -10.0)])
-    scenario.__dict__["vehicles"] = (with_battery(**battery),)
+    vars(scenario)["vehicles"] = (with_battery(**battery),)
     world = World(scenario)
     # nearly empty, after a long climb
     world.state.x[0, [DOD, U_TH]] = 0.72, 0.6
