@@ -20,6 +20,7 @@ highlight_language = "text"
 
 # signatures name types of other packages, whose sites are not looked up
 nitpick_ignore_regex = [("py:.*", ".*")]
+suppress_warnings = ["ref.python"]  # a type of which two modules have one of the same name
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 autodoc_member_order = "bysource"

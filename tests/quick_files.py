@@ -49,8 +49,10 @@ QUICK = {
         "only test_every_solver_finds_the_same_optimum "
         "test_an_unknown_solver_is_refused_with_the_names_there_are"
     ),
+    "mission/test_blocked.py": "",
+    "mission/test_brief.py": "",
+    "mission/test_legs.py": "",
     "missions/test_independent_check.py": "",
-    "order/test_legs.py": "",
     "order/test_order_search.py": "",
     "paper/test_battery_figure.py": "",
     "replay/test_figures.py": "but test_every_kind_is_a_vector_file_that_repeats_to_the_byte",

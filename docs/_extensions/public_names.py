@@ -1,7 +1,7 @@
 """The API reference: what a module makes public, described by its docstrings.
 
 A page names a module, and the names of it that it describes; without names it describes all of the
-module's `__all__` that `uas_coverage_env` itself does not export under a shorter path:
+module's `__all__` that no package above it exports under a shorter path:
 
     ```{public} uas_coverage_env.flight
     ```
@@ -24,17 +24,24 @@ from sphinx.ext.autodoc.mock import mock  # pyright: ignore[reportPrivateImportU
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 
-TOP = "uas_coverage_env"
-
 
 def described(module_name: str, names: list[str]) -> list[str]:
     """The names that the directive describes, in the order of `__all__`, values after the rest."""
-    module, top = importlib.import_module(module_name), importlib.import_module(TOP)
+    module = importlib.import_module(module_name)
     if names:
         return names
-    shorter = {id(getattr(top, name)) for name in top.__all__} if module_name != TOP else set()
+    parents = [importlib.import_module(parent) for parent in _parents(module_name)]
+    shorter = {
+        id(getattr(parent, name)) for parent in parents for name in getattr(parent, "__all__", ())
+    }
     found = [name for name in module.__all__ if id(getattr(module, name)) not in shorter]
     return sorted(found, key=lambda name: _kind(getattr(module, name)) == "data")
+
+
+def _parents(module_name: str) -> Iterator[str]:
+    while "." in module_name:
+        module_name = module_name.rpartition(".")[0]
+        yield module_name
 
 
 def _kind(thing: Any) -> str:

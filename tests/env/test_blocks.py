@@ -212,7 +212,7 @@ def test_a_planner_flies_inside_of_an_environment(dynamics):
     ground = practice_ground(n_uas=2)
     env = uas_coverage_v0.parallel_env(ground, dynamics=dynamics)
     env.reset(seed=0)
-    planner = load_planner("nearest-waypoint")
+    planner: Any = load_planner("nearest-waypoint")
     planner.reset(env.brief, 0)
     limit_mps = env.scenario.vehicles[0].limits.v_xy_max_mps
     for _ in range(20):
