@@ -3,6 +3,7 @@
 QUICK = {
     "test_memory.py": "",
     "test_quick.py": "",
+    "test_release.py": "",
     "test_strict_toml.py": "",
     "test_workflows.py": "",
     "agents/test_observer.py": "",
