@@ -39,7 +39,7 @@ QUICK = {
     "geometry/test_polytope.py": "but test_the_hull_agrees_with_delaunay_on_random_points",
     "geometry/test_round_shapes.py": "",
     "geometry/test_segments.py": "",
-    "kernels/test_kernel_cache.py": ("only test_every_form_of_import_is_read"),
+    "kernels/test_kernel_cache.py": "only test_every_form_of_import_is_read",
     "leaderboard/test_scores.py": "",
     "milp_mpc/test_golden_lp.py": "",
     "milp_mpc/test_golden_reductions.py": "",
