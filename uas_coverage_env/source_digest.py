@@ -62,7 +62,9 @@ def source_digest(path: str) -> str:
     return _digest(file)
 
 
-_real = cache(os.path.realpath)
+@cache
+def _real(path: str) -> str:
+    return os.path.realpath(path)
 
 
 @cache

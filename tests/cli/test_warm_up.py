@@ -13,14 +13,15 @@ from uas_coverage_env.flight import load_planner, planner_names
 
 
 def test_a_terminal_shows_a_bar_while_kernels_are_compiled():
-    screen = Console(file=io.StringIO(), force_terminal=True, width=100)
+    shown = io.StringIO()
+    screen = Console(file=shown, force_terminal=True, width=100)
     before = COMPILATIONS.listener
     with compilation_shown(screen):
-        assert screen.file.getvalue() == ""
+        assert shown.getvalue() == ""
         COMPILATIONS.listener(0.5)
         COMPILATIONS.listener(None)
-    assert "compiling for this machine, once" in screen.file.getvalue()
-    assert "50%" in screen.file.getvalue()
+    assert "compiling for this machine, once" in shown.getvalue()
+    assert "50%" in shown.getvalue()
     assert COMPILATIONS.listener is before
 
 
