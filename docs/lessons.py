@@ -64,7 +64,12 @@ def write(notebook: Path) -> None:
     cells = nbformat.read(notebook, as_version=4)
     with tempfile.TemporaryDirectory() as folder:
         resources = {"metadata": {"path": folder}}
-        NotebookClient(cells, timeout=_SECONDS_FOR_A_CELL, resources=resources).execute()
+        NotebookClient(
+            cells,
+            timeout=_SECONDS_FOR_A_CELL,
+            resources=resources,
+            coalesce_streams=True,  # else what a cell prints is cut wherever a buffer was flushed
+        ).execute()
     for old in PICTURES.glob(f"{notebook.stem}-*.png"):
         old.unlink()
     link = f"[notebook](../../notebooks/{notebook.name})"
@@ -74,6 +79,8 @@ def write(notebook: Path) -> None:
     for cell in cells.cells[1:]:
         parts.append(source_of(cell))
         for output in cell.get("outputs", ()):
+            if output.get("name") == "stderr":  # that kernels are compiled, on this machine
+                continue
             if "image/png" in output.get("data", {}):
                 n_pictures += 1
                 name = f"{notebook.stem}-{n_pictures}.png"
