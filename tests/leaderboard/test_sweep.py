@@ -69,7 +69,11 @@ def test_whatever_changes_a_flight_changes_its_key():
 
 def test_an_option_that_is_spelt_out_is_the_default():
     (player,) = players_of(["milp-mpc"], []).values()
-    spelt = [f"milp-mpc:{key}={value}" for key, value in player.options.items()]
+    values = {
+        key: ",".join(value) if isinstance(value, list) else value
+        for key, value in player.options.items()
+    }
+    spelt = [f"milp-mpc:{key}={value}" for key, value in values.items()]
     plain = [text for text in spelt if not text.endswith("=None")]
     assert keys(sweep(options=plain)) == keys(sweep())
     assert keys(sweep(options=plain[::-1])) == keys(sweep())

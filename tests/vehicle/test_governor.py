@@ -126,7 +126,7 @@ def rest_after_wild_wrenches(vehicle, wishes, rest_steps):
             u[number] = wishes[k, number]
         clip_wrench(vehicle, u)
         fly_kinematics(vehicle, x, u)
-    reseed_reference(x, reference)
+    reseed_reference(vehicle, x, reference)
     largest = 0.0
     for _ in range(rest_steps):
         velocity_wrench(vehicle, x, reference, 0.0, 0.0, 30.0, u)

@@ -30,6 +30,7 @@ from uas_coverage_env.vehicle import (
     acceleration_wrench,
     fly_kinematics,
     lpv_step,
+    reseed_reference,
     velocity_climb_wrench,
     velocity_wrench,
 )
@@ -287,3 +288,32 @@ def test_after_wild_wrenches_the_loop_takes_over_and_comes_to_rest(name):
             fly_kinematics(record, x, u)
         np.testing.assert_allclose(x[VX:DOD], 0.0, rtol=0, atol=0.05)
         assert x[Z] == pytest.approx(-30.0, abs=0.02)
+
+
+@njit(error_model="numpy")
+def largest_of_handed_over_flights(vehicle, commands, forgets):
+    """Fly velocities (C, 2), 3 steps each; with `forgets` the reference is lost at each step."""
+    tilt, speed = 0.0, 0.0
+    x, u, reference = np.zeros(N_STATES), np.zeros(N_INPUTS), np.zeros(2)
+    for c in range(len(commands)):
+        for _ in range(3):
+            if forgets:
+                reseed_reference(vehicle, x, reference)
+            velocity_climb_wrench(vehicle, x, reference, commands[c, 0], commands[c, 1], 0.0, u)
+            lpv_step(vehicle, x, u, x)
+            tilt = max(tilt, math.hypot(x[PHI], x[THETA]))
+            speed = max(speed, math.hypot(x[VX], x[VY]))
+    return tilt, speed
+
+
+@pytest.mark.parametrize(("name", "dt_s"), [("s500_v2", 1.0), ("hexacopter", 1.0)])
+def test_a_loop_that_takes_over_in_mid_manoeuvre_keeps_the_limits(name, dt_s):
+    vehicle = load(name)
+    limits, record = vehicle.limits, record_of(name, dt_s)
+    rng = np.random.default_rng(3)
+    commands = rng.uniform(-1.0, 1.0, (2000, 2)) * limits.v_xy_max_mps
+    # projections come near to where all bounds hold; the world tolerates five times as much
+    for forgets, tolerated in ((False, ROUNDING), (True, 2e-3)):
+        tilt, speed = largest_of_handed_over_flights(record, commands, forgets)
+        assert tilt <= limits.tilt_max_rad * (1.0 + tolerated), forgets
+        assert speed <= limits.v_xy_max_mps * (1.0 + tolerated), forgets

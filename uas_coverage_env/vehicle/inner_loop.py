@@ -8,7 +8,8 @@ exceeded, and no program has to be solved.
 
 The reference (2,) [m/s] is memory of the loop, kept by the caller: zero at the start of a flight.
 After wrenches that the loop did not make, `reseed_reference` lets it take over. If such wrenches
-led far beyond the bounds, the UAS is levelled out first, with torques within their limits.
+led far beyond the bounds of every reference, the UAS is levelled out first, with torques within
+their limits.
 """
 
 import math
@@ -34,20 +35,45 @@ from uas_coverage_env.vehicle.layout import (
 
 _BLOCKS = -GOVERNOR_BLOCK  # as a mask: to whole blocks
 _TINY = 1e-12
+_ROUNDING = 1e-9  # relative
 _FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant, say, goes on
+_SWEEPS = 8  # of cyclic projections
+_INSIDE = 0.999  # of a bound: projections on the bound itself would end outside of the others
 _HALVES = math.sqrt(0.5)  # of a norm for each of two axes
 
 
 @kernel
-def reseed_reference(x, reference):
-    """Let the loop take over from the velocity reached.
+def reseed_reference(vehicle, x, reference):
+    """Let the loop take over in a state that something else led to.
+
+    The reference is the velocity reached, moved to where all bounds are predicted to hold, or
+    nearly so: each bound holds for a disc of references, and a state in mid-manoeuvre lies in the
+    discs of others than its own velocity. Cyclic projections find a point of their intersection.
 
     Args:
+        vehicle: record of VEHICLE_DTYPE.
         x: (14,) state.
         reference: (2,) [m/s] written.
     """
     reference[0] = x[VX]
     reference[1] = x[VY]
+    rows = vehicle.governor_rows
+    for _ in range(_SWEEPS):
+        moved = False
+        for q in range(vehicle.n_governor_rows):
+            # tilt and rate forward along north are negative pitch and pitch rate
+            n = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
+            n += rows[3, q] * reference[0]
+            e = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
+            e += rows[3, q] * reference[1]
+            length = math.sqrt(n * n + e * e)
+            if length > rows[4, q] and abs(rows[3, q]) > _TINY:
+                back = (_INSIDE * rows[4, q] / length - 1.0) / rows[3, q]
+                reference[0] += back * n
+                reference[1] += back * e
+                moved = True
+        if not moved:
+            return
 
 
 @kernel
@@ -84,11 +110,14 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
             a = n1 * n1 + e1 * e1
             b = n0 * n1 + e0 * e1
             # At an active bound c is zero but for rounding. The root has to be taken in any case:
-            # to let c = +1e-16 pass as "no root" is how a bound breaks. Beyond a bound (a wrench
-            # of the player's own led there) the same root moves on only if that leads back.
-            c = min(n0 * n0 + e0 * e0 - bound, 0.0)
+            # to let c = +1e-16 pass as "no root" is how a bound breaks.
+            c = n0 * n0 + e0 * e0 - bound
+            if c <= _ROUNDING * bound:
+                c = min(c, 0.0)
             if a < _TINY:
                 return
+            # Beyond a bound, where a wrench of the player's own led, the reference moves on as far
+            # as that leads back: inside by the larger root, or to where the line is nearest.
             share = min(share, (-b + math.sqrt(max(b * b - a * c, 0.0))) / a)
             if share <= 0.0:
                 return
@@ -215,7 +244,7 @@ def velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down_mps, 
         u: (5,) lift and torques are written.
     """
     if _far_outside(vehicle, x, reference):
-        reseed_reference(x, reference)
+        reseed_reference(vehicle, x, reference)
     _govern(vehicle, x, reference, north_mps, east_mps)
     if _far_outside(vehicle, x, reference):
         _level_out(vehicle, x, u)

@@ -108,7 +108,7 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
         else:
             fly_kinematics(vehicle, x, u)
         if k < n_held and command.kind == WRENCH:
-            reseed_reference(x, governed)
+            reseed_reference(vehicle, x, governed)
         path_m[k + 1, 0] = x[X]
         path_m[k + 1, 1] = x[Y]
         path_m[k + 1, 2] = x[Z]

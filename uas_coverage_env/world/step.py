@@ -98,7 +98,7 @@ def _fly(arena, state, nonlinear, outcome):
         event.current_A = current_A
         event.energy_Wh = voltage_V * current_A * dt_h
         if command.kind == WRENCH:
-            reseed_reference(x, state.reference[i])
+            reseed_reference(vehicle, x, state.reference[i])
 
 
 @inlined_kernel

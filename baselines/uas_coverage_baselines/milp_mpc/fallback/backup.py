@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import short_s
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
@@ -44,6 +45,7 @@ from uas_coverage_env.vehicle import (
 FloatArray = NDArray[np.float64]
 BRAKING_S = 14.0
 """Braking from any speed has ended after this time."""
+_TOLERATED = 1.005  # times a limit; the world tolerates 1 %
 
 
 def backup_trajectory(
@@ -130,7 +132,20 @@ class _Candidates:
             *(np.zeros((1, end, self._problem.n_scenario_waypoints), bool), 0.0, -np.inf),
         )
         comes_home = self._comes_home(uas, x[end])
-        return not comes_home or trouble(self._alone[uas], alone, self._blocks) is not None
+        return (
+            not comes_home
+            or self._exceeds_limits(uas, x[followed + 1 : end + 1])
+            or trouble(self._alone[uas], alone, self._blocks) is not None
+        )
+
+    def _exceeds_limits(self, uas: int, braking: FloatArray) -> bool:
+        """Whether braking leads beyond the limits of the norms, which a plan's end may foredoom."""
+        beyond = self._problem.norm_bounds[uas].beyond
+        return any(
+            np.hypot(braking[:, first], braking[:, second]).max(initial=0.0)
+            > _TOLERATED * grown * getattr(self._problem.vehicles[uas].limits, name)
+            for (_, first, second, name), grown in zip(NORMS, beyond, strict=True)
+        )
 
     def _comes_home(self, uas: int, x: FloatArray) -> bool:
         late = short_s(self._problem, uas, x, allowance=False) > 0.0
@@ -161,7 +176,7 @@ def brake(vehicle, start, steps):
     """States after each step (steps, 14) and inputs (steps, 5) of braking from a state."""
     states, inputs = np.empty((steps, start.shape[0])), np.zeros((steps, 5))
     x, reference = start.copy(), np.empty(2)
-    reseed_reference(x, reference)
+    reseed_reference(vehicle, x, reference)
     for step in range(steps):
         velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[step])
         lpv_step(vehicle, x, inputs[step], x)

@@ -155,7 +155,7 @@ def _homeward(arena, i, start, pursued, steps, commands):
     states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
     x, reference = start.copy(), np.empty(2)
     vehicle, command = arena.vehicles[i], commands[0]
-    reseed_reference(x, reference)
+    reseed_reference(vehicle, x, reference)
     states[0] = x
     for step in range(steps):
         if step < pursued:

@@ -13,7 +13,7 @@ def pushed(vehicle, start, north_mps, east_mps, down_mps, push, steps):
     """States (steps+1, 14) and inputs (steps, 5): a velocity for some steps, then braking."""
     states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
     x, reference = start.copy(), np.empty(2)
-    reseed_reference(x, reference)
+    reseed_reference(vehicle, x, reference)
     states[0] = x
     for step in range(steps):
         go = 1.0 if step < push else 0.0
