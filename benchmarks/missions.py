@@ -35,12 +35,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Progress as FlightProgress
 from uas_coverage_env.flight import describe_planners
 from uas_coverage_env.flight.registry import options_of
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
-from uas_coverage_env.strict_toml import InputError
 
 PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"
 SEEDS = "1000:1020"

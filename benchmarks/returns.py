@@ -34,10 +34,12 @@ from rich.table import Table
 from uas_coverage_baselines.milp_mpc.model.energy import seconds_home as milp_seconds_home
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
+from uas_coverage_env.autopilot import seconds_home
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.vehicle import DOD, dod_per_s
-from uas_coverage_env.world import LANDED, Dynamics, seconds_home
+from uas_coverage_env.world import LANDED
 
 RETURNS_OF_A_TOWN = 5
 _NEAREST_M = 15.0

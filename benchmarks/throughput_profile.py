@@ -14,7 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 from rich.table import Table
 
-from uas_coverage_env.borrow import borrow, part
+from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.compiled.borrow import borrow, part
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions import write_commands
 from uas_coverage_env.env.kernel import Rules, step_learners
@@ -30,8 +31,10 @@ from uas_coverage_env.env.observe import observe_one, observing_of
 from uas_coverage_env.env.pay import pay, paying_of
 from uas_coverage_env.env.pool import learners_of, tables_at
 from uas_coverage_env.env.rewards import REWARD
+from uas_coverage_env.simulation import advance
+from uas_coverage_env.simulation.pool import arena_of, state_of
 from uas_coverage_env.vehicle import lpv_step
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY, advance
+from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY
 from uas_coverage_env.world.contacts import (
     check_limits,
     count_breaches,
@@ -39,9 +42,7 @@ from uas_coverage_env.world.contacts import (
     judge_obstacles,
     judge_separation,
 )
-from uas_coverage_env.world.control import command_wrench
 from uas_coverage_env.world.coverage import cover, land
-from uas_coverage_env.world.pool import arena_of, state_of
 
 N_LANES = 256
 N_STEPS = 60

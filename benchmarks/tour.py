@@ -34,11 +34,12 @@ from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import MissionBrief, Scenario, load_scenario
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import energy_Wh, rollout
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
-from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import World, build_arena
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import build_arena
 
 _MOVES_AT_ONCE = 250_000
 _PER_SECOND = 10  # OR-tools counts in whole numbers

@@ -27,12 +27,12 @@ from uas_coverage_agents.waypoint.layout import CANDIDATE, HOME_CHOICE, N_TEAM, 
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NOBODY, NOT_HOME, TIME
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
+from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.flight.metrics import decision_time_s
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
-from uas_coverage_env.world import assistants
-from uas_coverage_env.world.pool import pool_worlds
+from uas_coverage_env.simulation.pool import pool_worlds
 
 COLUMNS = ("coverage", "all home", "violations", "breaches", "Wh", "steps", "p95 s", "max s")
 WH, STEPS = COLUMNS.index("Wh"), COLUMNS.index("steps")

@@ -1,15 +1,16 @@
 """What `python -m pytest -m quick` runs: these files; behind some, `only` or `but` some tests."""
 
 QUICK = {
-    "test_memory.py": "",
     "test_quick.py": "",
     "test_release.py": "",
-    "test_strict_toml.py": "",
     "test_workflows.py": "",
     "agents/test_observer.py": "",
     "agents/test_patience.py": "",
     "agents/test_policy_directory.py": "",
     "agents/test_waypoint_observation.py": "",
+    "autopilot/test_guidance.py": "",
+    "autopilot/test_return_mode.py": "",
+    "autopilot/test_safety_filter.py": "",
     "baselines/test_simple_planners.py": "",
     "baselines/test_tour.py": (
         "but test_who_flies_slower_than_thought_hands_over_what_its_battery_does_not_last_for"
@@ -18,6 +19,8 @@ QUICK = {
         "but test_the_installed_command_answers_like_this_process "
         "test_a_path_that_no_file_can_have_is_named"
     ),
+    "compiled/test_cache.py": "only test_every_form_of_import_is_read",
+    "compiled/test_memory.py": "",
     "conformance/test_gymnasium.py": "but test_stable_baselines_finds_nothing_wrong",
     "conformance/test_pettingzoo.py": "",
     "docs/test_rules.py": "",
@@ -32,6 +35,7 @@ QUICK = {
     "env/test_observation.py": "",
     "env/test_parallel_env.py": "",
     "env/test_rewards.py": "",
+    "files/test_strict_toml.py": "",
     "flight/test_directory.py": "",
     "flight/test_metrics.py": "",
     "flight/test_registry.py": "",
@@ -39,7 +43,6 @@ QUICK = {
     "geometry/test_polytope.py": "but test_the_hull_agrees_with_delaunay_on_random_points",
     "geometry/test_round_shapes.py": "",
     "geometry/test_segments.py": "",
-    "kernels/test_kernel_cache.py": "only test_every_form_of_import_is_read",
     "leaderboard/test_scores.py": "",
     "milp_mpc/test_golden_lp.py": "",
     "milp_mpc/test_golden_reductions.py": "",
@@ -62,6 +65,7 @@ QUICK = {
     "scenario/test_scenario_checks.py": "",
     "scenario/test_scenario_load.py": "",
     "scenario/test_scenario_model.py": "",
+    "simulation/test_step_against_oracle.py": "",
     "vehicle/test_discrete_model.py": "",
     "vehicle/test_inner_loop.py": "",
     "vehicle/test_lpv_step.py": "",
@@ -71,10 +75,6 @@ QUICK = {
     "world/test_commands.py": "",
     "world/test_contacts.py": "",
     "world/test_coverage_and_landing.py": "",
-    "world/test_guidance.py": "",
-    "world/test_return_mode.py": "",
-    "world/test_safety_filter.py": "",
-    "world/test_step_against_oracle.py": "",
 }
 
 

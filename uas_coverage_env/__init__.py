@@ -4,6 +4,7 @@ Importing the package registers the environments with Gymnasium and PettingZoo, 
 """
 
 from uas_coverage_env.env import register_environments
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     Decision,
     Flight,
@@ -14,7 +15,7 @@ from uas_coverage_env.flight import (
 )
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario, scenario_names
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import (
     LinearModel,
     VehicleParams,
@@ -23,15 +24,7 @@ from uas_coverage_env.vehicle import (
     simulate_battery,
     vehicle_names,
 )
-from uas_coverage_env.world import (
-    Acceleration,
-    Command,
-    GoTo,
-    SwarmState,
-    Velocity,
-    World,
-    Wrench,
-)
+from uas_coverage_env.world import Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
 
 register_environments()
 

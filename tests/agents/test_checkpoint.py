@@ -11,7 +11,7 @@ from uas_coverage_agents.training.checkpoint import (
     write_checkpoint,
 )
 
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 
 def put_aside(directory, steps: int) -> Checkpoint:

@@ -14,7 +14,7 @@ from tiny_policies import describe, weights, write
 from uas_coverage_agents.policy import load_policy, save_policy
 from uas_coverage_agents.policy.directory import write_atomically
 
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 
 @pytest.fixture

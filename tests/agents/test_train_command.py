@@ -21,7 +21,7 @@ from uas_coverage_agents.training.freeze import frozen, thaw
 from uas_coverage_agents.training.trainee import Order, Trainee
 
 from uas_coverage_env.cli import main
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 

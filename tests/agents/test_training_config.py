@@ -9,8 +9,8 @@ from uas_coverage_agents.training.scenarios import (
     validation_scenarios,
 )
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import draw_scenario
-from uas_coverage_env.strict_toml import InputError
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 

@@ -20,8 +20,9 @@ from uas_coverage_agents.waypoint.look import NO_TARGET, look
 from waypoint_missions import town
 from waypoint_oracle import Mission, observation
 
+from uas_coverage_env.simulation import initial_state
 from uas_coverage_env.vehicle import DOD, VX, VZ
-from uas_coverage_env.world import HOME, LANDED, build_arena, initial_state
+from uas_coverage_env.world import HOME, LANDED, build_arena
 
 SCENARIOS = [
     town(1, n_uas=1, n_waypoints=5),

@@ -13,9 +13,9 @@ from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NOBODY, TIME
 from waypoint_missions import PRIOR, tensors, town, with_something_parked
 
 from uas_coverage_env import rollout
+from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants, coverage, energy_Wh, home
-from uas_coverage_env.world import assistants
-from uas_coverage_env.world.pool import pool_worlds
+from uas_coverage_env.simulation.pool import pool_worlds
 
 BOTH = Assistants(return_mode=True, safety_filter=True)
 

@@ -27,10 +27,12 @@ from uas_coverage_agents.waypoint.team import (
 )
 from waypoint_missions import town, with_something_parked
 
+from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.mission import find_blocked
+from uas_coverage_env.simulation import initial_state
+from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import assistants, build_arena, initial_state
-from uas_coverage_env.world.pool import pool_worlds
+from uas_coverage_env.world import build_arena
 
 SCENARIOS = [
     town(1, n_uas=1, n_waypoints=5),

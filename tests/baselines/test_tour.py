@@ -9,8 +9,9 @@ from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.flight import Assistants, accomplished
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import LOST, World, build_arena
+from uas_coverage_env.world import LOST, build_arena
 
 QUICK = {"moves": 20_000, "changes": 60}
 

@@ -18,7 +18,7 @@ from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.text_map import TextMap
 from uas_coverage_env.flight import Decision, Flight, load_planner, rollout
 from uas_coverage_env.scenario import load_scenario, scenario_names
-from uas_coverage_env.world import World
+from uas_coverage_env.simulation import World
 
 
 @pytest.fixture(autouse=True)

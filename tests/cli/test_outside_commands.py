@@ -5,7 +5,7 @@ import typer
 from typer.testing import CliRunner
 
 from uas_coverage_env.cli import outside
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 
 def greet(name: str) -> None:

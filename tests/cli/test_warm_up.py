@@ -5,10 +5,10 @@ import io
 import pytest
 from rich.console import Console
 
-from uas_coverage_env import compiling
 from uas_coverage_env.cli import main
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.compiling import COMPILATIONS
+from uas_coverage_env.compiled import progress
+from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.flight import load_planner, planner_names
 
 
@@ -43,7 +43,7 @@ def test_after_a_warm_up_a_run_compiles_nothing(tmp_path, monkeypatch, capsys):
 
 
 def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatch, capsys):
-    monkeypatch.setattr(compiling, "PATIENCE_S", 1e9)
+    monkeypatch.setattr(progress, "PATIENCE_S", 1e9)
     assert main(["warm-up", "--planner", "hover", "--environments"]) == 0
     n_compiled = COMPILATIONS.n_compiled
     from uas_coverage_env import uas_coverage_v0

@@ -10,11 +10,11 @@ from typer.core import TyperGroup
 
 from uas_coverage_env.cli.app import app
 from uas_coverage_env.env.observation import OBSERVATION
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
 from uas_coverage_env.leaderboard import players_of
 from uas_coverage_env.scenario import Scenario, scenario_names
-from uas_coverage_env.strict_toml import parse
 
 DOCS = ROOT / "docs"
 PLACEHOLDERS = {"NAME"}

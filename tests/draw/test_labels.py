@@ -8,7 +8,7 @@ from uas_coverage_env.draw import picture
 from uas_coverage_env.draw.labels import free_place
 from uas_coverage_env.draw.text import fitted, width_of
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.world import World
+from uas_coverage_env.simulation import World
 
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 80.0], [0.0, 80.0]])
 NO_MARKS = np.empty((0, 3))

@@ -11,8 +11,9 @@ from uas_coverage_env.draw import Picture, picture
 from uas_coverage_env.draw.colours import of_charge
 from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.scenario import generate_scenario, load_scenario, scenario_names
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, PSI
-from uas_coverage_env.world import LANDED, LOST, World
+from uas_coverage_env.world import LANDED, LOST
 
 
 @pytest.fixture(scope="module")

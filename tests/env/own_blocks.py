@@ -2,8 +2,8 @@
 
 import math
 
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env import Feature, ObservationBlock, RewardTerm
-from uas_coverage_env.kernels import kernel
 from uas_coverage_env.vehicle import VX, VY, X, Y
 
 

@@ -12,9 +12,9 @@ from uas_coverage_env.env.memory import ENERGY, LIMITS, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world import FLYING, LOST, STATUS_NAMES, build_arena
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.pool import pool_worlds
 
 MIXED = (
     practice_ground(n_uas=3, tower=True, n_moving=2, max_steps=25),

@@ -6,10 +6,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from practice_grounds import practice_ground
 
+from uas_coverage_env.compiled.kernels import kernel, lowest_bit
 from uas_coverage_env.env import K_WAYPOINTS
 from uas_coverage_env.env.observation.nearest import nearest_waypoints
-from uas_coverage_env.kernels import kernel, lowest_bit
-from uas_coverage_env.world import World
+from uas_coverage_env.simulation import World
 
 MANY = 140
 """Waypoints on a coarse grid: many are equally far away."""

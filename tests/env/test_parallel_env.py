@@ -10,8 +10,8 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.strict_toml import InputError
 
 
 def still(env):

@@ -4,8 +4,8 @@ import tomllib
 
 import pytest
 
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.strict_toml import parse
 from uas_coverage_env.world import GoTo
 
 YARD = """

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Decision, Flight, rollout, summary
-from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Velocity, Wrench
 
 FILES = {

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import vehicle
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, rollout
-from uas_coverage_env.strict_toml import InputError
 
 
 def own_vehicle(folder: Path, name: str, capacity_Ah: float) -> str:

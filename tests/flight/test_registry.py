@@ -4,6 +4,7 @@ from typing import Literal
 import pytest
 from pydantic import Field
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     PlannerOptions,
     describe_planners,
@@ -11,7 +12,6 @@ from uas_coverage_env.flight import (
     planner_names,
     registry,
 )
-from uas_coverage_env.strict_toml import InputError
 
 
 class TunedOptions(PlannerOptions):

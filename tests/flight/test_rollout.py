@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight import (
     MODES,
     Assistants,
@@ -17,9 +18,9 @@ from uas_coverage_env.flight import (
     rollout,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import load_vehicle
-from uas_coverage_env.world import GoTo, Velocity, World, Wrench
+from uas_coverage_env.world import GoTo, Velocity, Wrench
 
 
 class Still:

@@ -8,9 +8,9 @@ import polars
 import pytest
 
 from uas_coverage_env.cli import main
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import PlannerError, load_planner
 from uas_coverage_env.leaderboard import TIMES, workers
-from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Velocity
 
 

@@ -7,6 +7,7 @@ import polars
 import pytest
 from leaderboard_rows import failed_row, row
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     Comparison,
     leaderboard_figure,
@@ -15,7 +16,6 @@ from uas_coverage_env.leaderboard import (
     write,
 )
 from uas_coverage_env.leaderboard.table import NOTHING, markdown, outcome_cells, scenarios_cells
-from uas_coverage_env.strict_toml import InputError
 
 
 def by_player(rows, reference="base"):

@@ -6,8 +6,8 @@ import sqlite3
 import pytest
 from leaderboard_rows import failed_row, row
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import STORE, Row, flights_in, opened
-from uas_coverage_env.strict_toml import InputError
 
 SWEEP = {"version": "1", "seeds": "0:2"}
 

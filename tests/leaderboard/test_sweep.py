@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import SETS, Sweep, players_of, scenarios_of, source_of
 from uas_coverage_env.leaderboard.hashing import content_hash
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.sweep import difference
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.strict_toml import InputError
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)

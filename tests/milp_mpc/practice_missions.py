@@ -6,9 +6,9 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, Options
 from uas_coverage_baselines.milp_mpc.search.decision import Effort
 
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.strict_toml import parse
 from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
 from uas_coverage_env.world import OUTCOME_DTYPE, Wrench
 

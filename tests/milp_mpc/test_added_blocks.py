@@ -24,9 +24,9 @@ from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import World
+from uas_coverage_env.simulation import World
 
 BY_NODES = Effort(deterministic=True, teams=2)
 PLANNERS = (MilpMpc, MilpMpcGuided)

@@ -12,8 +12,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 
 from uas_coverage_env.cli import main
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, load_planner
-from uas_coverage_env.strict_toml import InputError
 
 OWN = '''
 """Blocks of my own."""

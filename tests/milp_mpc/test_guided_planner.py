@@ -11,7 +11,8 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.world import LOST, World
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import LOST
 
 REPEATABLE = Options(deterministic=True, horizon=10)
 PLACES = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]

@@ -13,7 +13,8 @@ from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.world import Velocity, World, Wrench
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import Velocity, Wrench
 
 decide_in_earnest = planner_module.decide
 

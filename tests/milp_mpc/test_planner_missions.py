@@ -8,8 +8,9 @@ from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import VZ
-from uas_coverage_env.world import LANDED, World
+from uas_coverage_env.world import LANDED
 
 
 def commands_of(scenario, decisions, **options):

@@ -10,7 +10,8 @@ from uas_coverage_baselines.milp_mpc.planner import Options
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.world import LANDED, Velocity, World
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import LANDED, Velocity
 
 PLACES = [((60.0, 50.0, -6.0), 8.0), ((50.0, 75.0, -6.0), 8.0), ((190.0, 190.0, -20.0), 8.0)]
 STARTS = [(50.0, 50.0, -1.0), (50.0, 90.0, -1.0)]

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.strict_toml import parse
 
 
 def box(low, high):

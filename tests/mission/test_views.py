@@ -5,7 +5,8 @@ import pytest
 
 from uas_coverage_env import MissionBrief, load_scenario
 from uas_coverage_env.mission import WorldView, first_sight
-from uas_coverage_env.world import GoTo, World
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import GoTo
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import missions
 import numpy as np
 import pytest
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import draw_scenario
-from uas_coverage_env.strict_toml import InputError
 
 
 @pytest.fixture

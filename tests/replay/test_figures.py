@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, DecisionRecord
 from uas_coverage_env.replay.figures import (
     KINDS,
@@ -20,7 +21,6 @@ from uas_coverage_env.replay.figures import (
     training_figure,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
-from uas_coverage_env.strict_toml import InputError
 
 
 def lines(axes) -> list[np.ndarray]:

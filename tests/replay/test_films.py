@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import flight_picture
 from uas_coverage_env.replay import write_gif, write_video
-from uas_coverage_env.strict_toml import InputError
 
 STEPS = 6
 

@@ -10,12 +10,12 @@ import re
 import numpy as np
 import pytest
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.record import PLAN_DTYPE
 from uas_coverage_env.replay import replay_page, write_replay
 from uas_coverage_env.replay.flight_data import flight_data
 from uas_coverage_env.replay.scene_data import scene_data
 from uas_coverage_env.scenario import generate_scenario, load_scenario
-from uas_coverage_env.strict_toml import InputError
 
 
 def embedded(page: str) -> list[dict]:

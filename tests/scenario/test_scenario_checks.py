@@ -4,9 +4,9 @@ import copy
 
 import pytest
 
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.scenario import Scenario, load_scenario, warnings
 from uas_coverage_env.scenario.endurance import back_and_forth
-from uas_coverage_env.strict_toml import InputError, parse
 
 
 def box(north, east, down):

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from uas_coverage_env import scenario as room
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import load_scenario, scenario_names, warnings
-from uas_coverage_env.strict_toml import InputError
 
 TEXT = (Path(room.__file__).parent / "open_field.toml").read_text(encoding="utf-8")
 WAYPOINTS = TEXT[TEXT.index("[[waypoints]]") : TEXT.index("# Drawn only")]

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uas_coverage_env import vehicle
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.scenario import (
     Decoration,
     Geofence,
@@ -23,7 +24,6 @@ from uas_coverage_env.scenario import (
     load_scenario,
     scenario_names,
 )
-from uas_coverage_env.strict_toml import parse
 
 EXAMPLES = settings(max_examples=60, deadline=None, derandomize=True)
 

@@ -7,9 +7,9 @@ from importlib.resources import files
 import jsonschema
 import pytest
 
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.scenario import Scenario, scenario_names
 from uas_coverage_env.scenario.schema import scenario_schema
-from uas_coverage_env.strict_toml import InputError, parse
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from flying import fly, load
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.vehicle import (
     DOD,
     N_INPUTS,

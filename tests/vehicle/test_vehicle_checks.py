@@ -7,7 +7,7 @@ import pytest
 from flying import NAMES, load, record_of
 from test_vehicle_params import SHIPPED, changed_file
 
-from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.vehicle import (
     DOD,
     N_INPUTS,

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 import uas_coverage_env.vehicle
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.vehicle import (
     compile_vehicle,
     load_vehicle,

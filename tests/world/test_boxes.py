@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import generate_scenario
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.geometry import segment_clearance
-from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.boxes import (
     BLOCK,

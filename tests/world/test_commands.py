@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from small_worlds import meadow
 
+from uas_coverage_env.simulation import World
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     HOME,
@@ -12,7 +13,6 @@ from uas_coverage_env.world import (
     Acceleration,
     GoTo,
     Velocity,
-    World,
     Wrench,
     command_mode,
     pack,

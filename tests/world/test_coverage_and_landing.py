@@ -3,8 +3,9 @@ import pytest
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, U_TH, VX, VZ
-from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity, World
+from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity
 
 
 def test_what_lies_within_reach_of_a_start_is_covered_at_time_zero():

@@ -11,8 +11,8 @@ import typer
 from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle, warm_up
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.outside import add_outside_commands
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import PlannerError
-from uas_coverage_env.strict_toml import InputError
 
 PROGRAM = "uas-coverage"
 

@@ -15,6 +15,7 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_world
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     FLOWN,
     Backend,
@@ -38,8 +39,7 @@ from uas_coverage_env.leaderboard import (
 )
 from uas_coverage_env.leaderboard import table as tables
 from uas_coverage_env.scenario import warnings
-from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import Dynamics
+from uas_coverage_env.simulation import Dynamics
 
 _REFERENCE = "nearest-waypoint"
 _SECONDS_BETWEEN_LINES = 5.0

@@ -6,9 +6,10 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from uas_coverage_env.compiling import listening
+from uas_coverage_env.compiled.progress import listening
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import Dynamics, Velocity, World
+from uas_coverage_env.simulation import Dynamics, World
+from uas_coverage_env.world import Velocity
 
 _DOING = "compiling for this machine, once"
 

@@ -7,9 +7,9 @@ import typer
 
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.replay import check_file
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.leaderboard import FLIGHTS, leaderboard_figure, published, scores_of
-from uas_coverage_env.strict_toml import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ from typing import NoReturn
 import typer
 
 from uas_coverage_env.cli.output import one_line
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 GROUP = "uas_coverage.commands"
 

@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.cli.output import console
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay import write_gif, write_replay, write_video
-from uas_coverage_env.strict_toml import InputError
 
 _PAGE = "replay.html"
 

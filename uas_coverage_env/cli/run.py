@@ -12,6 +12,7 @@ from rich.table import Table
 
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     MODES,
     Flight,
@@ -25,8 +26,7 @@ from uas_coverage_env.flight import (
     rollout,
     summary,
 )
-from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import Dynamics
+from uas_coverage_env.simulation import Dynamics
 
 
 def run(

@@ -10,9 +10,9 @@ from rich.table import Table
 
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.draw import picture
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, load_scenario, scenario_names
-from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import World
+from uas_coverage_env.simulation import World
 
 _PICTURE_PX = 1024
 

@@ -8,7 +8,7 @@ import typer
 from rich.table import Table
 
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.vehicle import (
     DataSheet,
     VehicleParams,

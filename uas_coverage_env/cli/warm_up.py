@@ -7,7 +7,7 @@ import typer
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_world
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.compiling import COMPILATIONS
+from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.draw import picture
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv

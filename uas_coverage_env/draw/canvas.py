@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.draw.frame import SMOOTHING
-from uas_coverage_env.kernels import kernel
 
 # Every second byte of a pixel; half of the divisor in these, to round; three bytes of a pixel.
 _EVEN, _HALF, _RGB = np.uint32(0x00FF00FF), np.uint32(0x00020002), np.uint32(0x00FFFFFF)

@@ -25,9 +25,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.env.observation.nearest import NO_TARGET
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
-from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, Z
 from uas_coverage_env.world import HOME

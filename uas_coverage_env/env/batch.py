@@ -9,6 +9,8 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.compiled.kernels import Constant, machine_code
 from uas_coverage_env.env.actions import HOME_CHOICE, as_array
 from uas_coverage_env.env.batch_kernel import (
     DISABLED,
@@ -31,14 +33,8 @@ from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.kernels import Constant, machine_code
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import (
-    FLYING,
-    SwarmState,
-    WorldState,
-    assistants,
-)
+from uas_coverage_env.world import FLYING, SwarmState, WorldState
 from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}

@@ -8,7 +8,10 @@ from numba import prange
 from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
-from uas_coverage_env.borrow import borrow
+from uas_coverage_env.compiled.borrow import borrow
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
 from uas_coverage_env.env.actions import first_not_finite
 from uas_coverage_env.env.kernel import ACCEPTED, Rules, step_learners
 from uas_coverage_env.env.memory import (
@@ -36,12 +39,9 @@ from uas_coverage_env.env.pool import (
     tables_at,
 )
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
-from uas_coverage_env.kernels import allocating_kernel, inlined_kernel, kernel
-from uas_coverage_env.memory import Memory, Values
-from uas_coverage_env.views import Handover, copy_arrays, lane_view
+from uas_coverage_env.simulation.pool import arena_of, lanes_of, start_of, state_of
 from uas_coverage_env.world import ABSENT, FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.pool import arena_of, lanes_of, start_of, state_of
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
 """When a mission that has ended begins anew: in the next step, in the same, or never by itself."""

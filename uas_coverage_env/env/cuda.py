@@ -15,6 +15,8 @@ import numpy as np
 from numba import config, cuda
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.views import copy_arrays, lane_view
 from uas_coverage_env.env.actions import first_not_finite, write_commands
 from uas_coverage_env.env.kernel import ACCEPTED, finish_step
 from uas_coverage_env.env.memory import (
@@ -40,14 +42,12 @@ from uas_coverage_env.env.pool import (
 )
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.kernels import kernel
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.views import copy_arrays, lane_view
+from uas_coverage_env.simulation.pool import arena_of, lanes_of, start_of, state_of
+from uas_coverage_env.simulation.step import begin_step, carry_out
 from uas_coverage_env.world import FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.pool import arena_of, lanes_of, start_of, state_of
 from uas_coverage_env.world.state import STATE
-from uas_coverage_env.world.step import begin_step, carry_out
 
 THREADS_PER_BLOCK = 64
 

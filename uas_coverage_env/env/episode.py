@@ -7,6 +7,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.env.actions import HOME_CHOICE, actions_of
 from uas_coverage_env.env.global_state import global_space, global_state
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
@@ -17,16 +19,9 @@ from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
-from uas_coverage_env.kernels import machine_code
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.world import (
-    CONTACT_NAMES,
-    KIND_NAMES,
-    STATUS_NAMES,
-    SwarmState,
-    World,
-    assistants,
-)
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES, SwarmState
 from uas_coverage_env.world.arena import ARENA
 
 _FLOAT32 = np.dtype(np.float32)

@@ -2,7 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from uas_coverage_env.borrow import part
+from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.actions import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
     CONTACT,
@@ -21,8 +22,8 @@ from uas_coverage_env.env.memory import (
 from uas_coverage_env.env.observation.nearest import count_company
 from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.pay import pay
-from uas_coverage_env.kernels import inlined_kernel, kernel
-from uas_coverage_env.world import FLYING, advance
+from uas_coverage_env.simulation import advance
+from uas_coverage_env.world import FLYING
 
 ACCEPTED = -1
 

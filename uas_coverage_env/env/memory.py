@@ -1,15 +1,15 @@
-"""What learners add to the world, declared once: see `uas_coverage_env.memory`."""
+"""What learners add to the world, declared once: see `uas_coverage_env.compiled.memory`."""
 
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.views import Layout
 from uas_coverage_env.env.actions import RANGES_DTYPE
 from uas_coverage_env.env.observation.nearest import NEIGHBOURS_DTYPE, NO_TARGET
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
-from uas_coverage_env.memory import Memory, Values
-from uas_coverage_env.views import Layout
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE

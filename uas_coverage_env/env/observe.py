@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from uas_coverage_env.borrow import part
-from uas_coverage_env.calls import Signature
+from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.calls import Signature
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.block import firsts_of
@@ -19,7 +20,6 @@ from uas_coverage_env.env.observation.own import write_own
 from uas_coverage_env.env.observation.remaining import write_remaining
 from uas_coverage_env.env.observation.surroundings import write_surroundings
 from uas_coverage_env.env.observation.waypoints import write_waypoints
-from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 

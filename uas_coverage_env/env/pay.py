@@ -8,12 +8,12 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from uas_coverage_env.borrow import part
-from uas_coverage_env.calls import Signature
+from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.calls import Signature
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.env.memory import LEARNERS, SCRATCH, TABLES, Paying
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
 from uas_coverage_env.env.rewards import terms as default
-from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 

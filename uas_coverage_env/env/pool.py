@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from uas_coverage_env.compiled.memory import Pool
+from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES, Look
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
-from uas_coverage_env.memory import Pool
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.views import lane_view, pool_view
+from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.pool import pool_worlds
 from uas_coverage_env.world.state import STATE
 
 

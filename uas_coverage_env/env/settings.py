@@ -11,7 +11,7 @@ from uas_coverage_env.env.actions import ACTION_NAMES
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import Dynamics
+from uas_coverage_env.simulation import Dynamics
 
 _LONGEST = 100_000
 

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from uas_coverage_env.files.folder import prepare_folder, write_files
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.metrics import summary
 from uas_coverage_env.flight.record import MODES, Flight
-from uas_coverage_env.folder import prepare_folder, write_files
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.vehicle import vehicle_names
 
 STATE_COLUMNS = (

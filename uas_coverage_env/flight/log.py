@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.kernels import interpreted
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (
     COVERING,
@@ -21,8 +22,8 @@ from uas_coverage_env.flight.record import (
     Violation,
     last_samples,
 )
-from uas_coverage_env.kernels import interpreted
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import (
     DOD,
     LIMIT_NAMES,
@@ -32,7 +33,7 @@ from uas_coverage_env.vehicle import (
     open_circuit_V,
     write_limited,
 )
-from uas_coverage_env.world import CONTACT_NAMES, FLYING, Command, World, command_mode
+from uas_coverage_env.world import CONTACT_NAMES, FLYING, Command, command_mode
 from uas_coverage_env.world import LANDED as HAS_LANDED
 
 

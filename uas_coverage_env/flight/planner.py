@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.strict_toml import StrictModel
 from uas_coverage_env.world import Command, SwarmState
 
 

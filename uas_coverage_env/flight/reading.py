@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
+from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse
 from uas_coverage_env.flight.directory import (
     FLIGHT_COLUMNS,
     INPUT_COLUMNS,
@@ -21,9 +22,8 @@ from uas_coverage_env.flight.directory import (
 )
 from uas_coverage_env.flight.record import LIMIT, MODES, PLAN_DTYPE, DecisionRecord, Violation
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.strict_toml import InputError, StrictModel, parse
+from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES
-from uas_coverage_env.world import Dynamics
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)

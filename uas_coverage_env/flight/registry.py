@@ -16,8 +16,8 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.planner import Planner
-from uas_coverage_env.strict_toml import InputError
 
 GROUP = "uas_coverage.planners"
 KINDS = "uas_coverage.planner_kinds"

@@ -11,14 +11,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.planner import Assistants, Planner, PlannerError
 from uas_coverage_env.flight.record import Flight
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.strict_toml import InputError
-from uas_coverage_env.world import Command, Dynamics, SwarmState, Velocity, World, pack
+from uas_coverage_env.simulation import Dynamics, World
+from uas_coverage_env.world import Command, SwarmState, Velocity, pack
 
 _RECORDED_PACKAGES = ("uas-coverage-env", "numpy", "scipy", "numba", "highspy")
 _RECORDED_WHERE_INSTALLED = ("pyscipopt", "gurobipy")

@@ -7,8 +7,8 @@ Loops go over views of a hull's own rows: of their indices the compiler knows th
 
 import math
 
-from uas_coverage_env.borrow import borrow
-from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.borrow import borrow
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 
 _SURE_M = 1e-6
 """More than rounding can change in a distance [m]."""

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.flight.registry import options_of
-from uas_coverage_env.strict_toml import InputError
 
 _LABELLED = re.compile(r"([\w.+-]+)=(.+)", re.DOTALL)
 

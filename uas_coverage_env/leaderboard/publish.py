@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uas_coverage_env.folder import write_files
+from uas_coverage_env.files.folder import write_files
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
 from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
@@ -22,7 +23,6 @@ from uas_coverage_env.leaderboard.table import (
     reference_cells,
     scenarios_cells,
 )
-from uas_coverage_env.strict_toml import InputError
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"

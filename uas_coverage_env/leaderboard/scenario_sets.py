@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.hashing import content_hash
 from uas_coverage_env.scenario import Scenario, draw_scenario, load_scenario
-from uas_coverage_env.strict_toml import InputError
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}

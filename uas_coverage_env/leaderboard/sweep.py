@@ -10,7 +10,7 @@ from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.players import Player
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import Dynamics
+from uas_coverage_env.simulation import Dynamics
 
 PACKAGE = "uas-coverage-env"
 

@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.kernels import kernel
+from uas_coverage_env.compiled.kernels import kernel
 
 
 @kernel

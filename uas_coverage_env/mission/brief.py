@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import (
     Decoration,
@@ -16,7 +17,6 @@ from uas_coverage_env.scenario import (
     Uas,
     Waypoint,
 )
-from uas_coverage_env.strict_toml import StrictModel
 from uas_coverage_env.vehicle import VehicleParams
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.kernels import kernel
+from uas_coverage_env.autopilot import target_position
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
 from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
-from uas_coverage_env.world import CLEAR, HOME, build_arena, route, target_position
+from uas_coverage_env.world import CLEAR, HOME, build_arena, route
 
 
 @kernel

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, flight_pictures
-from uas_coverage_env.strict_toml import InputError
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, covered_at, summary
 from uas_coverage_env.replay.scene_data import scene_data
-from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA
 
 POSITION_M = 0.01

@@ -9,9 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.flight_data import flight_data
-from uas_coverage_env.strict_toml import InputError
 
 _PAGE = """<!doctype html>
 <html lang="en">

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from uas_coverage_env.files.strict_toml import InputError, read_toml
 from uas_coverage_env.scenario.model import Scenario
-from uas_coverage_env.strict_toml import InputError, read_toml
 
 _SHIPPED = Path(__file__).parent
 

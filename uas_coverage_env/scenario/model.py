@@ -21,10 +21,10 @@ from pydantic import (
     model_validator,
 )
 
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario.checks import first_of, problems
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.strict_toml import StrictModel
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
 
 _NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.vehicle import derived
 from uas_coverage_env.vehicle.battery import segments_of
 from uas_coverage_env.vehicle.parts import Battery, Parts, Power, Rotor, ThrustCorrection

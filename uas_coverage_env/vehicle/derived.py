@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.kernels import interpreted
+from uas_coverage_env.compiled.kernels import interpreted
 from uas_coverage_env.vehicle.battery import battery_current_A
 from uas_coverage_env.vehicle.parts import Battery, Parts
 from uas_coverage_env.vehicle.powertrain import electrical_power_W

@@ -14,7 +14,7 @@ their limits.
 
 import math
 
-from uas_coverage_env.kernels import kernel
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle.compiled import GOVERNOR_BLOCK
 from uas_coverage_env.vehicle.layout import (
     LIFT,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY, VZ, WX, WY, WZ
 from uas_coverage_env.vehicle.params import VehicleParams
 

@@ -1,6 +1,6 @@
 """One step of the LPV model, compiled: rigid body, thrust correction, battery."""
 
-from uas_coverage_env.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,

@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from uas_coverage_env.strict_toml import InputError, StrictModel, read_toml
+from uas_coverage_env.files.strict_toml import InputError, StrictModel, read_toml
 from uas_coverage_env.vehicle import checks
 from uas_coverage_env.vehicle.parts import Parts
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 ABSENT = math.nan
 """Stands for a value that a file leaves out and `VehicleParams` computes."""

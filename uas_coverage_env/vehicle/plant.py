@@ -12,7 +12,7 @@ loss of motor speed with a falling battery voltage.
 
 import math
 
-from uas_coverage_env.kernels import kernel, room
+from uas_coverage_env.compiled.kernels import kernel, room
 from uas_coverage_env.vehicle.compiled import MAX_MOTORS
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,

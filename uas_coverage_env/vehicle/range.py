@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.kernels import kernel
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle.derived import steady_current_A
 from uas_coverage_env.vehicle.params import VehicleParams
 

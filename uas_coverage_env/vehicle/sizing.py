@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.vehicle import derived
 from uas_coverage_env.vehicle.compiled import compile_vehicle
 from uas_coverage_env.vehicle.data_sheet import (

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from uas_coverage_env.kernels import interpreted, kernel
+from uas_coverage_env.compiled.kernels import interpreted, kernel
 from uas_coverage_env.vehicle.parts import Parts, ThrustCorrection
 
 _NEWTON_STEPS = 8

@@ -1,7 +1,6 @@
-"""What happens: state, commands, and the one compiled step (rules: `docs/rules.md`)."""
+"""A mission as it stands: arena, state and commands, contacts and coverage (`docs/rules.md`)."""
 
 from uas_coverage_env.world.arena import Arena, build_arena
-from uas_coverage_env.world.assist import AssistantCode, assistants
 from uas_coverage_env.world.commands import (
     ACCELERATION,
     CLIMB,
@@ -20,11 +19,8 @@ from uas_coverage_env.world.commands import (
     command_mode,
     pack,
 )
-from uas_coverage_env.world.guidance import guide, path_length_home_m, target_position
 from uas_coverage_env.world.outcome import CONTACT_NAMES, OUTCOME_DTYPE
-from uas_coverage_env.world.return_mode import has_to_return, seconds_home
 from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, crossing, route
-from uas_coverage_env.world.simulation import Dynamics, World, initial_state
 from uas_coverage_env.world.state import (
     ABSENT,
     FLYING,
@@ -34,7 +30,6 @@ from uas_coverage_env.world.state import (
     SwarmState,
     WorldState,
 )
-from uas_coverage_env.world.step import advance, begin_mission, first_invalid
 
 __all__ = [
     "ABSENT",
@@ -56,29 +51,16 @@ __all__ = [
     "WRENCH",
     "Acceleration",
     "Arena",
-    "AssistantCode",
     "Command",
-    "Dynamics",
     "GoTo",
     "Mode",
     "SwarmState",
     "Velocity",
-    "World",
     "WorldState",
     "Wrench",
-    "advance",
-    "assistants",
-    "begin_mission",
     "build_arena",
     "command_mode",
     "crossing",
-    "first_invalid",
-    "guide",
-    "has_to_return",
-    "initial_state",
     "pack",
-    "path_length_home_m",
     "route",
-    "seconds_home",
-    "target_position",
 ]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.memory import Memory
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE

@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.borrow import part
-from uas_coverage_env.kernels import inlined_kernel
+from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.kernels import inlined_kernel
 
 BLOCK = 64
 """So many obstacles are looked at at once; kernels take more in several turns."""

@@ -2,7 +2,8 @@
 
 import math
 
-from uas_coverage_env.borrow import borrow
+from uas_coverage_env.compiled.borrow import borrow
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.geometry import (
     cylinder_clearance,
     cylinder_gap,
@@ -10,7 +11,6 @@ from uas_coverage_env.geometry import (
     segment_clearance,
     signed_distance,
 )
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import DOD, X, Y, Z, limits_exceeded
 from uas_coverage_env.world.boxes import (
     BLOCK,

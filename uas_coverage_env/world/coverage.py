@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.kernels import inlined_kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.outcome import NONE
 from uas_coverage_env.world.state import FLYING, LANDED

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.geometry import segment_meets, signed_distance
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.world.boxes import BLOCK, BOX, write_meetings
 
 _CREEP_M = 1e-3

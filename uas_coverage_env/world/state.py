@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.memory import Memory, Values
+from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES
 
 FLYING, LANDED, LOST = range(3)

@@ -7,7 +7,7 @@ from pydantic import Field, JsonValue, model_validator
 
 from uas_coverage_agents.policy.networks import Network
 from uas_coverage_env.env.observation import Group
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Count = Annotated[int, Field(ge=0)]

@@ -15,7 +15,7 @@ from safetensors import numpy as safetensors
 
 from uas_coverage_agents.policy.description import PolicyDescription
 from uas_coverage_agents.policy.tensors import LARGEST_WEIGHT, Tensors
-from uas_coverage_env.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError, parse
 
 DESCRIPTION = "policy.json"
 WEIGHTS = "policy.safetensors"

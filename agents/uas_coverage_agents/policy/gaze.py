@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from uas_coverage_agents.policy.tensors import Tensors, Width
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 _NOT_THERE = -1e9
 """Score of a candidate that is not there; its weight is zero in any case."""

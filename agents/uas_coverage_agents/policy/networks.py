@@ -10,7 +10,7 @@ from pydantic import Field
 from uas_coverage_agents.policy.gaze import Gaze
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.policy.tensors import Tensors, Width
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 _ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 

@@ -7,9 +7,9 @@ from typing import Protocol
 from uas_coverage_agents.policy.directory import Policy, load_policy
 from uas_coverage_agents.velocity.pilot import VelocityPilot
 from uas_coverage_agents.waypoint.pilot import WaypointPilot
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.world import Command, SwarmState
 
 

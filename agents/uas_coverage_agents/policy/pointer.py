@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from uas_coverage_agents.policy.tensors import Tensors, Width
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 HOME_AT_FIRST = -5.0
 """Score of the last choice before anything is learned; the nearest candidate has 0."""

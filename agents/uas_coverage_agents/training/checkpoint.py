@@ -17,7 +17,7 @@ from safetensors import SafetensorError
 from safetensors import numpy as safetensors
 
 from uas_coverage_agents.policy.directory import write_atomically
-from uas_coverage_env.strict_toml import InputError, StrictModel, parse
+from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse
 
 KEPT = 2
 

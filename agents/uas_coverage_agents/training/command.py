@@ -18,8 +18,8 @@ from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.config import load_config, published_names
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.folder import prepare_folder
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.folder import prepare_folder
+from uas_coverage_env.files.strict_toml import InputError
 
 if TYPE_CHECKING:
     from uas_coverage_agents.training.loop import Order, TrainingProgress

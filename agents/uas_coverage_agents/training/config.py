@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 from uas_coverage_agents.policy import ScenarioFamily
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_agents.waypoint.settings import WaypointSettings
+from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse, read_toml
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.strict_toml import InputError, StrictModel, parse, read_toml
 
 PUBLISHED = Path(__file__).parents[1] / "configs"
 

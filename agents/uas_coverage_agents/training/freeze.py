@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from uas_coverage_agents.training.learner import Lanes
 from uas_coverage_env.env.put_aside import check_values
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 Arrays = dict[str, NDArray[np.generic]]
 

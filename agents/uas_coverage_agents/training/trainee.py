@@ -27,8 +27,8 @@ from uas_coverage_agents.training.learner import Learner
 from uas_coverage_agents.training.learners import learner_of
 from uas_coverage_agents.training.scenarios import validation_scenarios
 from uas_coverage_agents.training.score import fly, score
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.strict_toml import InputError
 
 _PACKAGES = ("uas-coverage-env", "numpy", "torch", "stable-baselines3", "sb3-contrib")
 _ZIPPED = "policy.pth"

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from uas_coverage_agents.policy.tensors import Width
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 
 class VelocitySettings(StrictModel):

@@ -16,14 +16,11 @@ from uas_coverage_agents.waypoint.team import (
     choose,
     fly_on,
 )
-from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.memory import Memory, Pool, Values
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.memory import Memory, Pool, Values
+from uas_coverage_env.compiled.views import Handover, copy_arrays, pool_view
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.views import Handover, copy_arrays, pool_view
-from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, WorldState, build_arena
-from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.pool import (
+from uas_coverage_env.simulation.pool import (
     WorldPool,
     arena_of,
     lanes_of,
@@ -31,6 +28,9 @@ from uas_coverage_env.world.pool import (
     start_of,
     state_of,
 )
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, WorldState, build_arena
+from uas_coverage_env.world.arena import ARENA
 
 legs_at = pool_view(LEGS)
 """In a kernel, (pool, s) -> the legs of scenario s."""

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import CRUISE_SHARE
-from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.memory import Memory
+from uas_coverage_env.autopilot import seconds_home
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.vehicle import N_STATES, X, Y, Z
-from uas_coverage_env.world import Arena, route, seconds_home
+from uas_coverage_env.world import Arena, route
 from uas_coverage_env.world.arena import ARENA
 
 ROUTED_UNITS = 6.0

@@ -20,9 +20,10 @@ from uas_coverage_agents.waypoint.layout import (
 )
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
 from uas_coverage_agents.waypoint.outlook import ABSENT, IN_THE_AIR, outlook
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.autopilot import path_length_home_m
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
-from uas_coverage_env.world import FLYING, HOME, path_length_home_m, route
+from uas_coverage_env.world import FLYING, HOME, route
 
 NO_TARGET = -2
 """Target of a UAS that has none; home is world's HOME, waypoints are their indices."""

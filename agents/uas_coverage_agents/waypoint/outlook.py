@@ -7,7 +7,7 @@ one choice from another the better the fewer waypoints are left.
 
 import math
 
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 
 ABSENT = -2
 """Place of a UAS that covers no more."""

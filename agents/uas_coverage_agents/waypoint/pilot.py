@@ -23,6 +23,7 @@ from uas_coverage_agents.waypoint.look import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Desk, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NOBODY, choose, next_to_decide
+from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.world import (
@@ -33,7 +34,6 @@ from uas_coverage_env.world import (
     GoTo,
     SwarmState,
     WorldState,
-    assistants,
 )
 from uas_coverage_env.world.state import STATE
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.policy.tensors import Tensors
 from uas_coverage_agents.waypoint.layout import N_CANDIDATE, N_TEAM, WAY, K
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 
 
 class Weights(NamedTuple):

@@ -25,8 +25,8 @@ from uas_coverage_agents.waypoint.team import (
     choose,
     fly_on,
 )
-from uas_coverage_env.kernels import allocating_kernel
-from uas_coverage_env.views import copy_arrays
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.views import copy_arrays
 from uas_coverage_env.world import HOME, WorldState
 
 PRICES_WH = {ENERGY: 1.0, TIME: 0.1, LEFT: 20.0, LOST_UAS: 100.0, NOT_HOME: 100.0}

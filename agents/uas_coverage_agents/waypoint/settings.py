@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from uas_coverage_env.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import StrictModel
 
 Price = Annotated[float, Field(ge=0.0, le=1000.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

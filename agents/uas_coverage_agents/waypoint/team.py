@@ -10,17 +10,12 @@ from uas_coverage_agents.waypoint.look import (
     covers,
     look,
 )
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import find_blocked
+from uas_coverage_env.simulation import advance
 from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import (
-    FLYING,
-    GO_TO,
-    HOME,
-    VELOCITY,
-    advance,
-    has_to_return,
-)
+from uas_coverage_env.world import FLYING, GO_TO, HOME, VELOCITY
 
 NOBODY = -1
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.order.task import Task
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.tour.pursuit import HOME_TARGET, fly_step
+from uas_coverage_env.autopilot.guidance import target_position
+from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake, moving_slack
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_distance
-from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.guidance import target_position
-from uas_coverage_env.world.lookahead import fixed_slack, fly_and_brake, moving_slack
 from uas_coverage_env.world.routes import box_apart, route
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ import math
 
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, cost_s, look_around
 from uas_coverage_baselines.tour.pursuit import LEGS, aim, begin, pull_clear, push_to_guidance
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 
 _STRETCH_S = 5.0  # the longest stretch that a change touches
 

@@ -12,18 +12,11 @@ from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, Task, brake_seconds, empty_plan
 from uas_coverage_baselines.tour.schedule import Schedule, View
+from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    FLYING,
-    Command,
-    GoTo,
-    SwarmState,
-    Velocity,
-    has_to_return,
-)
+from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 _HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improve

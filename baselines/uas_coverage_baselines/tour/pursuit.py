@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot.control import command_wrench, write_command
+from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
+from uas_coverage_env.autopilot.lookahead import fly_and_brake
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import CLIMB, VELOCITY
-from uas_coverage_env.world.control import command_wrench, write_command
-from uas_coverage_env.world.guidance import CRUISE_ALTITUDE_M, guide, target_position
-from uas_coverage_env.world.lookahead import fly_and_brake
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
 
 FloatArray = NDArray[np.float64]

@@ -65,7 +65,7 @@ class ObservationBlock(Group):
     """A group of features and the kernel that writes them.
 
     The kernel is `write(arena, state, tables, learners, i, parameters, row)`, compiled with
-    `uas_coverage_env.kernels.kernel`:
+    `uas_coverage_env.compiled.kernels.kernel`:
 
     - `arena`, the mission (`world.Arena`); `state`, the world (`world.WorldState`);
     - `tables` and `learners`, what the environment adds (`env.memory`);

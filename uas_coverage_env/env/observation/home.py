@@ -1,12 +1,12 @@
 """The way home past obstacles."""
 
+from uas_coverage_env.autopilot.guidance import target_position
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.relative import close, direction, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M
-from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world import HOME as HOME_TARGET
-from uas_coverage_env.world.guidance import target_position
 from uas_coverage_env.world.routes import shortest_way
 
 _FEATURES = (

@@ -1,5 +1,6 @@
 """The moving obstacles nearest to a UAS."""
 
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -10,7 +11,6 @@ from uas_coverage_env.env.observation.block import (
 from uas_coverage_env.env.observation.relative import apart_m, close, direction, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_MOVING
 from uas_coverage_env.env.observation.sorted_list import insert
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 
 _FEATURES = (

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.borrow import part
+from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, room
 from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.scales import CROWD, CROWD_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
-from uas_coverage_env.kernels import inlined_kernel, kernel, lowest_bit, room
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import X, Y, Z
 

@@ -1,5 +1,6 @@
 """The other UAS that fly nearest to a UAS."""
 
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -16,7 +17,6 @@ from uas_coverage_env.env.observation.relative import (
 )
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_UAS
 from uas_coverage_env.env.observation.sorted_list import insert
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z
 from uas_coverage_env.world import FLYING
 

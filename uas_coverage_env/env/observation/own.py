@@ -1,11 +1,11 @@
 """The UAS itself: where it is, how it moves, what its battery holds, and how much is left to do."""
 
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.home import charge_home
 from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.env.observation.remaining import share_of_open_weight
 from uas_coverage_env.env.observation.scales import MARGIN
-from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA, U_TH, VX, VY, VZ, WX, WY, WZ, X, Y, Z
 from uas_coverage_env.world import FLYING
 

@@ -2,8 +2,8 @@
 
 import math
 
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.env.observation.scales import NEARBY_M
-from uas_coverage_env.kernels import inlined_kernel
 from uas_coverage_env.vehicle import DOD
 
 STRAIGHT_M = 1e-6

@@ -1,10 +1,10 @@
 """Where the weight of the open waypoints lies."""
 
-from uas_coverage_env.borrow import part
+from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.kernels import counting_kernel, inlined_kernel, kernel, room
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
-from uas_coverage_env.kernels import counting_kernel, inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import X, Y
 from uas_coverage_env.world.arena import ALL_SHARES
 

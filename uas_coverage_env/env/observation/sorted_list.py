@@ -1,6 +1,6 @@
 """A short list of what is nearest, kept in order, for kernels."""
 
-from uas_coverage_env.kernels import inlined_kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel
 
 
 @inlined_kernel

@@ -2,12 +2,12 @@
 
 import math
 
-from uas_coverage_env.borrow import borrow, part
+from uas_coverage_env.compiled.borrow import borrow, part
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.kernels import inlined_kernel, kernel, room
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world.boxes import (
     BLOCK,

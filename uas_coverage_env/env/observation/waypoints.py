@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room, single_room
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -13,7 +14,6 @@ from uas_coverage_env.env.observation.block import (
 )
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
-from uas_coverage_env.kernels import inlined_kernel, kernel, room, single_room
 from uas_coverage_env.vehicle import DOD, X, Y, Z
 from uas_coverage_env.world import FLYING
 

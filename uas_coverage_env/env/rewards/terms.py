@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.rewards.term import RewardTerm
-from uas_coverage_env.kernels import inlined_kernel, kernel
 from uas_coverage_env.world import FLYING, VELOCITY
 from uas_coverage_env.world.outcome import NONE
 

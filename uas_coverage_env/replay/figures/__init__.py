@@ -9,6 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.battery import battery_figure, published_battery
 from uas_coverage_env.replay.figures.decision_time import decision_time_figure
@@ -16,7 +17,6 @@ from uas_coverage_env.replay.figures.map import map_figure
 from uas_coverage_env.replay.figures.modes import modes_figure
 from uas_coverage_env.replay.figures.style import printed
 from uas_coverage_env.replay.figures.training import CURVE, learning_curve, training_figure
-from uas_coverage_env.strict_toml import InputError
 
 KINDS: dict[str, Callable[[Flight], Figure]] = {
     "map": map_figure,

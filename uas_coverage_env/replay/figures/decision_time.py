@@ -5,9 +5,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade
-from uas_coverage_env.strict_toml import InputError
 
 _MILLISECONDS_BELOW_S = 0.1
 

@@ -9,10 +9,10 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, covered_at
 from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade, uas_colour
 from uas_coverage_env.replay.outline import outline_of
-from uas_coverage_env.strict_toml import InputError
 from uas_coverage_env.vehicle import PSI
 
 _LEGEND_IN = 0.55

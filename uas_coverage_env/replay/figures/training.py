@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.replay.figures.style import WIDTH_IN, line_style, printed, uas_colour
-from uas_coverage_env.strict_toml import InputError
 
 CURVE = "learning_curve.csv"
 

@@ -34,7 +34,7 @@ from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     compile_vehicle,
     lpv_step,

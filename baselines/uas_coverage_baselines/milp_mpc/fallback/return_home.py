@@ -18,7 +18,9 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, brake, pr
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.autopilot import guide
+from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import MissionBrief, seconds_home
 from uas_coverage_env.vehicle import (
     DOD,
@@ -30,8 +32,7 @@ from uas_coverage_env.vehicle import (
     reseed_reference,
     velocity_climb_wrench,
 )
-from uas_coverage_env.world import COMMAND_DTYPE, SwarmState, build_arena, guide
-from uas_coverage_env.world.control import command_wrench
+from uas_coverage_env.world import COMMAND_DTYPE, SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
 _RESERVE_S = 30.0  # what is to be left at home, since other UAS may be in the way

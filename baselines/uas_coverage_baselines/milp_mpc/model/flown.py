@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import lpv_step, reseed_reference, velocity_climb_wrench
 
 

@@ -9,7 +9,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from uas_coverage_baselines.milp_mpc.model.ocp import Block
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 GROUP = "uas_coverage.blocks"
 """The entry-point group in which packages announce blocks by name."""

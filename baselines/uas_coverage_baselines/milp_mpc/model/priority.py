@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
 

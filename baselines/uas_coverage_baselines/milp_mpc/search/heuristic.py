@@ -17,8 +17,8 @@ from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal, gains
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, PlanningProblem, Tour, Trajectories
 from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory
+from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance, sphere_faces
-from uas_coverage_env.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     VX,
     VY,

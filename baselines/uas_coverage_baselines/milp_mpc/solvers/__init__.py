@@ -11,7 +11,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     SolveStatus,
     Start,
 )
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 _PACKAGES = {"highs": "highspy", "scip": "pyscipopt", "gurobi": "gurobipy"}
 SOLVERS = tuple(_PACKAGES)

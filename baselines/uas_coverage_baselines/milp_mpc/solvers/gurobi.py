@@ -27,7 +27,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Start,
     confirmed,
 )
-from uas_coverage_env.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError
 
 _LICENCE_ERRORS = (GRB.Error.NO_LICENSE, GRB.Error.SIZE_LIMIT_EXCEEDED)
 

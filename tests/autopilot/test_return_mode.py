@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+from small_worlds import meadow, waypoint
+
+from uas_coverage_env.autopilot import seconds_home
+from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import FLYING, LANDED, GoTo, Velocity
+
+AWAY = {"uas_1": Velocity(6.0, 6.0, 20.0)}
+HOVER = {"uas_1": Velocity(0.0, 0.0, 20.0)}
+
+
+def fly_until_done(world, commands, max_steps=600):
+    for _ in range(max_steps):
+        if world.done:
+            return
+        world.step({name: commands[name] for name in world.active})
+
+
+@pytest.mark.parametrize("return_mode", [True, False])
+def test_a_uas_comes_home_before_its_battery_is_empty(return_mode):
+    world = World(meadow(soc_0=0.5, dod_max=0.6, max_steps=1000), return_mode=return_mode)
+    for _ in range(10):
+        world.step(AWAY)
+    fly_until_done(world, HOVER)
+    assert (world.state.status[0] == LANDED) == return_mode
+    assert world.state.returning[0] == return_mode
+    if return_mode:
+        # the reserve is not so large that the battery is left unused
+        assert 0.56 < world.state.x[0, DOD] < 0.6
+
+
+def test_a_uas_comes_home_before_the_mission_ends():
+    world = World(meadow(max_steps=120), return_mode=True)
+    for _ in range(10):
+        world.step(AWAY)
+    fly_until_done(world, HOVER)
+    assert world.state.status[0] == LANDED
+    assert 80 < world.state.step[0] <= 120
+
+
+def test_all_come_home_when_everything_is_covered():
+    world = World(
+        meadow([(100.0, 100.0, -1.0)], waypoints=[waypoint((130.0, 100.0, -10.0), 8.0)]),
+        return_mode=True,
+    )
+    for _ in range(100):
+        if world.done:
+            break
+        outcome = world.step({"uas_1": Velocity(6.0, 0.0, 10.0)})
+        assert outcome["returning"][0] == world.state.returning[0]
+    assert not world.state.uncovered.any()
+    assert world.state.status[0] == LANDED
+
+
+def test_return_mode_stays_on_and_overrides_the_player():
+    world = World(meadow(max_steps=120), return_mode=True)
+    returning = []
+    for _ in range(120):
+        if world.done:
+            break
+        outcome = world.step(AWAY if world.state.step[0] < 10 else {"uas_1": GoTo(0)})
+        returning.append(bool(outcome["returning"][0]))
+    first = returning.index(True)
+    assert all(returning[first:])
+    assert world.state.status[0] == LANDED
+
+
+def test_without_return_mode_only_the_player_returns():
+    world = World(meadow())
+    outcome = world.step(AWAY)
+    assert not outcome["returning"][0]
+    outcome = world.step({"uas_1": GoTo(None)})
+    assert outcome["returning"][0]
+    assert not world.state.returning[0]
+
+
+def test_the_time_home_grows_with_the_distance():
+    world = World(meadow([(100.0, 100.0, -1.0)]))
+    x = world.state.x[0].copy()
+    times_s = []
+    for away_m in (0.0, 20.0, 60.0):
+        x[0] = 100.0 + away_m
+        times_s.append(seconds_home(world.arena, 0, x))
+    np.testing.assert_allclose(np.diff(times_s), [20.0 / 8.0, 40.0 / 8.0])
+
+
+def test_a_whole_town_comes_home_from_a_random_walk():
+    scenario = generate_scenario(7, n_uas=3, n_waypoints=16, n_obstacles=6)
+    scenario = scenario.model_copy(update={"max_steps": 140})
+    world = World(scenario, return_mode=True, safety_filter=True)
+    rng = np.random.default_rng(1)
+    commands = {}
+    while not world.done and world.state.step[0] < 140:
+        if world.state.step[0] % 5 == 0:
+            commands = {
+                name: Velocity(*rng.uniform([-10, -10, 5], [10, 10, 30])) for name in world.names
+            }
+        world.step({name: commands[name] for name in world.active})
+    assert (world.state.status == LANDED).all()
+    assert FLYING not in world.state.status

@@ -1,0 +1,294 @@
+"""What is compiled is kept on disk for as long as all the sources it was made from are the same."""
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from uas_coverage_env.compiled import source_digest
+
+PACKAGE = Path(source_digest.__file__).parents[1]
+ROOT = PACKAGE.parent
+
+SOURCES = {
+    "craft/__init__.py": "",
+    "craft/parts/__init__.py": """
+from craft.parts.motor import thrust
+from craft.parts.cell import charge
+""",
+    "craft/parts/motor.py": """
+from uas_coverage_env.compiled.kernels import kernel
+FACTOR = 2.0
+@kernel
+def thrust(x):
+    return FACTOR * x
+""",
+    "craft/parts/cell.py": """
+from uas_coverage_env.compiled.kernels import kernel
+@kernel
+def charge(x):
+    return x - 1.0
+""",
+    "craft/body.py": """
+from craft.parts import thrust
+from uas_coverage_env.compiled.kernels import kernel
+@kernel
+def lift(x):
+    return thrust(x) + 1.0
+""",
+    "sensor.py": """
+from craft.body import lift
+from uas_coverage_env.compiled.kernels import kernel
+from helper import half
+@kernel
+def sense(x):
+    return half(lift(x))
+def around(reward):
+    @kernel
+    def inner(x):
+        return reward(x) + 1.0
+    return inner
+""",
+    "helper.py": """
+from uas_coverage_env.compiled.kernels import kernel
+@kernel
+def half(x):
+    return 0.5 * x
+""",
+}
+
+PROGRAM = """
+import json, sys, types
+package = types.ModuleType("uas_coverage_env")  # without the second that all of it takes
+package.__path__ = [sys.argv.pop()]
+sys.modules["uas_coverage_env"] = package
+module, name, number = sys.argv[1:]
+function = getattr(__import__(module, fromlist=[name]), name)
+value = function(float(number))
+stats = getattr(function, "stats", None)
+print(json.dumps([value, len(stats.cache_hits) if stats else 0]))
+"""
+
+
+@pytest.fixture
+def craft(tmp_path):
+    for name, text in SOURCES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def called(
+    folder: Path, module: str, name: str, number: float = 3.0, program=PROGRAM, **environment: str
+):
+    """What a kernel returns in a new process, and how many versions it took from the cache."""
+    done = subprocess.run(
+        [sys.executable, "-c", program, module, name, str(number), str(PACKAGE)],
+        env={
+            **{key: text for key, text in os.environ.items() if key != "NUMBA_CACHE_DIR"},
+            "PYTHONPATH": os.pathsep.join(
+                [str(folder), os.environ.get("PYTHONPATH", ""), str(ROOT)]
+            ),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **environment,
+        },
+        capture_output=True,
+        text=True,
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    return tuple(json.loads(done.stdout))
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_an_edited_kernel_is_noticed_by_what_calls_it_from_another_module(craft):
+    assert called(craft, "sensor", "sense") == (3.5, 0)
+    assert called(craft, "sensor", "sense") == (3.5, 1)
+    edit(craft / "craft/parts/motor.py", "FACTOR * x", "FACTOR * x + 1.0")
+    assert called(craft, "sensor", "sense") == (4.0, 0)
+    edit(craft / "craft/parts/motor.py", "2.0", "4.0")  # a constant
+    assert called(craft, "sensor", "sense") == (7.0, 0)
+    edit(craft / "helper.py", "0.5", "1.5")  # beside a file that belongs to no package
+    assert called(craft, "sensor", "sense") == (21.0, 0)
+
+
+def test_an_edit_elsewhere_costs_no_compilation(craft):
+    called(craft, "sensor", "sense")
+    edit(craft / "craft/parts/cell.py", "1.0", "2.0")
+    assert called(craft, "sensor", "sense") == (3.5, 1)
+    os.utime(craft / "craft/parts/motor.py", (1, 1))  # a fresh checkout of the same contents
+    assert called(craft, "sensor", "sense") == (3.5, 1)
+
+
+def test_a_name_that_a_package_takes_from_another_module_is_noticed(craft):
+    called(craft, "craft.body", "lift")
+    edit(craft / "craft/parts/__init__.py", "cell import charge", "cell import charge as thrust")
+    assert called(craft, "craft.body", "lift") == (3.0, 0)
+
+
+def test_a_kernel_built_around_another_is_kept_for_as_long_as_that_one_is_the_same(craft):
+    (craft / "built.py").write_text(
+        "from craft.body import lift\nfrom craft.parts import charge\n"
+        "from sensor import around\nreward = around(lift)\nother = around(charge)\n"
+    )
+    assert called(craft, "built", "reward") == (8.0, 0)
+    assert called(craft, "built", "other") == (3.0, 0)
+    assert called(craft, "built", "reward") == (8.0, 1)
+    edit(craft / "craft/parts/motor.py", "2.0", "3.0")
+    assert called(craft, "built", "reward") == (11.0, 0)
+
+
+def test_the_plant_flies_by_the_power_train_as_it_is_now(tmp_path):
+    copy = tmp_path / PACKAGE.name
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "*.js"))
+    program = """
+import json
+import numpy as np
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES, compile_vehicle, load_vehicle, plant_step
+vehicle, x = compile_vehicle(load_vehicle("s500_v2"), 0.1)[()], np.zeros(N_STATES)
+print(json.dumps(plant_step(vehicle, x, np.zeros(N_INPUTS), x.copy())))
+"""
+    before = called(tmp_path, "", "", program=program)
+    edit(copy / "vehicle/powertrain.py", "return n * per_motor", "return 1.03 * n * per_motor")
+    after = called(tmp_path, "", "", program=program)
+    # not more: a vehicle whose rotors take 5 % more than its file says is refused
+    assert after[1] > 1.02 * before[1] > 0.0
+
+
+def test_what_was_compiled_from_earlier_sources_is_deleted(craft):
+    called(craft, "craft.body", "lift")
+    folder = craft / "craft/__pycache__"
+    first = set(folder.glob("*.nbc"))
+    for n in range(3):  # the second kernel of a module moves down, too
+        edit(craft / "craft/body.py", "@kernel", "# an edit\n@kernel")
+        called(craft, "craft.body", "lift", number=n)
+    assert len(list(folder.glob("*.nbc"))) == len(first) == 1
+    assert first.isdisjoint(folder.glob("*.nbc"))
+
+
+def test_of_a_function_that_is_built_around_numbers_the_latest_versions_are_kept(craft):
+    (craft / "many.py").write_text(
+        "from uas_coverage_env.compiled import cache\n"
+        "from uas_coverage_env.compiled.kernels import kernel\n"
+        "cache._MOST_VERSIONS = 3\n"
+        "def plus(y):\n    @kernel\n    def inner(x):\n        return x + y\n    return inner\n"
+        "def call(x):\n    return [plus(float(y))(x) for y in range(5)][int(x)]\n"
+    )
+    assert called(craft, "many", "call", 4.0) == (8.0, 0)
+    assert len(list(craft.glob("__pycache__/*.nbc"))) == 3
+
+
+def test_a_folder_that_cannot_be_written_to_leaves_the_choice_to_the_users_cache(craft):
+    (craft / "craft/__pycache__").write_text("no folder, so nothing can be written into it")
+    home = craft / "home"
+    there = {"XDG_CACHE_HOME": str(home), "HOME": str(home)}
+    assert called(craft, "craft.body", "lift", **there) == (7.0, 0)
+    assert called(craft, "craft.body", "lift", **there) == (7.0, 1)
+    assert list(home.rglob("body.lift-*.nbc"))
+
+
+def test_without_any_place_to_write_to_kernels_are_compiled_in_each_process(craft):
+    (craft / "craft/__pycache__").write_text("")
+    (craft / "home").write_text("")
+    nowhere = {"XDG_CACHE_HOME": str(craft / "home"), "HOME": str(craft / "home")}
+    for _ in range(2):
+        assert called(craft, "craft.body", "lift", **nowhere) == (7.0, 0)
+
+
+def test_a_cache_folder_of_the_users_choice_serves_checkouts_side_by_side(craft, tmp_path_factory):
+    other = tmp_path_factory.mktemp("other")
+    shutil.copytree(craft, other, dirs_exist_ok=True)
+    edit(other / "craft/parts/motor.py", "2.0", "4.0")
+    place = {"NUMBA_CACHE_DIR": str(craft / "chosen")}
+    for hits in (0, 1):
+        assert called(craft, "craft.body", "lift", **place) == (7.0, hits)
+        assert called(other, "craft.body", "lift", **place) == (13.0, hits)
+    assert not list((craft / "craft").rglob("*.nbc"))
+
+
+def test_processes_that_compile_at_the_same_time_leave_a_whole_cache(craft):
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(lambda _: called(craft, "craft.body", "lift"), range(4)))
+    assert {value for value, _ in results} == {7.0}
+    assert called(craft, "craft.body", "lift") == (7.0, 1)
+    assert not list(craft.rglob("*.tmp.*"))
+
+
+def test_a_cache_file_that_was_cut_off_is_replaced(craft):
+    called(craft, "craft.body", "lift")
+    (kept,) = (craft / "craft/__pycache__").glob("body.lift-*.nbc")
+    kept.write_bytes(kept.read_bytes()[:100])
+    assert called(craft, "craft.body", "lift") == (7.0, 0)
+    assert called(craft, "craft.body", "lift") == (7.0, 1)
+
+
+def test_without_compilation_kernels_are_plain_functions(craft):
+    assert called(craft, "sensor", "sense", NUMBA_DISABLE_JIT="1") == (3.5, 0)
+    assert not list(craft.rglob("*.nbc"))
+
+
+def test_a_kernel_typed_into_a_prompt_is_compiled_but_not_kept():
+    program = """
+import json
+from uas_coverage_env.compiled.kernels import kernel
+@kernel
+def twice(x):
+    return 2.0 * x
+print(json.dumps([twice(2.0), len(twice.stats.cache_hits)]))
+"""
+    assert called(Path.cwd(), "", "", program=program) == (4.0, 0)
+
+
+def test_imports_are_read_from_the_text_as_python_reads_them():
+    for path in PACKAGE.rglob("*.py"):
+        statements = ast.walk(ast.parse(path.read_text()))
+        expected = set()
+        for statement in statements:
+            if isinstance(statement, ast.ImportFrom):
+                expected |= {
+                    (statement.module or "", statement.level, alias.name)
+                    for alias in statement.names
+                }
+            elif isinstance(statement, ast.Import):
+                expected |= {(alias.name, 0, None) for alias in statement.names}
+        read = source_digest._source(str(path)).imports
+        assert expected <= {(one.module, one.level, one.name) for one in read}, path
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("import a.b as c", {("a.b", 0, None, "c")}),
+        ("import a.b", {("a", 0, None, "a.b"), ("a.b", 0, None, "a.b")}),
+        ("x = 1; import a, b", {("a", 0, None, "a"), ("b", 0, None, "b")}),
+        (
+            "from . import (  # one (or two)\n    a,\n    b as c,\n)",
+            {("", 1, "a", "a"), ("", 1, "b", "c")},
+        ),
+        ("if x:\n    from ..p import \\\n        a", {("p", 2, "a", "a")}),
+        ('"""Text\nfrom which nothing is imported\n"""', set()),
+    ],
+)
+def test_every_form_of_import_is_read(tmp_path, text, expected):
+    path = tmp_path / "module.py"
+    path.write_text(text)
+    assert set(source_digest._source(str(path)).imports) == expected
+
+
+def test_packages_that_import_from_each_other_in_a_circle_have_a_digest(tmp_path):
+    for name, other in (("a", "b"), ("b", "a")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text(f"from {other} import name\n")
+    (tmp_path / "module.py").write_text("from a import name\n")
+    assert len(source_digest.source_digest(str(tmp_path / "module.py"))) == 64

@@ -1,0 +1,15 @@
+"""What flies a UAS: control, guidance past obstacles, return mode and safety filter."""
+
+from uas_coverage_env.autopilot.assist import AssistantCode, assistants
+from uas_coverage_env.autopilot.guidance import guide, path_length_home_m, target_position
+from uas_coverage_env.autopilot.return_mode import has_to_return, seconds_home
+
+__all__ = [
+    "AssistantCode",
+    "assistants",
+    "guide",
+    "has_to_return",
+    "path_length_home_m",
+    "seconds_home",
+    "target_position",
+]

@@ -1,0 +1,137 @@
+"""Getting out of the way of what moves, where braking does not help.
+
+Braking proves a UAS safe from what stands still and from the other UAS, which brake too. It proves
+nothing about an obstacle that comes at a UAS that hovers. Then the filter looks for an evasive
+flight: a velocity held for some seconds and braked, that stays out of the space which the moving
+obstacle sweeps at its present velocity. Its first step must leave room to brake clear of everything
+that stands still and of the others, so that the proof about these goes on.
+"""
+
+import math
+
+import numpy as np
+
+from uas_coverage_env.autopilot.control import write_brake, write_command
+from uas_coverage_env.autopilot.lookahead import (
+    PLENTY_M,
+    TOLERANCE_M,
+    fixed_slack,
+    fly_and_brake,
+    fly_hold_and_brake,
+    peer_slack,
+    required_from,
+)
+from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
+from uas_coverage_env.geometry import cylinder_clearance
+from uas_coverage_env.world.commands import CLIMB
+
+_TURNS = 12
+_HELD_S = (8.0, 3.0)
+_ENOUGH_M = 3.0  # more room than this is not looked for
+LINGERING = 0.05
+"""Weight of the mean shortfall of room beside the largest: who is inside leaves early."""
+
+
+@kernel
+def _room_m(arena, step, i, path_m):
+    """How well a path keeps clear of moving obstacles that go on as they go now [m].
+
+    The least room to spare along the path, at most _ENOUGH_M; where it is negative, less a little
+    for every step with too little room.
+    """
+    dt_s = arena.rules[0].dt_s
+    step = min(step, arena.moving_path_m.shape[0] - 1)
+    n_steps = path_m.shape[0] - 1
+    least_m, shortfall_m = _ENOUGH_M, 0.0
+    for m in range(arena.moving.shape[0]):
+        obstacle = arena.moving[m]
+        required_m = required_from(arena, step, i, m)
+        north_m, east_m, down_m = arena.moving_path_m[step, m]
+        north_mps, east_mps, down_mps = arena.moving_velocity_mps[step, m]
+        for k in range(n_steps):
+            now_s, next_s = k * dt_s, (k + 1) * dt_s
+            clearance_m = cylinder_clearance(
+                obstacle.radius_m,
+                obstacle.half_height_m,
+                path_m[k, 0] - north_m - now_s * north_mps,
+                path_m[k, 1] - east_m - now_s * east_mps,
+                path_m[k, 2] - down_m - now_s * down_mps,
+                path_m[k + 1, 0] - north_m - next_s * north_mps,
+                path_m[k + 1, 1] - east_m - next_s * east_mps,
+                path_m[k + 1, 2] - down_m - next_s * down_mps,
+            )
+            room_m = clearance_m - required_m
+            least_m = min(least_m, room_m)
+            shortfall_m += min(room_m, 0.0)
+    return least_m + LINGERING * shortfall_m / n_steps
+
+
+@kernel
+def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
+    """Whether braking after one step of a command is clear of all that stands still or brakes."""
+    n_flown, slack_m = fly_and_brake(
+        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m
+    )
+    enough_m = -TOLERANCE_M
+    slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
+    if slack_m >= enough_m:
+        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, enough_m, slack_m)
+    return slack_m >= enough_m
+
+
+@kernel
+def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
+    """Whether an evasive flight meets nothing that stands still and no path of another UAS."""
+    fly_hold_and_brake(arena, i, state.x[i], state.reference[i], command, n_held, nonlinear, path_m)
+    slack_m = fixed_slack(arena, i, path_m, path_m.shape[0] - 1, 0.0, PLENTY_M)
+    if slack_m >= 0.0:
+        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, 0.0, slack_m)
+    return slack_m >= 0.0
+
+
+@allocating_kernel
+def evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m):
+    """Write the command that gets a UAS best out of the way of what moves.
+
+    Args:
+        arena: The arena.
+        state: The state.
+        i: Index of the UAS.
+        heading_rad: Where it would like to fly; directions near to it come first.
+        nonlinear: Whether the world flies the 6-DOF plant.
+        command: A record of COMMAND_DTYPE, written.
+        path_m: (N+1, 3) [m] written: the command flown for one step and braked.
+        committed_m: (U, N+1, 3) [m] the paths to which the UAS are committed.
+
+    Returns:
+        Whether braking after the command is clear of all that stands still; if not, nothing is.
+    """
+    uas = arena.uas[i]
+    write_brake(command)
+    if not _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
+        return False
+    best_m = _room_m(arena, state.step[0], i, path_m)
+    best_north_mps, best_east_mps, best_down_mps = 0.0, 0.0, 0.0
+    tail_m = np.empty(path_m.shape)
+    for turn in range(_TURNS + 1):
+        # nearest first: 0, 1, -1, 2, -2, ...; the last one goes straight up or down
+        turns = (turn + 1) // 2 * (1 if turn % 2 else -1)
+        heading = heading_rad + turns * 2.0 * math.pi / _TURNS
+        speed_mps = uas.speed_mps if turn < _TURNS else 0.0
+        for climb in range(3):
+            down_mps = (0.0, -uas.climb_mps, uas.descent_mps)[climb]
+            north_mps, east_mps = speed_mps * math.cos(heading), speed_mps * math.sin(heading)
+            write_command(command, CLIMB, north_mps, east_mps, down_mps)
+            if not _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
+                continue
+            for held_s in _HELD_S:
+                n_held = max(1, round(held_s / arena.rules[0].dt_s))
+                if _is_open(arena, state, i, command, n_held, nonlinear, tail_m, committed_m):
+                    room_m = _room_m(arena, state.step[0], i, tail_m)
+                    if room_m > best_m:
+                        best_m = room_m
+                        best_north_mps, best_east_mps = north_mps, east_mps
+                        best_down_mps = down_mps
+    write_command(command, CLIMB, best_north_mps, best_east_mps, best_down_mps)
+    _is_provable(arena, state, i, command, nonlinear, path_m, committed_m)
+    return True

@@ -1,0 +1,333 @@
+"""What would happen if a command were flown for a step, and then the brakes were put on."""
+
+import math
+
+from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
+from uas_coverage_env.vehicle import (
+    N_INPUTS,
+    N_STATES,
+    PHI,
+    THETA,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    X,
+    Y,
+    Z,
+    fly_kinematics,
+    plant_step,
+    reseed_reference,
+)
+from uas_coverage_env.world.commands import WRENCH
+from uas_coverage_env.world.contacts import face_between, moving_clearance
+from uas_coverage_env.world.routes import box_apart
+from uas_coverage_env.world.state import FLYING
+
+TOLERANCE_M = 1e-3
+"""Clearances of a braking flight may be missed by this: rounding must not forbid braking on."""
+
+PLENTY_M = 2.0
+"""More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
+
+SURPRISE_S = 1.0
+"""What moves may turn: its keep-out is widened by how far it goes in this time [s]."""
+
+_STILL = 0.02
+
+
+@kernel
+def _is_still(x):
+    """Slow and level enough that what is left of the motion is centimetres."""
+    return (
+        abs(x[VX]) + abs(x[VY]) + abs(x[VZ]) < _STILL
+        and abs(x[PHI]) + abs(x[THETA]) < 0.2 * _STILL
+        and abs(x[WX]) + abs(x[WY]) < 0.2 * _STILL
+    )
+
+
+@kernel
+def _kept_m(required_m, now_m):
+    """What has to be kept: the distance required, or the distance now where it is less already.
+
+    So a UAS that starts too near to something may stay or leave, but not come nearer.
+    """
+    return min(required_m, now_m - TOLERANCE_M)
+
+
+@inlined_kernel
+def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
+    """Simulate a command for one step, then braking until the UAS stands.
+
+    The simulation is the inner loop and the dynamics that the world flies. So where a command was
+    found safe, its braking flight is still there to be flown in the next step: from a safe state
+    there is always a safe command (against what stands still).
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        start: (14,) its state.
+        reference: (2,) [m/s] of its inner loop; neither is changed.
+        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
+        nonlinear: Whether the world flies the 6-DOF plant, and this too.
+        path_m: (N+1, 3) [m] positions, written; after a stop the position stays.
+
+    Returns:
+        (steps until it stands, slack [m]): the slack is PLENTY_M, but negative where the UAS has
+        not come to rest at the end of the path.
+    """
+    return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m)
+
+
+@inlined_kernel
+def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m):
+    """Like `fly_and_brake`, with the command flown for n_held steps."""
+    n_steps = path_m.shape[0] - 1
+    vehicle = arena.vehicles[i]
+    x = room(N_STATES)
+    governed = room(2)
+    u = room(N_INPUTS)
+    for k in range(N_STATES):
+        x[k] = start[k]
+    for k in range(2):
+        governed[k] = reference[k]
+    for k in range(N_INPUTS):
+        u[k] = 0.0
+    path_m[0, 0] = x[X]
+    path_m[0, 1] = x[Y]
+    path_m[0, 2] = x[Z]
+    for k in range(n_steps):
+        # one call: what is flown becomes part of this function
+        flown = command if k < n_held else arena.rules[0].brake
+        command_wrench(vehicle, x, governed, flown, u)
+        if nonlinear:
+            plant_step(vehicle, x, u, x)
+        else:
+            fly_kinematics(vehicle, x, u)
+        if k < n_held and command.kind == WRENCH:
+            reseed_reference(vehicle, x, governed)
+        path_m[k + 1, 0] = x[X]
+        path_m[k + 1, 1] = x[Y]
+        path_m[k + 1, 2] = x[Z]
+        if k + 1 >= n_held and _is_still(x):
+            for later in range(k + 2, n_steps + 1):
+                path_m[later, 0] = x[X]
+                path_m[later, 1] = x[Y]
+                path_m[later, 2] = x[Z]
+            return k + 1, PLENTY_M
+    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
+    return n_steps, min(PLENTY_M, 0.1 - speed_mps)
+
+
+@kernel
+def _box_of(path_m, n_flown, low, high):
+    """Bounds of the first n_flown segments of a path."""
+    for axis in range(3):
+        low[axis] = path_m[0, axis]
+        high[axis] = path_m[0, axis]
+        for k in range(1, n_flown + 1):
+            low[axis] = min(low[axis], path_m[k, axis])
+            high[axis] = max(high[axis], path_m[k, axis])
+
+
+@kernel
+def _fence_slack(arena, path_m, n_flown, low, high, slack_m):
+    """The smaller of slack_m and the distance to spare from the geofence along a path."""
+    rules = arena.rules[0]
+    normals = arena.normals
+    offsets_m = arena.offsets_m
+    required_m = rules.fence_margin_m
+    for h in range(rules.fence_first, rules.fence_last):
+        outermost = offsets_m[h]
+        for axis in range(3):
+            outermost += max(normals[h, axis] * low[axis], normals[h, axis] * high[axis])
+        if -outermost - required_m >= slack_m:
+            # the whole box around the path is far enough from this face
+            continue
+        for k in range(1, n_flown + 1):
+            spare_m = -signed_distance(
+                normals, offsets_m, h, h + 1, path_m[k, 0], path_m[k, 1], path_m[k, 2]
+            )
+            if spare_m - required_m < slack_m:
+                now_m = -signed_distance(
+                    normals, offsets_m, h, h + 1, path_m[0, 0], path_m[0, 1], path_m[0, 2]
+                )
+                slack_m = min(slack_m, spare_m - _kept_m(required_m, now_m))
+    return slack_m
+
+
+@inlined_kernel
+def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
+    """Least distance to spare from the geofence and fixed obstacles along a path.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        path_m: (N+1, 3) [m] its path.
+        n_flown: Number of segments in which it moves.
+        enough_m: Stop looking when the slack is below this [m].
+        slack_m: Slack known so far [m].
+
+    Returns:
+        The smaller of slack_m and the distance to spare [m].
+    """
+    low = room(3)
+    high = room(3)
+    _box_of(path_m, n_flown, low, high)
+    slack_m = _fence_slack(arena, path_m, n_flown, low, high, slack_m)
+    normals = arena.normals
+    offsets_m = arena.offsets_m
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        if box_apart(obstacle, low[0], low[1], low[2], high[0], high[1], high[2]):
+            continue
+        first = obstacle.first_face
+        last = obstacle.last_face
+        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
+        for k in range(n_flown):
+            x0 = path_m[k, 0]
+            y0 = path_m[k, 1]
+            z0 = path_m[k, 2]
+            x1 = path_m[k + 1, 0]
+            y1 = path_m[k + 1, 1]
+            z1 = path_m[k + 1, 2]
+            bound = face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
+            if bound - required_m >= slack_m:
+                continue
+            clearance = segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1)
+            if clearance - required_m < slack_m:
+                now_m = signed_distance(
+                    normals, offsets_m, first, last, path_m[0, 0], path_m[0, 1], path_m[0, 2]
+                )
+                slack_m = min(slack_m, clearance - _kept_m(required_m, now_m))
+                if slack_m < enough_m:
+                    return slack_m
+    return slack_m
+
+
+@kernel
+def required_from(arena, step, i, m):
+    """The clearance that UAS i keeps from moving obstacle m [m]: more, the faster that moves."""
+    velocity_mps = arena.moving_velocity_mps[step, m]
+    north_mps, east_mps, down_mps = velocity_mps[0], velocity_mps[1], velocity_mps[2]
+    speed_mps = math.sqrt(north_mps * north_mps + east_mps * east_mps + down_mps * down_mps)
+    required_m = arena.uas[i].radius_m + arena.moving[m].safe_distance_m
+    return required_m + SURPRISE_S * speed_mps
+
+
+@inlined_kernel
+def moving_slack(arena, step, i, path_m, enough_m, slack_m):
+    """Least distance to spare from moving obstacles that keep their present velocities.
+
+    What moves may also turn without warning: see `required_from`.
+
+    Args:
+        arena: The arena.
+        step: Number of the sample at which the path begins.
+        i: Index of the UAS.
+        path_m: (N+1, 3) [m] its path.
+        enough_m: As in `fixed_slack`.
+        slack_m: Slack known so far [m].
+
+    Returns:
+        The smaller of slack_m and the distance to spare [m].
+    """
+    dt_s = arena.rules[0].dt_s
+    step = min(step, arena.moving_path_m.shape[0] - 1)
+    centre_m = arena.moving_path_m[step]
+    velocity_mps = arena.moving_velocity_mps[step]
+    for m in range(arena.moving.shape[0]):
+        obstacle = arena.moving[m]
+        required_m = required_from(arena, step, i, m)
+        now_m = moving_clearance(
+            arena.moving, centre_m, centre_m, m,
+            path_m[0, 0], path_m[0, 1], path_m[0, 2], path_m[0, 0], path_m[0, 1], path_m[0, 2],
+        )  # fmt: skip
+        required_m = _kept_m(required_m, now_m)
+        vx = velocity_mps[m, 0] * dt_s
+        vy = velocity_mps[m, 1] * dt_s
+        vz = velocity_mps[m, 2] * dt_s
+        for k in range(path_m.shape[0] - 1):
+            clearance = cylinder_clearance(
+                obstacle.radius_m,
+                obstacle.half_height_m,
+                path_m[k, 0] - centre_m[m, 0] - k * vx,
+                path_m[k, 1] - centre_m[m, 1] - k * vy,
+                path_m[k, 2] - centre_m[m, 2] - k * vz,
+                path_m[k + 1, 0] - centre_m[m, 0] - (k + 1) * vx,
+                path_m[k + 1, 1] - centre_m[m, 1] - (k + 1) * vy,
+                path_m[k + 1, 2] - centre_m[m, 2] - (k + 1) * vz,
+            )
+            slack_m = min(slack_m, clearance - required_m)
+            if slack_m < enough_m:
+                return slack_m
+    return slack_m
+
+
+@kernel
+def _paths_apart(path_m, other_m, k, keep_m):
+    """Whether two paths are farther apart than keep_m in step k by a look at north and east."""
+    for axis in range(2):
+        a0 = path_m[k, axis]
+        a1 = path_m[k + 1, axis]
+        b0 = other_m[k, axis]
+        b1 = other_m[k + 1, axis]
+        if min(a0, a1) - max(b0, b1) > keep_m or min(b0, b1) - max(a0, a1) > keep_m:
+            return True
+    return False
+
+
+@kernel
+def separation_at(path_m, other_m, k):
+    """Smallest separation [m] of two UAS on paths (S + 1, 3) between samples k and k + 1."""
+    return cylinder_clearance(
+        0.0,
+        0.0,
+        path_m[k, 0] - other_m[k, 0],
+        path_m[k, 1] - other_m[k, 1],
+        path_m[k, 2] - other_m[k, 2],
+        path_m[k + 1, 0] - other_m[k + 1, 0],
+        path_m[k + 1, 1] - other_m[k + 1, 1],
+        path_m[k + 1, 2] - other_m[k + 1, 2],
+    )
+
+
+@inlined_kernel
+def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
+    """Least distance to spare from the paths to which the other UAS are committed.
+
+    Args:
+        arena: The arena.
+        status: (U,) status of all UAS.
+        i: Index of the UAS.
+        path_m: (N+1, 3) [m] its path.
+        committed_m: (U, N+1, 3) [m] the paths of all UAS.
+        enough_m: As in `fixed_slack`.
+        slack_m: Slack known so far [m].
+
+    Returns:
+        The smaller of slack_m and the distance to spare [m].
+    """
+    for j in range(status.shape[0]):
+        if j == i or status[j] != FLYING:
+            continue
+        other_m = committed_m[j]
+        required_m = (
+            arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
+        )
+        now_m = max(
+            math.hypot(path_m[0, 0] - other_m[0, 0], path_m[0, 1] - other_m[0, 1]),
+            abs(path_m[0, 2] - other_m[0, 2]),
+        )
+        required_m = _kept_m(required_m, now_m)
+        for k in range(path_m.shape[0] - 1):
+            if _paths_apart(path_m, other_m, k, required_m + max(slack_m, 0.0)):
+                continue
+            apart_m = separation_at(path_m, other_m, k)
+            slack_m = min(slack_m, apart_m - required_m)
+            if slack_m < enough_m:
+                return slack_m
+    return slack_m

@@ -1,0 +1,244 @@
+"""The safety filter: a command is flown only if the UAS can still brake clear of everything.
+
+A command is safe if it can be flown for one step, and braking then keeps the UAS at the distances
+that count as a breach: from the geofence, fixed obstacles, moving obstacles that go on as they go
+now, and the paths of the other UAS. UAS decide in order; those that have decided are committed to
+what they chose, the later ones to braking. So every UAS always has a safe choice, braking, except
+where a moving obstacle comes at it; then it gets out of the way as best it can (`evasion`), but
+never at the cost of what can be proved: one step of the evasive flight, and braking after it, is
+clear of all that stands still and of the other UAS.
+
+Whom return mode brings home decides first, and the others leave its way (`right_of_way`): among
+the safe commands they fly the nearest that keeps clear of it.
+"""
+
+import math
+
+import numpy as np
+
+from uas_coverage_env.autopilot.control import write_brake, write_command
+from uas_coverage_env.autopilot.evasion import evade
+from uas_coverage_env.autopilot.lookahead import (
+    TOLERANCE_M,
+    fixed_slack,
+    fly_and_brake,
+    moving_slack,
+    peer_slack,
+)
+from uas_coverage_env.autopilot.right_of_way import claim_way, decision_order, room_beside
+from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
+from uas_coverage_env.vehicle import VX, VY, Z
+from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
+
+_LEAST_SPEED_MPS = 3.0
+_AS_WISHED, _CLIMBING, _SINKING, _LEVEL = range(4)
+_NOTICEABLE_M = 1e-3
+
+
+def _deflections() -> np.ndarray:
+    """(D, 3) turn [rad], share of the speed, and one of the four heights: nearest first.
+
+    Instead of braking, last, come level flight, straight up or down, and creeping: who is wedged in
+    between others may have room for no more.
+    """
+    turns_deg = (0, 25, -25, 50, -50, 80, -80, 110, -110, 150, -150, 180)
+    rows = [
+        (turn_deg, share, height)
+        for share in (1.0, 0.6, 0.3)
+        for turn_deg in turns_deg
+        for height in (_AS_WISHED, _CLIMBING, _SINKING)
+    ]
+    rows.sort(key=lambda r: abs(r[0]) / 60 + (1 - r[1]) * 1.2 + (r[2] != _AS_WISHED) * 0.45)
+    rows += [(turn_deg, share, _LEVEL) for share in (1.0, 0.3) for turn_deg in turns_deg]
+    rows += [(0, 0.0, _CLIMBING), (0, 0.0, _SINKING)]
+    rows += [
+        (turn_deg, 0.1, height)
+        for turn_deg in turns_deg
+        for height in (_LEVEL, _CLIMBING, _SINKING)
+    ]
+    return np.array([(np.deg2rad(turn_deg), share, height) for turn_deg, share, height in rows])
+
+
+_DEFLECTIONS = _deflections()
+
+
+@kernel
+def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
+    """Least distance to spare from everything when a command is flown and then braked [m]."""
+    n_flown, slack_m = fly_and_brake(
+        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m
+    )
+    if slack_m >= enough_m:
+        slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
+    if slack_m >= enough_m:
+        slack_m = moving_slack(arena, state.step[0], i, path_m, enough_m, slack_m)
+    if slack_m >= enough_m:
+        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, enough_m, slack_m)
+    return slack_m
+
+
+@kernel
+def _wish(arena, state, i, command):
+    """The velocity (north, east, down) [m/s] that a command is after."""
+    uas = arena.uas[i]
+    x = state.x[i]
+    kind = command.kind
+    values = command.values
+    if kind == VELOCITY:
+        down_mps = -values[2] - x[Z]
+        return values[0], values[1], min(max(down_mps, -uas.climb_mps), uas.descent_mps)
+    if kind == CLIMB:
+        return values[0], values[1], values[2]
+    if kind == ACCELERATION:
+        dt_s = arena.rules[0].dt_s
+        north_mps = state.reference[i, 0] + values[0] * dt_s
+        east_mps = state.reference[i, 1] + values[1] * dt_s
+        return north_mps, east_mps, 0.0
+    return x[VX], x[VY], 0.0
+
+
+@kernel
+def _deflect(arena, i, wish_mps, d, command):
+    """Write the d-th nearest alternative to a velocity (north, east, down)."""
+    uas = arena.uas[i]
+    speed_mps = math.hypot(wish_mps[0], wish_mps[1])
+    heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, 0]
+    share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, 1]
+    height = _DEFLECTIONS[d, 2]
+    down_mps = wish_mps[2]
+    if height == _CLIMBING:
+        down_mps = -uas.climb_mps
+    elif height == _SINKING:
+        down_mps = uas.descent_mps
+    elif height == _LEVEL:
+        down_mps = 0.0
+    write_command(
+        command, CLIMB, share_mps * math.cos(heading), share_mps * math.sin(heading), down_mps
+    )
+
+
+@allocating_kernel
+def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
+    """Put the nearest safe command in the place of an unsafe one, or else the least harmful.
+
+    The order is: the deflections; braking; where even braking is not safe, because something
+    moving comes near, an evasive flight; and where not even what stands still is far enough away,
+    whatever keeps most distance. `path_m` is left as the path to which the UAS is then committed.
+    """
+    n_deflections = _DEFLECTIONS.shape[0]
+    wish_mps = _wish(arena, state, i, command)
+    for d in range(n_deflections):
+        _deflect(arena, i, wish_mps, d, command)
+        slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
+        if slack_m >= 0.0:
+            return
+    write_brake(command)
+    best_m = _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+    if best_m >= -TOLERANCE_M:
+        return
+    heading_rad = math.atan2(wish_mps[1], wish_mps[0])
+    if evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m):
+        return
+    best = -1
+    for d in range(n_deflections):
+        _deflect(arena, i, wish_mps, d, command)
+        slack_m = _slack(arena, state, i, command, nonlinear, best_m, path_m, committed_m)
+        if slack_m > best_m:
+            best_m = slack_m
+            best = d
+    if best < 0:
+        write_brake(command)
+    else:
+        _deflect(arena, i, wish_mps, best, command)
+    _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+
+
+@kernel
+def _make_way(
+    arena, state, i, command, nonlinear, path_m, committed_m, claimants, n_claims, claims_m
+):  # fmt: skip
+    """Write the nearest safe command that keeps clear of the claimed ways.
+
+    Where none does, the safe one that leaves them most room: the command itself, a deflection, or
+    braking. `path_m` is left as in `_replace`.
+
+    Returns:
+        Whether there is a safe command; if not, `command` is what it was.
+    """
+    n_deflections = _DEFLECTIONS.shape[0]
+    own_kind = command.kind
+    own = command.values[0], command.values[1], command.values[2], command.values[3]
+    wish_mps = _wish(arena, state, i, command)
+    n_options = n_deflections + 2
+    best, best_m = n_options, -math.inf
+    for option in range(n_options):
+        enough_m = 0.0
+        if 0 < option <= n_deflections:
+            _deflect(arena, i, wish_mps, option - 1, command)
+        elif option > n_deflections:
+            write_brake(command)
+            enough_m = -TOLERANCE_M
+        if _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m) < enough_m:
+            continue
+        room_m = room_beside(arena, i, path_m, claimants, n_claims, claims_m)
+        if room_m > best_m + _NOTICEABLE_M:
+            best, best_m = option, room_m
+        if room_m >= 0.0:
+            break
+    if 0 < best <= n_deflections:
+        _deflect(arena, i, wish_mps, best - 1, command)
+    elif best == n_deflections + 1:
+        write_brake(command)
+    else:
+        write_command(command, own_kind, own[0], own[1], own[2])
+        command.values[3] = own[3]
+    _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+    return best < n_options
+
+
+@allocating_kernel
+def filter_commands(arena, state, nonlinear, outcome):
+    """Replace the unsafe ones among the commands in `outcome` and mark them as filtered.
+
+    Args:
+        arena: The arena.
+        state: The state from which the commands are flown.
+        nonlinear: Whether the world flies the 6-DOF plant.
+        outcome: (U,) of OUTCOME_DTYPE; applied_command and filtered are written.
+    """
+    n_uas = state.status.shape[0]
+    n_steps = arena.rules[0].lookahead_steps
+    committed_m = np.empty((n_uas, n_steps + 1, 3))
+    claims_m = np.empty((n_uas, n_steps + 1, 3))
+    order = np.empty(n_uas, np.int64)
+    n_flying, n_returning = decision_order(state, order)
+    held_up = np.empty(n_uas, np.int64)
+    n_held_up = 0
+    brake = arena.rules[0].brake
+    # the first UAS decides before anybody asks where it would brake
+    for rank in range(1, n_flying):
+        i = order[rank]
+        x = state.x[i]
+        reference = state.reference[i]
+        fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i])
+    for rank in range(n_flying):
+        i = order[rank]
+        command = outcome[i].applied_command
+        path_m = committed_m[i]
+        claimants, n_claims = order, n_returning
+        slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
+        if rank < n_returning:
+            claimants, n_claims = held_up, n_held_up
+            claim_way(arena, state, i, command, nonlinear, claims_m[i])
+            if slack_m < 0.0:
+                held_up[n_held_up] = i
+                n_held_up += 1
+        room_m = room_beside(arena, i, path_m, claimants, n_claims, claims_m)
+        if slack_m >= 0.0 and room_m >= 0.0:
+            continue
+        if n_claims == 0 or not _make_way(
+            arena, state, i, command, nonlinear, path_m, committed_m, claimants, n_claims, claims_m
+        ):
+            _replace(arena, state, i, command, nonlinear, path_m, committed_m)
+        # nobody but the filter gives this kind of command
+        outcome[i].filtered = command.kind == CLIMB

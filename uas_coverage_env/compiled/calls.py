@@ -1,0 +1,116 @@
+"""Kernels that are called at their address: compiled by themselves, and only if they are needed.
+
+Numba puts the machine code of what a kernel calls into that kernel, and optimises it again in each
+kernel above. What is large, or not known when a step is compiled (a sensor that a user brings), is
+not part of a step: the step is given addresses and calls what lies there.
+"""
+
+import inspect
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from numba import config, types
+from numba.core import cgutils, errors
+from numba.extending import intrinsic
+
+COMPILED = not config.DISABLE_JIT  # pyright: ignore[reportAttributeAccessIssue]
+
+
+class Signature:
+    """What all kernels that are called at one place take and return.
+
+    Args:
+        names: Of the arguments, separated by blanks.
+        arguments: A function that returns their types.
+        result: Type of what they return.
+
+    Attributes:
+        call: In a kernel, `call(address, *arguments)`; to be bound to a name of the module first.
+    """
+
+    def __init__(
+        self,
+        names: str,
+        arguments: Callable[[], tuple[types.Type, ...]],
+        result: types.Type = types.none,
+    ) -> None:
+        self._arguments = arguments
+        self._result = result
+        self.call: Any = _made(names.split(), arguments, result) if COMPILED else _call_plain
+
+    def address_of(self, kernel: Any) -> int:
+        """Compile a kernel, or load it from the cache, and say where it lies.
+
+        Returns:
+            Its address, for one process: it must not be kept in what travels to another. With
+            NUMBA_DISABLE_JIT=1, a number that stands for it.
+
+        Raises:
+            ValueError: It cannot be compiled for these arguments, or returns something else.
+        """
+        if not COMPILED:
+            return _kept(kernel)
+        return _address_of(kernel, self._arguments(), self._result)
+
+
+_PLAIN: list[Callable[..., Any]] = []
+
+
+@cache
+def _kept(function: Callable[..., Any]) -> int:
+    _PLAIN.append(function)
+    return len(_PLAIN) - 1
+
+
+def _call_plain(number: int, *arguments: Any) -> Any:
+    return _PLAIN[number](*arguments)
+
+
+@cache  # numba takes milliseconds to find it again
+def _address_of(kernel: Any, arguments: tuple[types.Type, ...], result: types.Type) -> int:
+    name = getattr(kernel, "__name__", repr(kernel))
+    if not hasattr(kernel, "get_compile_result"):
+        raise ValueError(
+            f"{name} is no compiled function; decorate it with compiled.kernels.kernel"
+        )
+    try:
+        compiled = kernel.get_compile_result(result(*arguments))
+    except errors.NumbaError as error:
+        reason = " ".join(str(error).split())
+        raise ValueError(f"{name} cannot be compiled: {reason[:400]}") from error
+    returned = compiled.signature.return_type
+    if returned != result:
+        raise ValueError(f"{name} returns {returned}; it should return {result}")
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
+
+def _made(
+    names: list[str], arguments: Callable[[], tuple[types.Type, ...]], result: types.Type
+) -> Any:
+    def typed(typing_context, address, *given):
+        given = tuple(types.unliteral(each) for each in given)
+        expected = arguments()
+        if given != expected:
+            # at an address there is nothing that would notice
+            raise errors.TypingError(f"a kernel here takes {expected}, not {given}")
+
+        def generate(context, builder, signature, values):
+            convention = context.call_conv
+            code = convention.get_function_type(result, expected)
+            at = builder.inttoptr(values[0], code.as_pointer())
+            status, value = convention.call_function(builder, at, result, expected, values[1:])
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return context.get_dummy_value() if result == types.none else value
+
+        return result(types.int64, *expected), generate
+
+    # numba reads from the signature how many arguments there are
+    typed.__signature__ = inspect.Signature(  # pyright: ignore[reportFunctionMemberAccess]
+        [
+            inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+            for name in ("typing_context", "address", *names)
+        ]
+    )
+    return intrinsic(typed)

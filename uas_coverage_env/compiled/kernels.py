@@ -1,0 +1,157 @@
+"""How the kernels of a step are compiled: without counting references, and so without allocating.
+
+Numba counts a reference for every array that a kernel takes out of a named tuple or slices, with
+an atomic instruction; in one step of two UAS that is as much work as the flight. The arrays of a
+step outlive it, so nothing has to be counted. The price is that such a kernel cannot make arrays:
+what it needs for a while lies on the stack (`room`). The same source compiles for a GPU.
+
+Whatever is compiled with these decorators is kept on disk by the contents of its sources
+(`cache.py`).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import config, typeof, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
+from numpy.typing import NDArray
+
+from uas_coverage_env.compiled.cache import keep_on_disk
+from uas_coverage_env.compiled.compiler import KernelDispatcher, PartCacheImpl
+
+
+def _decorator(**options: Any) -> Any:
+    """A decorator that compiles with some options; called with more options, it makes another."""
+
+    def decorate(function: Any = None, /, **more: Any) -> Any:
+        if function is None:
+            return _decorator(**options, **more)
+        if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+            return function
+        compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
+        keep_on_disk(compiled)
+        keep_on_disk(compiled.part, PartCacheImpl)
+        return compiled
+
+    return decorate
+
+
+kernel = _decorator(error_model="numpy", _nrt=False)
+"""Compiles a function that makes no arrays and returns none."""
+
+inlined_kernel = _decorator(error_model="numpy", _nrt=False, forceinline=True)
+"""A `kernel` that becomes part of its callers. For parts of a step that take whole named tuples:
+to hand over their hundred machine words takes longer than most of these parts themselves. Numba
+hands this on: a `kernel` that is compiled first because such a part calls it is inlined, too."""
+
+counting_kernel = _decorator(
+    error_model="numpy", _nrt=False, forceinline=True, fastmath={"reassoc", "nsz"}
+)
+"""An `inlined_kernel` that adds floats in any order, several at a time. Only for whole numbers
+below 2⁵³, which have one sum in every order: two compilations of a step must agree to the bit."""
+
+lending_kernel = _decorator(error_model="numpy", _nrt=True, forceinline=True)
+"""Compiles a function that returns borrowed arrays (`borrow.py`), part of its callers."""
+
+allocating_kernel = _decorator(error_model="numpy", _nrt=True)
+"""Compiles a function that makes arrays; also what it calls, unless that is a `kernel`. Takes
+numba's other options: `@allocating_kernel(parallel=True)`."""
+
+
+class Constant(int):
+    """A whole number that `machine_code` compiles into a kernel: one for each value."""
+
+
+def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
+    """A kernel compiled for arguments of these types, which the caller has to keep to.
+
+    Called directly it spares numba's look at the type of each argument, a third of a short step.
+    """
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+        return function
+    return function.compile(
+        tuple(
+            types.literal(int(argument)) if isinstance(argument, Constant) else typeof(argument)
+            for argument in arguments
+        )
+    )
+
+
+def interpreted(kernel: Any) -> Callable[..., Any]:
+    """The Python function of a kernel: for the few calls that are not worth compiling.
+
+    It reads its first argument by name, so that any object with those attributes will do, but the
+    kernels that it calls are compiled.
+    """
+    return getattr(kernel, "py_func", kernel)
+
+
+def room(size: int) -> NDArray[np.float64]:
+    """An array for the time of one call, in a kernel on the stack.
+
+    Args:
+        size: How many numbers; a constant.
+
+    Returns:
+        (size,) not initialised.
+    """
+    return np.empty(size)
+
+
+def single_room(size: int) -> NDArray[np.float32]:
+    """`room` for single precision."""
+    return np.empty(size, np.float32)
+
+
+def _on_the_stack(number: types.Float, element: ir.Type) -> Any:
+    def make(typing_context, size):
+        if not isinstance(size, types.IntegerLiteral):
+            return None
+
+        def generate(context, builder, signature, arguments):
+            data = cgutils.alloca_once(builder, ir.ArrayType(element, size.literal_value))
+            array = make_array(signature.return_type)(context, builder)
+            width = context.get_constant(types.intp, number.bitwidth // 8)
+            populate_array(
+                array,
+                data=builder.bitcast(data, element.as_pointer()),
+                shape=[context.get_constant(types.intp, size.literal_value)],
+                strides=[width],
+                itemsize=width,
+                meminfo=None,
+                parent=None,
+            )
+            return array._getvalue()
+
+        return types.Array(number, 1, "C")(size), generate
+
+    return intrinsic(prefer_literal=True)(make)
+
+
+def lowest_bit(bits: int) -> int:
+    """The place of the lowest bit that is set, counted from 0; in a kernel one instruction.
+
+    Args:
+        bits: Above 0.
+    """
+    return (int(bits) & -int(bits)).bit_length() - 1
+
+
+def _trailing_zeros() -> Any:
+    def make(typing_context, bits):
+        def generate(context, builder, signature, arguments):
+            return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+
+        return types.int64(types.int64), generate
+
+    return intrinsic(make)
+
+
+if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    lowest_bit = _trailing_zeros()
+    room = _on_the_stack(types.float64, ir.DoubleType())
+    single_room = _on_the_stack(types.float32, ir.FloatType())

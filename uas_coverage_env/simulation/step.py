@@ -1,0 +1,178 @@
+"""One step of the world: the rules of the game."""
+
+import math
+
+from uas_coverage_env.autopilot.assist import assist
+from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.views import Layout
+from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
+from uas_coverage_env.world.contacts import (
+    check_limits,
+    count_breaches,
+    judge_fence_and_battery,
+    judge_obstacles,
+    judge_separation,
+)
+from uas_coverage_env.world.coverage import cover, land
+from uas_coverage_env.world.outcome import NONE
+from uas_coverage_env.world.state import FLYING, LOST, STATE
+
+ACCEPTED = -1
+
+
+@kernel
+def first_invalid(arena, state, commands):
+    """Index of the first flying UAS whose command cannot be flown; ACCEPTED where all can."""
+    for i in range(state.status.shape[0]):
+        if state.status[i] != FLYING:
+            continue
+        command = commands[i]
+        kind = command.kind
+        values = command.values
+        if kind != VELOCITY and kind != ACCELERATION and kind != WRENCH and kind != GO_TO:
+            return i
+        for k in range(4):
+            if not math.isfinite(values[k]):
+                return i
+        if kind == GO_TO:
+            target = values[0]
+            if target != math.floor(target) or not HOME <= target < arena.waypoints.shape[0]:
+                return i
+    return ACCEPTED
+
+
+@inlined_kernel
+def begin_step(state, commands, outcome):
+    """An outcome in which nothing has happened yet, with the commands as they were given."""
+    for i in range(commands.shape[0]):
+        event = outcome[i]
+        event.flew = state.status[i] == FLYING
+        for k in range(3):
+            event.before_m[k] = state.x[i, X + k]
+        for k in range(N_INPUTS):
+            event.u[k] = 0.0
+        event.voltage_V = 0.0
+        event.current_A = 0.0
+        event.energy_Wh = 0.0
+        event.newly_covered = 0
+        event.newly_covered_weight = 0.0
+        event.contact = NONE
+        event.contact_with = -1
+        event.breaches = 0
+        event.limits_exceeded = 0
+        event.landed = False
+        event.obstacle_clearance_m = math.inf
+        event.separation_m = math.inf
+        event.fence_clearance_m = math.inf
+        event.filtered = False
+        event.returning = False
+        given = commands[i]
+        applied = event.applied_command
+        applied.kind = given.kind
+        for k in range(4):
+            applied.values[k] = given.values[k]
+        applied.returning = given.returning
+
+
+@inlined_kernel
+def _fly(arena, state, nonlinear, outcome):
+    """Fly the commands for one step."""
+    dt_h = arena.rules[0].dt_s / 3600.0
+    for i in range(state.status.shape[0]):
+        if state.status[i] != FLYING:
+            continue
+        x = state.x[i]
+        event = outcome[i]
+        u = event.u[:]
+        command = event.applied_command
+        vehicle = arena.vehicles[i]
+        command_wrench(vehicle, x, state.reference[i], command, u)
+        if nonlinear:
+            voltage_V, current_A = plant_step(vehicle, x, u, x)
+        else:
+            voltage_V, current_A = lpv_step(vehicle, x, u, x)
+        event.voltage_V = voltage_V
+        event.current_A = current_A
+        event.energy_Wh = voltage_V * current_A * dt_h
+        if command.kind == WRENCH:
+            reseed_reference(vehicle, x, state.reference[i])
+
+
+@inlined_kernel
+def _lose(state, outcome):
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING and outcome[i].contact != NONE:
+            state.status[i] = LOST
+
+
+@inlined_kernel
+def carry_out(arena, state, nonlinear, outcome):
+    """Fly the commands in `outcome`, of any kind but GO_TO, and judge what happened.
+
+    The second half of `advance`. It makes no arrays at all, so it runs on a GPU too.
+    """
+    _fly(arena, state, nonlinear, outcome)
+    judge_obstacles(arena, state, outcome)
+    judge_separation(arena, state, outcome)
+    judge_fence_and_battery(arena, state, outcome)
+    count_breaches(arena, state, outcome)
+    cover(arena, state, outcome)
+    land(arena, state, outcome)
+    check_limits(arena, state, nonlinear, outcome)
+    _lose(state, outcome)
+    state.step[0] += 1
+
+
+@kernel
+def advance(arena, state, commands, nonlinear, assistants, outcome):
+    """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
+
+    All decide from the state at sample k; then all fly; then contacts are judged on the straight
+    segments between the samples, and breaches, coverage and landing at sample k+1.
+
+    Args:
+        arena: The arena.
+        state: The state; written in place.
+        commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
+        nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
+        assistants: Who helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
+        outcome: (U,) of OUTCOME_DTYPE; written.
+    """
+    begin_step(state, commands, outcome)
+    for k in range(len(assistants)):
+        assist(assistants[k], arena, state, nonlinear, outcome)
+    carry_out(arena, state, nonlinear, outcome)
+
+
+@kernel
+def begin_mission(arena, state, outcome):
+    """Put the world at t = 0: what lies within reach of the starts is covered at once."""
+    cover(arena, state, outcome)
+
+
+MISSION = Layout(ARENA, STATE)
+_views = MISSION.views
+
+
+@kernel
+def step_world(at, commands, nonlinear, assistants, outcome):
+    """`advance` called from Python.
+
+    Args:
+        at: Addresses of arena and state, see `MISSION`.
+        commands: See `advance`, also the next three.
+        nonlinear: Whether.
+        assistants: Who helps to fly.
+        outcome: Written.
+
+    Returns:
+        ACCEPTED, or the index of a UAS whose command is invalid; then nothing has changed.
+    """
+    arena, state = _views(at)
+    invalid = first_invalid(arena, state, commands)
+    if invalid == ACCEPTED:
+        advance(arena, state, commands, nonlinear, assistants, outcome)
+    return invalid

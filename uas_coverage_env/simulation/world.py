@@ -1,0 +1,186 @@
+"""The world as an object: one mission, step by step."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.autopilot.assist import AssistantCode, assistants
+from uas_coverage_env.compiled.kernels import machine_code
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world.arena import build_arena
+from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
+from uas_coverage_env.world.outcome import OUTCOME_DTYPE
+from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState
+
+Dynamics = Literal["lpv", "nonlinear"]
+
+_OUTCOMES_IN_BLOCK = 256
+
+
+def initial_state(scenario: Scenario) -> WorldState:
+    """All UAS at rest at their starts, batteries rested, nothing covered."""
+    state = STATE.zeros({"U": len(scenario.uas), "W": len(scenario.waypoints)})
+    state.x[:, :3] = [uas.start_m for uas in scenario.uas]
+    state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
+    state.status[:] = FLYING
+    state.uncovered[:] = True
+    return state
+
+
+class World:
+    """One mission of a scenario.
+
+    Args:
+        scenario: The scenario.
+        dynamics: The model that is flown.
+        return_mode: Whether UAS are brought home in time.
+        safety_filter: Whether commands are kept clear of harm.
+        measured_m: Up to where distances are measured, see `build_arena`.
+
+    Attributes:
+        scenario: As given; likewise dynamics, return_mode and safety_filter.
+        names: Names of the UAS, in order.
+        arena: The scenario as arrays; not to be changed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        dynamics: Dynamics = "lpv",
+        return_mode: bool = False,
+        safety_filter: bool = False,
+        measured_m: float = math.inf,
+    ) -> None:
+        if dynamics not in get_args(Dynamics):
+            allowed = ", ".join(get_args(Dynamics))
+            raise ValueError(f"dynamics is {dynamics!r}; it is one of {allowed}")
+        self.scenario = scenario
+        self.dynamics = dynamics
+        self.return_mode = bool(return_mode)
+        self.safety_filter = bool(safety_filter)
+        self.names = tuple(uas.name for uas in scenario.uas)
+        self.arena = build_arena(scenario, measured_m=measured_m)
+        self._start = initial_state(scenario)
+        begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
+        self._state = self._start.copy()
+        self._nonlinear = dynamics == "nonlinear"
+        self._prepare()
+
+    def _prepare(self) -> None:
+        self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
+        self._next_outcome = 0
+        self._step: Callable[..., int] | None = None
+        self._assistants: AssistantCode = np.zeros(0, dtype=np.int64)
+        self._at = MISSION.addresses_of(self.arena, self._state)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # neither machine code nor addresses travel: they are made anew wherever the copy goes
+        stays = ("_step", "_assistants", "_outcomes", "_at")
+        return {k: v for k, v in self.__dict__.items() if k not in stays}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepare()
+
+    @property
+    def state(self) -> WorldState:
+        """The state; its arrays are written by `reset` and `step`."""
+        return self._state
+
+    def reset(self) -> None:
+        """Go back to t = 0."""
+        for array, start in zip(self.state, self._start, strict=True):
+            array[:] = start
+
+    def step(self, commands: NDArray[np.void] | Mapping[str, Command]) -> NDArray[np.void]:
+        """Fly all UAS for one step.
+
+        Args:
+            commands: One command for each active UAS, by name, or packed: (U,) of COMMAND_DTYPE.
+
+        Returns:
+            (U,) of OUTCOME_DTYPE, an array of its own.
+
+        Raises:
+            ValueError: A command is missing, surplus or invalid; nothing has changed.
+        """
+        if not isinstance(commands, np.ndarray):
+            active = self.active
+            commands = pack(commands, self.names, active, len(self.scenario.waypoints))
+        elif commands.dtype != COMMAND_DTYPE or commands.shape != (len(self.names),):
+            raise ValueError(
+                f"commands have dtype {commands.dtype} and shape {commands.shape}; "
+                f"give COMMAND_DTYPE and ({len(self.names)},)"
+            )
+        elif not commands.flags.c_contiguous:
+            commands = commands.copy()
+        if self._step is None:
+            # not before: environments have a world, too, and a step of their own
+            self._assistants = assistants(self.return_mode, self.safety_filter)
+        outcome = self._fresh_outcome()
+        arguments = (self._at, commands, self._nonlinear, self._assistants, outcome)
+        if self._step is None:
+            self._step = machine_code(step_world, arguments)
+        invalid = self._step(*arguments)
+        if invalid != ACCEPTED:
+            raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
+        return outcome
+
+    def _fresh_outcome(self) -> NDArray[np.void]:
+        """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""
+        if self._next_outcome == len(self._outcomes):
+            rows = max(1, _OUTCOMES_IN_BLOCK // len(self.names))
+            self._outcomes = np.zeros((rows, len(self.names)), dtype=OUTCOME_DTYPE)
+            self._next_outcome = 0
+        self._next_outcome += 1
+        return self._outcomes[self._next_outcome - 1]
+
+    def _what_is_wrong(self, i: int, command: np.void) -> str:
+        kind = int(command["kind"])
+        name = KIND_NAMES[kind] if 0 <= kind < len(KIND_NAMES) else f"of kind {kind}"
+        return (
+            f"command of {self.names[i]} is {name} {command['values'].tolist()}; give finite "
+            f"values of a velocity, acceleration or wrench, or the index of a waypoint"
+        )
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the UAS that fly."""
+        status = self.state.status.tolist()
+        return tuple(name for name, s in zip(self.names, status, strict=True) if s == FLYING)
+
+    @property
+    def done(self) -> bool:
+        """Whether no UAS flies any more."""
+        return FLYING not in self.state.status
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start [s]."""
+        return int(self.state.step[0]) * self.scenario.dt_s
+
+    def swarm_state(self) -> SwarmState:
+        """What players see now, in arrays of their own."""
+        state = self.state
+        step = int(state.step[0])
+        sample = min(step, len(self.arena.moving_path_m) - 1)
+        return SwarmState(
+            time_s=self.time_s,
+            step=step,
+            names=self.names,
+            x=state.x.copy(),
+            reference_mps=state.reference.copy(),
+            status=state.status.copy(),
+            departed=state.departed.copy(),
+            returning=state.returning.copy(),
+            uncovered=state.uncovered.copy(),
+            home_m=self.arena.uas["home_m"].copy(),
+            moving_position_m=self.arena.moving_path_m[sample].copy(),
+            moving_velocity_mps=self.arena.moving_velocity_mps[sample].copy(),
+        )
