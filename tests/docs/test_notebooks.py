@@ -7,6 +7,8 @@ import pytest
 from markdown_blocks import ROOT
 from nbclient import NotebookClient
 
+from uas_coverage_env.compiled.progress import NOTICE
+
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 SECONDS_FOR_A_CELL = 600  # the longest takes half a minute; a busy machine several times that
 MACHINE_PATH = re.compile(r"/(?:home|Users|private|var)/|\b[A-Z]:\\")
@@ -73,6 +75,7 @@ def test_a_notebook_runs_from_top_to_bottom_without_a_warning(path, tmp_path, mo
         resources={"metadata": {"path": str(folder)}},
     ).execute()
     outputs = [output for cell in code_cells(notebook) for output in cell.outputs]
-    warned = [output.text for output in outputs if output.get("name") == "stderr"]
-    assert warned == []
+    warned = "".join(output.text for output in outputs if output.get("name") == "stderr")
+    lines = [line for line in warned.splitlines() if NOTICE not in line]  # a fresh machine compiles
+    assert lines == []
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= 3

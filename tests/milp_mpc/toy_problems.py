@@ -20,6 +20,7 @@ from uas_coverage_env.vehicle import (
     linear_model,
     load_vehicle,
     lpv_step,
+    reseed_reference,
     velocity_climb_wrench,
 )
 
@@ -121,7 +122,8 @@ def feasible(milp, fixed):
 def flown(vehicle, x0, commands, dt_s=1.0):
     """(T+1, 14) states and (T, 5) inputs under commands (T, 3) of the inner loop [m/s]."""
     record = compile_vehicle(vehicle, dt_s)[()]
-    reference = x0[VX : VX + 2].copy()
+    reference = np.zeros(2)
+    reseed_reference(record, x0, reference)
     states, inputs = [x0.copy()], np.zeros((len(commands), N_INPUTS))
     for (north, east, down), u in zip(commands, inputs, strict=True):
         x = states[-1].copy()
