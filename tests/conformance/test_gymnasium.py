@@ -12,19 +12,22 @@ from uas_coverage_env.env import ACTION_NAMES, OBSERVATION_SIZE, CoverageSwarmEn
 ID = "UASCoverage-v0"
 
 
+SCENARIO_AND_ACTION = [*(("village", action) for action in ACTION_NAMES), ("generated", "waypoint")]
+
+
 @pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
-@pytest.mark.parametrize("action", ACTION_NAMES)
-def test_gymnasium_finds_nothing_wrong(action, dynamics, monkeypatch):
+@pytest.mark.parametrize(("scenario", "action"), SCENARIO_AND_ACTION)
+def test_gymnasium_finds_nothing_wrong(scenario, action, dynamics, monkeypatch):
     pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = gymnasium.make(ID, scenario="village", action=action, dynamics=dynamics)
+    env = gymnasium.make(ID, scenario=scenario, action=action, dynamics=dynamics)
     check_env(env.unwrapped)
 
 
-@pytest.mark.parametrize("action", ACTION_NAMES)
-def test_stable_baselines_finds_nothing_wrong(action):
+@pytest.mark.parametrize(("scenario", "action"), SCENARIO_AND_ACTION)
+def test_stable_baselines_finds_nothing_wrong(scenario, action):
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    checker.check_env(CoverageSwarmEnv("village", action=action))
+    checker.check_env(CoverageSwarmEnv(scenario, action=action))
 
 
 @pytest.mark.parametrize("action", ACTION_NAMES)

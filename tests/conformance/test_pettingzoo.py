@@ -30,17 +30,25 @@ SETTINGS = [
     {"action": "waypoint", "dynamics": "nonlinear", "return_mode": True, "safety_filter": True},
     {"scenario": generate_scenario(0, n_uas=5, n_waypoints=30, n_obstacles=6)},
 ]
+DRAWN = [{"scenario": "generated"}, {"scenario": "generated", "action": "waypoint"}]
 
 
 def named(settings):
     return "-".join(str(getattr(value, "name", value)) for value in settings.values())
 
 
-all_settings = pytest.mark.parametrize("settings", SETTINGS, ids=named)
+all_settings = pytest.mark.parametrize("settings", SETTINGS + DRAWN, ids=named)
 
 
-@all_settings
+@pytest.mark.parametrize("settings", SETTINGS, ids=named)
 def test_parallel_api(settings, capsys):
+    parallel_api_test(uas_coverage_v0.parallel_env(**settings), num_cycles=150)
+
+
+# it expects an end of all possible agents, of those too that a mission does not have
+@pytest.mark.filterwarnings("ignore:No agents present but not all possible_agents:UserWarning")
+@pytest.mark.parametrize("settings", DRAWN, ids=named)
+def test_parallel_api_of_drawn_missions(settings, capsys):
     parallel_api_test(uas_coverage_v0.parallel_env(**settings), num_cycles=150)
 
 

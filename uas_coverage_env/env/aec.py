@@ -1,6 +1,5 @@
 """The multi-agent environment in turns: one agent acts after the other (PettingZoo AEC)."""
 
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -10,7 +9,7 @@ from pettingzoo.utils import BaseWrapper
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from uas_coverage_env.env.parallel import CoverageParallelEnv
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import ScenarioLike
 
 
 class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
@@ -33,7 +32,7 @@ class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
 
 
 def raw_env(
-    scenario: str | Path | Scenario = "village", **settings: Any
+    scenario: ScenarioLike = "village", **settings: Any
 ) -> AECEnv[str, NDArray[np.float32], Any]:
     """The environment in turns, without checks of its own.
 
@@ -45,7 +44,7 @@ def raw_env(
 
 
 def env(
-    scenario: str | Path | Scenario = "village", **settings: Any
+    scenario: ScenarioLike = "village", **settings: Any
 ) -> AECEnv[str, NDArray[np.float32], Any]:
     """The environment in turns; an invalid action is refused at once.
 

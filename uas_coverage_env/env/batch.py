@@ -26,14 +26,14 @@ from uas_coverage_env.env.batch_kernel import (
     step_batch,
     step_batch_in_threads,
 )
+from uas_coverage_env.env.drawn import DrawnPool, pool_of
 from uas_coverage_env.env.kernel import ACCEPTED, Rules
 from uas_coverage_env.env.memory import LEARNERS, Learners
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.pay import paying_of
-from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SwarmState, WorldState
 from uas_coverage_env.world.state import STATE
 
@@ -46,14 +46,18 @@ _MOST_LANES = 2**20
 class CoverageBatch:
     """Missions in L lanes; what flies in one is, bit for bit, what `CoverageParallelEnv` flies.
 
-    Every lane draws the scenario of each of its missions from the pool, by its own seed and the
-    number of the mission alone: neither the number of lanes nor that of threads changes a result.
+    Every lane draws the scenario of each of its missions by its own seed and the number of the
+    mission alone: neither the number of lanes nor that of threads changes a result. From a sequence
+    of scenarios kernels draw; a family or another generator is asked in Python when a mission
+    begins, for that lane alone.
+
     Where scenarios differ in their number of UAS, the arrays have room for the largest: rows of UAS
     that a scenario does not have are zero, never fly, and what is asked of them has no effect.
 
     Args:
         num_envs: L.
-        scenario: See `ScenarioPool`.
+        scenario: A scenario, its name or its file; a sequence of these, see `ScenarioPool`; or what
+            draws them, see `DrawnPool`.
         autoreset: A name of `AUTORESET`.
         threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
             for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
@@ -74,7 +78,7 @@ class CoverageBatch:
     def __init__(
         self,
         num_envs: int,
-        scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
+        scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
         *,
         autoreset: str = "next_step",
         threads: int = 1,
@@ -86,14 +90,15 @@ class CoverageBatch:
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
         self.settings = MissionSettings.of(settings)
-        self.pool = ScenarioPool(scenario, self.settings)
         self.num_envs = int(num_envs)
-        self.n_uas = int(self.pool.n_uas.max())
+        self.pool = pool_of(scenario, self.settings, self.num_envs)
+        self.draws = isinstance(self.pool, DrawnPool)
+        self.n_uas = self.pool.sizes["U"]
         self.actions = self.pool.actions
         self.chooses = self.settings.chooses
         self.filters = self.settings.safety_filter
         self.autoreset = AUTORESET[autoreset]
-        self.missions = new_missions(self.pool, self.num_envs, int(threads))
+        self.missions = new_missions(self.pool.sizes, self.num_envs, int(threads))
         shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
@@ -168,14 +173,16 @@ class CoverageBatch:
         seed: int | Sequence[int | None] | None = None,
         *,
         mask: NDArray[np.bool_] | None = None,
-        scenarios: Sequence[int] | NDArray[np.integer] | None = None,
+        scenarios: Any = None,
     ) -> NDArray[np.float32]:
         """Begin missions.
 
         Args:
             seed: See `seed`; None: the lanes go on drawing, at first from seeds of no meaning.
             mask: (L,) in which lanes; None: in all.
-            scenarios: (L,) indices in the pool, what to fly instead of drawing; None: draw.
+            scenarios: What to fly instead of drawing; None: draw. Of a sequence of scenarios (L,)
+                indices; where a family or another generator draws, one scenario (its name, its
+                file) for all of these lanes, or a sequence of L of them, None in lanes that draw.
 
         Returns:
             (L, U, V) see `observation`.
@@ -192,10 +199,13 @@ class CoverageBatch:
             )
         if not self._begun and not mask.all():
             raise ResetNeeded("reset of some lanes before any: reset all lanes first")
-        orders = self._chosen(scenarios)
-        orders[~mask] = REST
+        if not isinstance(self.pool, DrawnPool):
+            orders = self._chosen(scenarios)
+            orders[~mask] = REST
         if seed is not None:
             self.seed(seed)
+        if isinstance(self.pool, DrawnPool):
+            orders = self._begun_by(self.pool, mask, scenarios)
         self._run(orders)
         self._begun = True
         return self.observation
@@ -224,17 +234,32 @@ class CoverageBatch:
                     f"have ended before the next step, or choose another autoreset mode"
                 )
         self._ask(actions)
-        refused = self._run(lanes.orders)
+        orders, drawing = lanes.orders, None
+        if self.draws:
+            # new missions begin after the step of the others: these may still be refused
+            drawing = orders == DRAW
+            orders = np.where(drawing, REST, orders)
+        refused = self._run(orders)
         if refused != ACCEPTED:
             lane, i = divmod(refused, self.n_uas)
             raise ValueError(
                 f"action of UAS {i} in lane {lane} is {self.learners.asked[lane, i].tolist()}; "
                 f"give finite numbers"
             )
+        if isinstance(self.pool, DrawnPool):
+            self._draw_next(self.pool, drawing)
         return self.observation
 
     def state_dict(self) -> dict[str, NDArray[Any]]:
-        """All that changes from step to step, in arrays of their own, by name."""
+        """All that changes from step to step, in arrays of their own, by name.
+
+        Of missions that are drawn it has the states of the generators that drew them.
+
+        Raises:
+            ValueError: A mission was given to `reset`, not drawn.
+        """
+        if isinstance(self.pool, DrawnPool):
+            self.pool.check_drawn()
         return {name: array.copy() for name, array in self._changing().items()}
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -246,15 +271,23 @@ class CoverageBatch:
         """
         own = self._changing()
         check_like(state, own)
-        last = len(self.pool) - 1
-        longest = max(scenario.max_steps for scenario in self.pool.scenarios)
-        n_waypoints = self.pool.n_waypoints[state["scenario"].clip(0, last)]
+        scenarios, drawn = list(self.pool.scenarios), []
+        if isinstance(self.pool, DrawnPool):
+            drawn = self.pool.redrawn(state["drawn_from"], state["mission"] >= 0)
+            for mission in drawn:
+                scenarios[mission.lane] = mission.scenario
+        longest = max(self.settings.limited(scenario).max_steps for scenario in scenarios)
+        of_scenario = np.array([len(scenario.waypoints) for scenario in scenarios])
+        n_waypoints = of_scenario[state["scenario"].clip(0, len(scenarios) - 1)]
         limits = {
-            **LANES.limits({"S": last + 1}, lanes=False),
+            **LANES.limits({"S": len(scenarios)}, lanes=False),
             **STATE.limits({"samples": longest + 1}, lanes=True),
             **LEARNERS.limits({"W": n_waypoints}, lanes=True),
         }
         check_values(state, limits)
+        if isinstance(self.pool, DrawnPool):
+            check_values(state, {"scenario": self.pool.slots_of(state["mission"] >= 0)})
+            self.pool.install(drawn)
         for name, array in own.items():
             array[...] = state[name]
         # the other array of observations is not what it was
@@ -264,7 +297,10 @@ class CoverageBatch:
     def _changing(self) -> dict[str, NDArray[Any]]:
         parts = (self.worlds, self.learners, self.lanes)
         arrays = {k: v for part in parts for k, v in part._asdict().items()}
-        return {**arrays, "observation": self.observation}
+        arrays["observation"] = self.observation
+        if isinstance(self.pool, DrawnPool):
+            arrays["drawn_from"] = self.pool.drawn_from
+        return arrays
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a player of this lane sees now, in arrays of their own."""
@@ -290,9 +326,44 @@ class CoverageBatch:
         """The scenario that a lane flies now."""
         return self.pool.scenarios[self.lanes.scenario[lane]]
 
-    def _run(self, orders: NDArray[np.int64]) -> int:
+    def _begun_by(
+        self, pool: DrawnPool, begins: NDArray[np.bool_], scenarios: Any = None
+    ) -> NDArray[np.int64]:
+        """Draw missions for some lanes; the orders that begin them."""
+        lanes = np.flatnonzero(begins)
+        pool.begin(lanes, self.lanes.seed, self.lanes.mission < 0, scenarios)
+        orders = np.full(self.num_envs, REST)
+        orders[lanes] = lanes
+        return orders
+
+    def _draw_next(self, pool: DrawnPool, begins: NDArray[np.bool_]) -> None:
+        """Begin drawn missions, as the kernel begins those of a `ScenarioPool`."""
+        lanes, final = self.lanes, self.missions.final
+        if self.autoreset == SAME_STEP:
+            begins = lanes.terminated | lanes.truncated
+        if not begins.any():
+            return
+        orders = self._begun_by(pool, begins)
+        if self.autoreset != SAME_STEP:
+            self._run(orders, in_place=True)
+            return
+        for kept, array in (
+            (final.observation, self.observation),
+            (final.report, self.learners.report),
+            (final.candidates, self.learners.candidates),
+            (final.swarm, lanes.swarm),
+        ):
+            kept[begins] = array[begins]
+        ends = [array.copy() for array in (lanes.terminated, lanes.truncated, lanes.rewards)]
+        self._run(orders, in_place=True)
+        # this step is the last of a mission and shows the first sample of the next
+        lanes.terminated[:], lanes.truncated[:], lanes.rewards[:] = ends
+
+    def _run(self, orders: NDArray[np.int64], *, in_place: bool = False) -> int:
         rules = self._rules = self._rules or self._compiled_rules()
         before, free = self._observations
+        if in_place:
+            free = before
         width = Constant(self.settings.observation_size)
         given = (self.pool.arrays, self.missions, orders, rules, before, free, width)
         if self._kernel is None:
@@ -305,7 +376,7 @@ class CoverageBatch:
             numba.set_num_threads(self._threads)
             refused = self._kernel(*given)
             numba.set_num_threads(threads)
-        if refused == ACCEPTED:
+        if refused == ACCEPTED and not in_place:
             self._observations = free, before
         return refused
 
@@ -316,7 +387,9 @@ class CoverageBatch:
         observing = observing_of(settings.observation)
         nonlinear = settings.dynamics == "nonlinear"
         rules = Rules(self.actions.kind, nonlinear, called, paying, observing)
-        return BatchRules(rules, self.autoreset)
+        # `_draw_next` comes between the end of a drawn mission and the next
+        autoreset = DISABLED if self.draws and self.autoreset == SAME_STEP else self.autoreset
+        return BatchRules(rules, autoreset)
 
     def _chosen(self, scenarios: Any) -> NDArray[np.int64]:
         if scenarios is None:

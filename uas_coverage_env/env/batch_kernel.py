@@ -1,6 +1,7 @@
 """One step of many missions, compiled: every lane is flown by `step_learners`, as a single one."""
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -39,9 +40,10 @@ from uas_coverage_env.env.pool import (
     tables_at,
 )
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
-from uas_coverage_env.simulation.pool import arena_of, lanes_of, start_of, state_of
+from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.world import ABSENT, FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.state import STATE
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
 """When a mission that has ended begins anew: in the next step, in the same, or never by itself."""
@@ -114,11 +116,17 @@ class Missions(NamedTuple):
     """(L, U) it does not fly, and what it saw last lies in both arrays of observations."""
 
 
-def new_missions(pool: ScenarioPool, num_envs: int, threads: int) -> Missions:
-    """Missions of which none has begun, seeded with numbers of no meaning."""
-    sizes = {**pool.sizes, "L": num_envs, "Q": SWARM_FIRST_TERM + pool.sizes["R"]}
+def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missions:
+    """Missions of which none has begun, seeded with numbers of no meaning.
+
+    Args:
+        sizes: The largest of every named size, as `ScenarioPool.sizes`.
+        num_envs: L.
+        threads: How many share the lanes.
+    """
+    sizes = {**sizes, "L": num_envs, "Q": SWARM_FIRST_TERM + sizes["R"]}
     missions = Missions(
-        lanes_of(num_envs, pool.arrays.starts),
+        STATE.zeros(sizes, lanes=num_envs),
         LEARNERS.zeros(sizes, lanes=num_envs),
         LANES.zeros(sizes),
         FINAL.zeros(sizes),
@@ -126,6 +134,7 @@ def new_missions(pool: ScenarioPool, num_envs: int, threads: int) -> Missions:
         np.zeros((num_envs, sizes["U"]), dtype=np.bool_),
     )
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
+    missions.worlds.status[:] = FLYING
     missions.lanes.seed[:] = seeds
     missions.lanes.mission[:] = -1
     missions.lanes.orders[:] = FLY
@@ -370,7 +379,7 @@ def _example() -> _Given:
     pool = ScenarioPool("open_field")
     paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
     rules = Rules(0, False, np.zeros(0, np.int64), paying, observing_of(OBSERVATION))
-    return _Given(pool.arrays, new_missions(pool, 1, 1), rules)
+    return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
 
 
 _HANDOVER = Handover(_example)

@@ -1,16 +1,14 @@
-"""One mission as learners fly it: what the multi-agent and the single-agent environment share."""
+"""One scenario as learners fly it: what the multi-agent and the single-agent environment share."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.env.actions import HOME_CHOICE, actions_of
-from uas_coverage_env.env.global_state import global_space, global_state
+from uas_coverage_env.env.global_state import global_state
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
 from uas_coverage_env.env.named import namer_of
@@ -19,7 +17,7 @@ from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
-from uas_coverage_env.scenario import Scenario, load_scenario
+from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES, SwarmState
 from uas_coverage_env.world.arena import ARENA
@@ -31,8 +29,9 @@ class Episode:
     """One mission after another, in arrays.
 
     Args:
-        scenario: Name of a shipped scenario, path of a scenario file, or a scenario.
+        scenario: What is flown.
         settings: How missions are flown and paid.
+        room: The largest mission that `global_state` has room for; None: this one.
 
     Attributes:
         settings: As given.
@@ -45,16 +44,14 @@ class Episode:
         tables: What does not change during a mission.
         asked: (U, size) the actions of the coming step, to be written before it.
         observation: (U, V) the latest; a new array in every step.
-
-    Raises:
-        ValueError: The scenario is none of what is allowed; says what is.
     """
 
-    def __init__(self, scenario: str | Path | Scenario, settings: MissionSettings) -> None:
-        if not isinstance(scenario, Scenario):
-            scenario = load_scenario(scenario)
+    def __init__(
+        self, scenario: Scenario, settings: MissionSettings, room: Room | None = None
+    ) -> None:
         scenario = settings.limited(scenario)
         self.settings = settings
+        self._room = room or Room.of(scenario)
         self.actions = actions_of(settings.action, scenario)
         self._world = World(
             scenario,
@@ -174,6 +171,7 @@ class Episode:
             self._world.arena.moving_path_m[sample],
             self._world.arena.moving_velocity_mps[sample],
             self.tables.scales[0],
+            self._room,
         )
 
     def _own(self) -> NDArray[np.float32]:
@@ -188,13 +186,6 @@ class Episode:
         arrays = (world.arena, world.state, self.tables, self._learners)
         observe(*arrays, observing_of([OWN]), observes, own)
         return own
-
-    def state_space(self) -> spaces.Box:
-        """A new space of `global_state`."""
-        scenario = self.scenario
-        return global_space(
-            len(scenario.uas), len(scenario.moving_obstacles), len(scenario.waypoints)
-        )
 
     @property
     def positions_m(self) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 For each UAS its `own` group of the observation, then whether it has landed and whether it is lost;
 for each moving obstacle its place in the box around the fence (north, east, up; ±1 are the sides)
 and its velocity (north, east, down / 20 m/s); for each waypoint whether it is still to be covered.
+There is room for the largest mission of the environment: what a mission lacks is zero.
 """
 
 import numpy as np
@@ -11,14 +12,16 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.observation.own import OWN
+from uas_coverage_env.scenario import Room
 from uas_coverage_env.world import LANDED, LOST
 
 _MOVING_BOUND = 2.0
 _MOVING_MPS = 20.0
 
 
-def global_space(n_uas: int, n_moving: int, n_waypoints: int) -> spaces.Box:
-    """The space of the vector; its size depends on the scenario."""
+def global_space(room: Room) -> spaces.Box:
+    """The space of the vector; its size depends on the largest mission."""
+    n_uas, n_waypoints, n_moving = room
     own_low, own_high = observation_bounds([OWN])
     low = np.concatenate(
         [
@@ -44,6 +47,7 @@ def global_state(
     moving_position_m: NDArray[np.float64],
     moving_velocity_mps: NDArray[np.float64],
     scale: np.void,
+    room: Room,
 ) -> NDArray[np.float32]:
     """The vector.
 
@@ -54,9 +58,15 @@ def global_state(
         moving_position_m: (M, 3) [m] centres.
         moving_velocity_mps: (M, 3) [m/s].
         scale: A record of SCALES_DTYPE, for the box around the fence.
+        room: The largest mission.
     """
     uas = np.column_stack([own, status == LANDED, status == LOST])
     place = (moving_position_m - scale["centre_m"]) * scale["per_half_side"] * [1, 1, -1]
     moving = np.column_stack([place, moving_velocity_mps / _MOVING_MPS])
     moving = np.clip(moving, -_MOVING_BOUND, _MOVING_BOUND)
-    return np.concatenate([uas.ravel(), moving.ravel(), uncovered], dtype=np.float32)
+    first_moving = room.n_uas * uas.shape[1]
+    first_waypoint = first_moving + room.n_moving * 6
+    vector = np.zeros(first_waypoint + room.n_waypoints, np.float32)
+    for first, part in ((0, uas), (first_moving, moving), (first_waypoint, uncovered)):
+        vector[first : first + part.size] = part.ravel()
+    return vector

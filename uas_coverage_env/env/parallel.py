@@ -1,9 +1,7 @@
 """The multi-agent environment: one agent per UAS, all act at once (PettingZoo)."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -13,13 +11,14 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
-from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.global_state import global_space
 from uas_coverage_env.env.memory import REWARD, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SwarmState
 
 Observations = dict[str, NDArray[np.float32]]
@@ -53,7 +52,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         another choice keeps the former target or, where there is none, the place.
 
         Finite numbers beyond ±1 are clipped. An action that is NaN, infinite, of a wrong type or
-        shape, missing, or for an agent that does not fly raises a ValueError and changes nothing.
+        shape, missing, or for an agent that never existed raises a ValueError and changes nothing.
+        An action for an agent that has ended, or that the mission does not have, is ignored.
 
     Observation Space:
         A float32 `Box`, the same for all agents and all scenarios. What lies beyond its bounds is
@@ -79,7 +79,9 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     Starting State:
         All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
-        random: the seed seeds `np_random` alone, and equal actions make equal missions.
+        random but the draw of a mission where `scenario` draws: `reset(seed=...)` draws the same
+        one again, `reset()` the next, `reset(options={"scenario": ...})` flies that one. Agents
+        that a mission does not have are not in `agents`. Equal actions make equal missions.
 
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
@@ -87,7 +89,9 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`.
 
     Arguments:
-        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`.
+        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`; or what
+            draws a scenario at each reset: the name of a family (`generated`), a `MissionSource`,
+            or any function `generator(rng) -> Scenario`.
         {settings}
         render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra `human`:
             space pauses, right steps, escape closes it and the missions go on unseen).
@@ -105,15 +109,16 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     def __init__(
         self,
-        scenario: str | Path | Scenario = "village",
+        scenario: ScenarioLike = "village",
         *,
         render_mode: str | None = None,
         **settings: Any,
     ) -> None:
-        self._episode = Episode(scenario, MissionSettings.of(settings))
+        self._missions = MissionSequence(scenario, MissionSettings.of(settings))
+        self._episode = self._missions.episode
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode
-        self.possible_agents = list(self._episode.names)
+        self.possible_agents = list(self._missions.source.names)
         self.agents: list[str] = []
         self._begun = False
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
@@ -125,7 +130,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._action_spaces = {
             agent: self._episode.actions.space() for agent in self.possible_agents
         }
-        self.state_space = self._episode.state_space()
+        self.state_space = global_space(self._missions.source.room)
         self.np_random, self.np_random_seed = seeding.np_random()
 
     @property
@@ -135,15 +140,14 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     @max_cycles.setter
     def max_cycles(self, steps: int) -> None:
-        # all anew: return mode and observations reckon with it from the start
-        self._episode = Episode(self.scenario, replace(self._episode.settings, max_cycles=steps))
+        self._episode = self._missions.cut_after(steps)
         self._begun = False
         self.agents = []
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario flown."""
-        return self._episode.scenario
+        """The scenario flown; where it is drawn, `reset` comes first."""
+        return self._missions.scenario
 
     def observation_space(self, agent: str) -> spaces.Space[NDArray[np.float32]]:
         """The space of an agent's observations; always the same object."""
@@ -159,20 +163,22 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`; the mission itself holds nothing random.
-            options: None are known; they are ignored.
+            seed: Seeds `np_random`, with which the mission is drawn; None: it goes on drawing.
+            options: `scenario`, a scenario, its name or its file: what to fly instead of drawing.
 
         Returns:
-            Observations and infos of all agents.
+            Observations and infos of the agents that the mission has.
+
+        Raises:
+            ValueError: The mission does not fit the spaces, or is none.
         """
         if seed is not None:
             self.np_random, self.np_random_seed = seeding.np_random(seed)
-        episode = self._episode
-        episode.reset()
-        self.agents = list(self.possible_agents)
+        episode = self._episode = self._missions.begin(self.np_random, options)
+        self.agents = list(episode.names)
         self._begun = True
         if self.render_mode is not None:
-            self._screen.begin()
+            self._screen.begin(episode.scenario)
             self._screen.see(episode.positions_m)
             self._show()
         observations = dict(zip(self.agents, episode.observation, strict=True))
@@ -188,13 +194,13 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """Fly every agent for one step.
 
         Args:
-            actions: One action for each agent of `agents`.
+            actions: One action for each agent of `agents`; those of other agents are ignored.
 
         Returns:
             Observations, rewards, terminations, truncations and infos of the agents that acted.
 
         Raises:
-            ValueError: An action is invalid, missing, or for an agent that does not fly; names
+            ValueError: An action is invalid, missing, or for an agent that never existed; names
                 agent and value. Nothing has changed.
             ResetNeeded: `reset` was not called before.
         """
@@ -203,13 +209,13 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         agents, index, episode = self.agents, self._index, self._episode
         known = type(actions) is dict or isinstance(actions, Mapping)
         if not known or len(actions) != len(agents):
-            self._refuse(actions)
+            self._check_agents(actions)
         if not agents:
             return {}, {}, {}, {}, {}
         accept, asked = episode.actions.accept, episode.asked
         for agent in agents:
             if agent not in actions:
-                self._refuse(actions)
+                self._check_agents(actions)
             accept(agent, actions[agent], asked, index[agent])
         report = episode.step()
 
@@ -283,8 +289,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._episode.asked[:] = 0.0
         self.agents = alive
 
-    def _refuse(self, actions: Any) -> NoReturn:
-        """Say which agents were given actions that they should not have, or none."""
+    def _check_agents(self, actions: Any) -> None:
+        """Refuse actions for agents that never existed, and too few actions."""
         if not isinstance(actions, Mapping):
             raise ValueError(
                 f"actions are {actions!r} of type {type(actions).__name__}; "
@@ -296,7 +302,6 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
                 raise ValueError(
                     f"action {action!r} for {agent!r}: there is no such agent: {known}"
                 )
-            if agent not in self.agents:
-                raise ValueError(f"action {action!r} for {agent}, which does not fly any more")
         missing = [agent for agent in self.agents if agent not in actions]
-        raise ValueError(f"{missing[0]} has no action; give one for each agent that flies")
+        if missing:
+            raise ValueError(f"{missing[0]} has no action; give one for each agent that flies")

@@ -71,6 +71,10 @@ class ScenarioPool:
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario],
         settings: MissionSettings | None = None,
     ) -> None:
+        if callable(scenario):
+            raise ValueError(
+                f"scenario is {scenario!r}; give scenarios here, nothing that draws them"
+            )
         given = [scenario] if isinstance(scenario, str | Path | Scenario) else scenario
         settings = settings or MissionSettings()
         self.settings = settings

@@ -60,8 +60,14 @@ class Screen:
         twin._path_m = []
         return twin
 
-    def begin(self) -> None:
-        """Forget the paths: a new mission begins."""
+    def begin(self, scenario: Scenario | None = None) -> None:
+        """Forget the paths: a new mission begins.
+
+        Args:
+            scenario: What it flies; None: the same as before.
+        """
+        if scenario is not None and scenario is not self._scenario:
+            self._scenario, self._picture = scenario, None
         self._path_m.clear()
 
     def see(self, positions_m: NDArray[np.float64]) -> None:

@@ -2,7 +2,6 @@
 
 from functools import reduce
 from operator import add
-from pathlib import Path
 from typing import Any, ClassVar
 
 import gymnasium
@@ -11,14 +10,15 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from uas_coverage_env.env.actions import HOME_CHOICE
 from uas_coverage_env.env.documentation import with_tables
-from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SwarmState
 
 
@@ -32,10 +32,11 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     Action Space:
         The actions of all UAS one after the other: `Box(-1, 1)` of 3 (velocity, acceleration) or 4
         (wrench) numbers for each UAS, or `MultiDiscrete` with one choice of 13 for each (waypoint).
-        What is asked of a UAS that does not fly has no effect.
+        What is asked of a UAS that does not fly, or that the mission does not have, has no effect.
 
     Observation Space:
-        The observations of all UAS one after the other, flying or not; of each:
+        The observations of all UAS one after the other, flying or not; zero for UAS that the
+        mission does not have. Of each:
 
         {observations}
 
@@ -56,7 +57,9 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         Terminated: no UAS flies any more. Truncated: one still flies after `max_cycles` steps.
 
     Arguments:
-        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`.
+        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`; or what
+            draws a scenario at each reset: the name of a family (`generated`), a `MissionSource`,
+            or any function `generator(rng) -> Scenario`.
         {settings}
         render_mode: None, "rgb_array" or "human", see `CoverageParallelEnv`.
 
@@ -71,16 +74,17 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     def __init__(
         self,
-        scenario: str | Path | Scenario = "village",
+        scenario: ScenarioLike = "village",
         *,
         render_mode: str | None = None,
         **settings: Any,
     ) -> None:
-        self._episode = Episode(scenario, MissionSettings.of(settings))
+        self._missions = MissionSequence(scenario, MissionSettings.of(settings))
+        self._episode = self._missions.episode
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode
         self._begun = False
-        n_uas = len(self._episode.names)
+        self._n_uas = n_uas = self._missions.source.room.n_uas
         low, high = (
             np.tile(bounds, n_uas)
             for bounds in observation_bounds(self._episode.settings.observation)
@@ -90,8 +94,8 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario flown."""
-        return self._episode.scenario
+        """The scenario flown; where it is drawn, `reset` comes first."""
+        return self._missions.scenario
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -99,16 +103,19 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`; the mission itself holds nothing random.
-            options: None are known; they are ignored.
+            seed: Seeds `np_random`, with which the mission is drawn; None: it goes on drawing.
+            options: `scenario`, a scenario, its name or its file: what to fly instead of drawing.
+
+        Raises:
+            ValueError: The mission does not fit the spaces, or is none.
         """
         super().reset(seed=seed)
-        self._episode.reset()
+        self._episode = self._missions.begin(self.np_random, options)
         self._begun = True
         if self.render_mode is not None:
-            self._screen.begin()
+            self._screen.begin(self._episode.scenario)
             self._see()
-        return self._episode.observation.ravel(), self._info(self._episode.report)
+        return self._observation(), self._info(self._episode.report)
 
     def step(self, action: Any) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Fly all UAS for one step.
@@ -123,8 +130,8 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         if not self._begun:
             raise ResetNeeded("step() before reset(): call reset() first")
         episode = self._episode
-        rows = episode.actions.joint_rows(action, len(episode.names))
-        for i, (name, row) in enumerate(zip(episode.names, rows, strict=True)):
+        rows = episode.actions.joint_rows(action, self._n_uas)
+        for i, (name, row) in enumerate(zip(episode.names, rows, strict=False)):
             episode.actions.accept(name, row, episode.asked, i)
         report = episode.step()
         info = self._info(report)
@@ -133,7 +140,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         if self.render_mode is not None:
             self._see()
         reward = reduce(add, info["reward_terms"].values())
-        return episode.observation.ravel(), reward, not flies, truncated, info
+        return self._observation(), reward, not flies, truncated, info
 
     @property
     def brief(self) -> MissionBrief:
@@ -152,8 +159,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """
         if not self._episode.chooses:
             raise ValueError('only action="waypoint" has masks; the others are continuous')
-        masks = [self._episode.action_mask(i) for i in range(len(self._episode.names))]
-        return np.concatenate(masks).astype(np.bool_)
+        return self._action_mask().astype(np.bool_)
 
     def render(self) -> Any:
         """The picture of the present state for "rgb_array"; the window for "human"."""
@@ -170,6 +176,20 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         if self.render_mode == "human":
             self.render()
 
+    def _observation(self) -> NDArray[np.float32]:
+        """(U · V,) with rows of zeros for UAS that the mission does not have."""
+        seen = self._episode.observation.ravel()
+        missing = self.observation_space.shape[0] - len(seen)
+        return np.pad(seen, (0, missing)) if missing else seen
+
+    def _action_mask(self) -> NDArray[np.int8]:
+        """(U · choices,) the only choice of UAS that the mission does not have is home."""
+        masks = np.zeros((self._n_uas, HOME_CHOICE + 1), np.int8)
+        masks[:, HOME_CHOICE] = 1
+        for i in range(len(self._episode.names)):
+            masks[i] = self._episode.action_mask(i)
+        return masks.ravel()
+
     def _info(self, report: list[list[float]]) -> dict[str, Any]:
         episode = self._episode
         # not Python's `sum`, which rounds in another way than a kernel since 3.12
@@ -184,7 +204,5 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             },
         }
         if episode.chooses:
-            info["action_mask"] = np.concatenate(
-                [entry["action_mask"] for entry in info["uas"].values()]
-            )
+            info["action_mask"] = self._action_mask()
         return info

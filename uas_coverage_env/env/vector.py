@@ -21,15 +21,17 @@ from uas_coverage_env.env.batch_kernel import (
 from uas_coverage_env.env.memory import CONTACT, FILTERED, LIMITS, RETURNING, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS
+from uas_coverage_env.env.sequence import check_options
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import Scenario, ScenarioLike
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
     AutoresetMode.SAME_STEP: "same_step",
     AutoresetMode.DISABLED: "disabled",
 }
-_OF_EACH_MISSION = ("action_masks", "scenario", "swarm_state")
+_OF_EACH_MISSION = ("action_masks", "brief", "scenario", "swarm_state")
 
 Arrays = tuple[
     NDArray[np.float32],
@@ -50,9 +52,18 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         `scenario` may be a sequence of scenarios, each with any number of UAS, waypoints and
         obstacles. Every mission begins with a draw from it that depends on the seed of its
         sub-environment and its number since then alone; `infos["scenario"]` says which it is.
-        `reset(options={"scenario": indices})` flies these instead. Where fleets differ, the single
-        spaces have room for the largest: the observation of a UAS that a mission does not have is
-        zero, and its part of an action has no effect.
+        `reset(options={"scenario": indices})` flies these instead.
+
+        Where `scenario` is the name of a family, a `MissionSource` or a function
+        `generator(rng) -> Scenario`, every mission is drawn when it begins, after an autoreset
+        too: sub-environment i flies what `CoverageSwarmEnv` draws after `reset(seed=s + i)`, one
+        mission after the other. Drawing happens in Python and takes some 20 ms for a generated
+        scenario: where most of a training would be drawing, draw a sequence beforehand.
+        `reset(options={"scenario": ...})` takes one scenario (its name, its file), or a sequence
+        with one for each sub-environment, None where it draws.
+
+        Where fleets differ, the single spaces have room for the largest: the observation of a UAS
+        that a mission does not have is zero, and its part of an action has no effect.
 
     Autoreset:
         `autoreset_mode` as Gymnasium defines it: `NEXT_STEP` (default), `SAME_STEP` (`final_obs`
@@ -69,7 +80,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
 
     Args:
         num_envs: How many.
-        scenario: A scenario, its name or file, or a sequence of these.
+        scenario: A scenario, its name or file; a sequence of these; or what draws them, see above.
         autoreset_mode: An `AutoresetMode`, or its value.
         threads: How many of numba's threads share the missions, see `CoverageBatch`.
         copy: Whether observations are arrays of their own. False: they are overwritten by the step
@@ -92,7 +103,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
+        scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int = 1,
@@ -150,8 +161,8 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         Args:
             seed: A number s seeds sub-environment i with s + i; or one seed for each, None where
                 it goes on drawing as it did. Only the draw of scenarios is random.
-            options: `reset_mask`, (num_envs,) of bool, which to begin anew; `scenario`, (num_envs,)
-                indices of the scenarios to fly. Others are ignored.
+            options: `reset_mask`, (num_envs,) of bool, which to begin anew; `scenario`, what to fly
+                instead of drawing, see above. Others are ignored.
 
         Raises:
             ValueError: An argument is wrong.
@@ -159,6 +170,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         if isinstance(seed, int):
             super().reset(seed=seed)
         options = options or {}
+        check_options(options, "reset_mask", "scenario")
         mask = options.get("reset_mask")
         if mask is None:
             mask = self._all
@@ -225,7 +237,8 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         """What every sub-environment answers, a tuple.
 
         Args:
-            name: `scenario`, `action_masks`, `swarm_state`, what was set, or what all share.
+            name: `scenario`, `brief`, `action_masks`, `swarm_state`, what was set, or what all
+                share.
             *args: For a function.
             **kwargs: For a function.
 
@@ -237,6 +250,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         if name in _OF_EACH_MISSION:
             answer = {
                 "action_masks": lambda: tuple(self.action_masks()),
+                "brief": lambda: tuple(map(MissionBrief.of, self.call("scenario"))),
                 "scenario": lambda: tuple(map(self._batch.scenario_of, range(self.num_envs))),
                 "swarm_state": lambda: tuple(map(self._batch.swarm_state, range(self.num_envs))),
             }[name]

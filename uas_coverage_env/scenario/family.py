@@ -1,20 +1,30 @@
 """Scenarios of a family: the counts are drawn from the seed too."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.model import Scenario
 
+Range = tuple[int, int]
+"""Least and most."""
+
+N_UAS, N_WAYPOINTS, N_OBSTACLES = (1, 4), (20, 60), (5, 20)
+"""The ranges of the benchmarks and of the leaderboard's sets."""
+
+# above the seeds of every set that players are compared on: nothing is trained on those
+_SEEDS = (2**31, 2**32)
+
 
 def draw_scenario(
     seed: int,
-    n_uas: tuple[int, int] = (1, 4),
-    n_waypoints: tuple[int, int] = (20, 60),
-    n_obstacles: tuple[int, int] = (5, 20),
+    n_uas: Range = N_UAS,
+    n_waypoints: Range = N_WAYPOINTS,
+    n_obstacles: Range = N_OBSTACLES,
 ) -> Scenario:
     """The generated scenario of a seed, with counts that the seed draws.
-
-    The default ranges are those of the benchmarks and of the leaderboard's sets.
 
     Args:
         seed: From 0 on.
@@ -30,3 +40,41 @@ def draw_scenario(
         int(lots.integers(least, most + 1)) for least, most in (n_uas, n_waypoints, n_obstacles)
     )
     return generate_scenario(seed, n_uas=uas, n_waypoints=waypoints, n_obstacles=obstacles)
+
+
+@dataclass(frozen=True)
+class GeneratedScenarios:
+    """A family of generated scenarios: an environment's `scenario=` that draws one at each reset.
+
+    Called with a generator of random numbers it draws a seed, and `draw_scenario` does the rest.
+    The seeds are above those of the leaderboard's sets, which nothing should be trained on.
+
+    Attributes:
+        n_uas: Least and most.
+        n_waypoints: Least and most.
+        n_obstacles: Least and most.
+
+    Raises:
+        ValueError: A range is not two whole numbers, the least first.
+    """
+
+    n_uas: Range = N_UAS
+    n_waypoints: Range = N_WAYPOINTS
+    n_obstacles: Range = N_OBSTACLES
+
+    def __post_init__(self) -> None:
+        for name, given in vars(self).items():
+            pair = isinstance(given, tuple | list) and len(given) == 2
+            if not pair or not all(type(count) is int for count in given) or given[0] > given[1]:
+                raise ValueError(f"{name} is {given!r}; give least and most, as in (2, 4)")
+            object.__setattr__(self, name, tuple(given))
+
+    def __call__(self, rng: np.random.Generator) -> Scenario:
+        """Draw a scenario."""
+        return draw_scenario(
+            int(rng.integers(*_SEEDS)), self.n_uas, self.n_waypoints, self.n_obstacles
+        )
+
+
+FAMILIES: Mapping[str, GeneratedScenarios] = {"generated": GeneratedScenarios()}
+"""The families that are known by name."""

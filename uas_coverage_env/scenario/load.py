@@ -26,7 +26,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     """
     if isinstance(name_or_path, str) and name_or_path in scenario_names():
         path = _SHIPPED / f"{name_or_path}.toml"
-    elif _is_path(name_or_path):
+    elif is_path(name_or_path):
         path = Path(name_or_path)
     else:
         raise InputError(
@@ -36,7 +36,8 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     return read_toml(path, Scenario, context={"folder": path.parent})
 
 
-def _is_path(name_or_path: str | Path) -> bool:
+def is_path(name_or_path: str | Path) -> bool:
+    """Whether a scenario is named by its file."""
     if isinstance(name_or_path, Path):
         return True
     path = Path(name_or_path) if isinstance(name_or_path, str) else Path()

@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 from uas_coverage_env.env import CoverageBatch, observation_bounds
 from uas_coverage_env.env.memory import STATUS
 from uas_coverage_env.env.put_aside import check_like, check_values
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING
 
 
@@ -48,7 +48,8 @@ class CoverageVecEnv(VecEnv):
 
     Args:
         num_missions: How many.
-        scenario: A scenario, its name or file, or a sequence of these to draw from.
+        scenario: A scenario, its name or file, a sequence of these to draw from, or what draws
+            them, see `CoverageVectorEnv`.
         action: A name of `uas_coverage_env.env.ACTION_NAMES`.
         **settings: See `uas_coverage_env.env.CoverageBatch`: dynamics, return_mode, safety_filter,
             reward_weights, max_cycles.
@@ -65,7 +66,7 @@ class CoverageVecEnv(VecEnv):
     def __init__(
         self,
         num_missions: int,
-        scenario: str | Path | Scenario | Sequence[str | Path | Scenario] = "village",
+        scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
         *,
         action: str = "velocity",
         **settings: Any,

@@ -1,0 +1,197 @@
+"""Missions of a batch that are drawn one by one: every lane has a slot for its own."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium.utils import seeding
+from numpy.typing import NDArray
+
+from uas_coverage_env.compiled.slots import Slots
+from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES
+from uas_coverage_env.env.pool import MissionPool, ScenarioPool
+from uas_coverage_env.env.put_aside import check_values
+from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.state import STATE
+
+_MEMORIES = (ARENA, STATE, TABLES, LEARNERS, LOOK)
+_WORDS = 6
+_WORD = 2**64 - 1
+
+
+class DrawnPool:
+    """What the lanes of a batch fly where `scenario=` draws: slot i holds the mission of lane i.
+
+    Lane i draws with a generator of its own, seeded as a single environment's `reset(seed=...)`
+    seeds it, so both fly the same missions.
+
+    Args:
+        source: Draws them.
+        settings: How missions are flown and paid.
+        num_envs: Number of lanes.
+
+    Attributes:
+        settings: As given.
+        scenarios: (L,) what the lanes fly; before their first missions an example.
+        actions: The kind of action.
+        sizes: The largest that the arrays of a lane may need.
+        drawn_from: (L, 6) states of the generators from which the missions now flown were drawn;
+            zero where none was drawn.
+    """
+
+    def __init__(self, source: MissionSource, settings: MissionSettings, num_envs: int) -> None:
+        self.settings = settings
+        self._source = source
+        example = ScenarioPool(source.example, settings)
+        self.scenarios = [example.scenarios[0]] * num_envs
+        self.actions = example.actions
+        self.sizes = {**example.sizes, "U": source.room.n_uas, "W": source.room.n_waypoints}
+        self._slots = [Slots(memory, num_envs) for memory in _MEMORIES]
+        self._rngs: list[np.random.Generator | None] = [None] * num_envs
+        self.drawn_from = np.zeros((num_envs, _WORDS), dtype=np.uint64)
+
+    def __len__(self) -> int:
+        return len(self.scenarios)
+
+    @property
+    def arrays(self) -> MissionPool:
+        """For kernels; to be taken anew after `begin`."""
+        return MissionPool(*(slots.pool for slots in self._slots))
+
+    def begin(
+        self,
+        lanes: NDArray[np.integer],
+        seeds: NDArray[np.uint64],
+        seeded: NDArray[np.bool_],
+        given: Any = None,
+    ) -> None:
+        """Put the next missions of some lanes into their slots.
+
+        Args:
+            lanes: Which.
+            seeds: (L,) of all lanes.
+            seeded: (L,) whose generator begins anew from its seed.
+            given: What to fly instead of drawing, see `CoverageBatch.reset`; None: draw.
+
+        Raises:
+            ValueError: A mission does not fit, or the generator returned none. No slot has changed.
+        """
+        chosen = self._chosen(given)
+        missions: list[_Mission] = []
+        for lane in lanes.tolist():
+            rng = self._rngs[lane]
+            if seeded[lane] or rng is None:
+                rng = self._rngs[lane] = seeding.np_random(int(seeds[lane]))[0]
+            scenario = chosen[lane]
+            before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
+            missions.append(_Mission(lane, scenario or self._source.draw(rng), before, rng))
+        self.install(missions)
+
+    def check_drawn(self) -> None:
+        """Refuse to put missions aside that cannot be drawn again.
+
+        Raises:
+            ValueError: A mission was not drawn.
+        """
+        for lane, rng in enumerate(self._rngs):
+            if rng is not None and not self.drawn_from[lane].any():
+                raise ValueError(
+                    f"the mission of lane {lane} was given to reset(): only missions that were "
+                    f"drawn can be put aside"
+                )
+
+    def redrawn(self, drawn_from: NDArray[np.uint64], begun: NDArray[np.bool_]) -> list["_Mission"]:
+        """The missions of `drawn_from` once more, for `install`.
+
+        Raises:
+            ValueError: These are no states of generators.
+        """
+        last = np.array([_WORD, _WORD, _WORD, _WORD, 1, 2**32 - 1], dtype=np.uint64)
+        check_values({"drawn_from": drawn_from}, {"drawn_from": (0, last)})
+        missions: list[_Mission] = []
+        for lane in np.flatnonzero(begun).tolist():
+            before = drawn_from[lane]
+            if not before.any():
+                raise ValueError(f"drawn_from[{lane}] is zero: of a mission that was not drawn")
+            rng = _generator_of(before)
+            missions.append(_Mission(lane, self._source.draw(rng), before.copy(), rng))
+        return missions
+
+    def slots_of(self, begun: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(L,) lowest and highest index of what a lane may fly: its own slot."""
+        slots = np.where(begun, np.arange(len(self)), 0)
+        return slots, slots
+
+    def install(self, missions: Sequence["_Mission"]) -> None:
+        """Put missions into the slots of their lanes."""
+        for lane, scenario, before, rng in missions:
+            pool = ScenarioPool(scenario, self.settings)
+            for memory, slots, arrays in zip(_MEMORIES, self._slots, pool.arrays, strict=True):
+                slots.put(lane, memory.mission(arrays, 0))
+            self.scenarios[lane] = pool.scenarios[0]
+            self.drawn_from[lane] = before
+            self._rngs[lane] = rng
+
+    def _chosen(self, given: Any) -> list[Scenario | None]:
+        n = len(self)
+        if given is None or isinstance(given, str | Path | Scenario):
+            return [None if given is None else self._source.fitted(given)] * n
+        if not isinstance(given, Sequence) or len(given) != n:
+            raise ValueError(
+                f"scenario is {given!r}; give a scenario, its name or its file, or a sequence of "
+                f"{n} of these, None where one is drawn"
+            )
+        return [None if each is None else self._source.fitted(each) for each in given]
+
+
+def pool_of(
+    scenario: ScenarioLike | Sequence[str | Path | Scenario],
+    settings: MissionSettings,
+    num_envs: int,
+) -> ScenarioPool | DrawnPool:
+    """What a batch flies: the pool of scenarios that do not change, or of those that are drawn.
+
+    Raises:
+        ValueError: `scenario` is none of what is allowed.
+    """
+    if isinstance(scenario, Sequence) and not isinstance(scenario, str):
+        return ScenarioPool(scenario, settings)
+    source = MissionSource.of(scenario)
+    if source.fixed:
+        return ScenarioPool(source.example, settings)
+    return DrawnPool(source, settings, num_envs)
+
+
+class _Mission(NamedTuple):
+    """What a lane flies."""
+
+    lane: int
+    scenario: Scenario
+    before: NDArray[np.uint64]
+    """(6,) the state of the generator before it drew the mission; 0: it was given."""
+    rng: np.random.Generator
+    """Draws the next one."""
+
+
+def _words_of(rng: np.random.Generator) -> NDArray[np.uint64]:
+    """The state of a generator as numbers of 64 bits."""
+    state: Any = rng.bit_generator.state
+    inner = [state["state"][name] for name in ("state", "inc")]
+    words = [part for number in inner for part in (number & _WORD, number >> 64)]
+    return np.array([*words, state["has_uint32"], state["uinteger"]], dtype=np.uint64)
+
+
+def _generator_of(words: NDArray[np.uint64]) -> np.random.Generator:
+    """A generator in this state."""
+    low, high, inc_low, inc_high, has_uint32, uinteger = words.tolist()
+    bits = np.random.PCG64(0)
+    bits.state = {
+        "bit_generator": "PCG64",
+        "state": {"state": low | high << 64, "inc": inc_low | inc_high << 64},
+        "has_uint32": has_uint32,
+        "uinteger": uinteger,
+    }
+    return np.random.Generator(bits)

@@ -1,0 +1,90 @@
+"""The missions of one environment, one after another."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from gymnasium.error import ResetNeeded
+
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
+
+
+class MissionSequence:
+    """Flies the same scenario again, or one that is drawn for each mission.
+
+    Args:
+        scenario: See `MissionSource.of`.
+        settings: How missions are flown and paid.
+
+    Attributes:
+        source: Of the missions.
+        episode: The mission that is flown; before the first one an example.
+
+    Raises:
+        ValueError: `scenario` is none of what is allowed; says what is.
+    """
+
+    def __init__(self, scenario: ScenarioLike, settings: MissionSettings) -> None:
+        self.source = MissionSource.of(scenario)
+        self._settings = settings
+        self._flown = self.source.example
+        self._drawn = self.source.fixed
+        self.episode = self._made()
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario flown.
+
+        Raises:
+            ResetNeeded: It is drawn, and none was drawn yet.
+        """
+        if not self._drawn:
+            raise ResetNeeded("no mission is drawn yet: call reset() first")
+        return self.episode.scenario
+
+    def begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
+        """Begin the next mission.
+
+        Args:
+            rng: To draw it with.
+            options: Of `reset`: `scenario`, what to fly instead of drawing.
+
+        Raises:
+            ValueError: An option is wrong, or the mission does not fit; the former one goes on.
+        """
+        options = options or {}
+        check_options(options, "scenario")
+        given = options.get("scenario")
+        scenario = self.source.draw(rng) if given is None else self.source.fitted(given)
+        if scenario is not self._flown:
+            self._flown = scenario
+            self.episode = self._made()
+        self._drawn = True
+        self.episode.reset()
+        return self.episode
+
+    def cut_after(self, steps: int) -> Episode:
+        """Give missions another time limit; the one that is flown is over."""
+        # all anew: return mode and observations reckon with it from the start
+        self._settings = replace(self._settings, max_cycles=steps)
+        self.episode = self._made()
+        return self.episode
+
+    def _made(self) -> Episode:
+        return Episode(self._flown, self._settings, self.source.room)
+
+
+def check_options(options: Mapping[str, Any], *known: str) -> None:
+    """Refuse misspelt options of `reset`; others are ignored, as PettingZoo's tests demand.
+
+    Raises:
+        ValueError: One is close to a known one; says which.
+    """
+    for name in options:
+        meant = get_close_matches(str(name).lower(), known, n=1)
+        if meant and name not in known:
+            raise ValueError(f"reset() has no option {name!r}; did you mean {meant[0]!r}?")

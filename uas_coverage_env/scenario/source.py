@@ -1,0 +1,188 @@
+"""Where the missions of an environment come from: one scenario, or one drawn at each reset."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios
+from uas_coverage_env.scenario.load import is_path, load_scenario, scenario_names
+from uas_coverage_env.scenario.model import Scenario
+
+ScenarioGenerator = Callable[[np.random.Generator], Scenario]
+"""Draws a scenario, the same one from a generator of random numbers in the same state."""
+
+_EXAMPLES = 32
+# Beyond the most that the examples have: room costs nothing, a mission refused costs a training.
+_SPARE = 2
+
+
+class Room(NamedTuple):
+    """The most that a mission of an environment may have; its spaces are made for that."""
+
+    n_uas: int
+    n_waypoints: int
+    n_moving: int
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Room":
+        """What a scenario has."""
+        return cls(len(scenario.uas), len(scenario.waypoints), len(scenario.moving_obstacles))
+
+
+_LEAST = Room(1, 1, 0)
+_NOUNS = ("UAS", "waypoints", "moving obstacles")
+
+
+@dataclass(frozen=True)
+class _Always:
+    """The generator that draws one scenario."""
+
+    scenario: Scenario
+
+    def __call__(self, rng: np.random.Generator) -> Scenario:
+        return self.scenario
+
+
+class MissionSource:
+    """Draws missions with a generator and refuses those that do not fit the spaces.
+
+    The spaces are made for the largest mission. A family knows it. Of any other generator it is
+    said here, or found out: 32 missions are drawn when the source is made; the largest fleet among
+    them is the largest that may come, and there is room for twice the waypoints and moving
+    obstacles.
+
+    UAS i of a drawn mission is agent i of the environment and bears its name: `uas_1`, `uas_2`...
+
+    Args:
+        generator: A function that takes a `numpy.random.Generator` and returns a `Scenario`.
+        n_uas: The largest fleet; None: find out.
+        n_waypoints: The most waypoints; None: find out.
+        n_moving: The most moving obstacles; None: find out.
+
+    Attributes:
+        generator: As given.
+        room: The most that a mission may have.
+        names: (U,) of the largest fleet.
+        example: A mission like those to come.
+
+    Raises:
+        ValueError: An argument is none of what is allowed, or the generator returns no scenario.
+    """
+
+    def __init__(
+        self,
+        generator: ScenarioGenerator,
+        *,
+        n_uas: int | None = None,
+        n_waypoints: int | None = None,
+        n_moving: int | None = None,
+    ) -> None:
+        if not callable(generator):
+            raise ValueError(f"generator is {generator!r}; give a function rng -> Scenario")
+        said = {"n_uas": n_uas, "n_waypoints": n_waypoints, "n_moving": n_moving}
+        for (name, count), least in zip(said.items(), _LEAST, strict=True):
+            if count is not None and (type(count) is not int or count < least):
+                raise ValueError(f"{name} is {count!r}; give a whole number from {least} on")
+        self.generator = generator
+        rng = np.random.default_rng(0)
+        examples = [self._drawn(rng) for _ in range(_EXAMPLES if None in said.values() else 1)]
+        most = Room(*map(max, zip(*map(Room.of, examples), strict=True)))
+        found = Room(most.n_uas, _SPARE * most.n_waypoints, _SPARE * most.n_moving)
+        self.room = found._replace(**{k: count for k, count in said.items() if count is not None})
+        first = examples[0]
+        self.names = tuple(
+            first.uas[i].name if self.fixed else f"uas_{i + 1}" for i in range(self.room.n_uas)
+        )
+        self.example = self.fitted(first)
+
+    @classmethod
+    def of(cls, missions: Any) -> "MissionSource":
+        """What an environment's `scenario=` means.
+
+        Args:
+            missions: A scenario, its name or its file; the name of a family; a source; or any
+                `ScenarioGenerator`.
+
+        Raises:
+            InputError: There is no scenario or family of this name, or the file is wrong.
+            ValueError: It is none of what is allowed.
+        """
+        if isinstance(missions, str):
+            missions = FAMILIES.get(missions, missions)
+        if isinstance(missions, MissionSource):
+            return missions
+        if isinstance(missions, GeneratedScenarios):
+            (_, n_uas), (_, n_waypoints) = missions.n_uas, missions.n_waypoints
+            return cls(missions, n_uas=n_uas, n_waypoints=n_waypoints, n_moving=0)
+        if callable(missions):
+            return cls(missions)
+        scenario = _loaded(missions)
+        return cls(_Always(scenario), **Room.of(scenario)._asdict())
+
+    @property
+    def fixed(self) -> bool:
+        """Whether all missions are flown in one scenario."""
+        return isinstance(self.generator, _Always)
+
+    def draw(self, rng: np.random.Generator) -> Scenario:
+        """The scenario of the next mission.
+
+        Raises:
+            ValueError: The generator returned no scenario, or one that does not fit.
+        """
+        return self.fitted(self._drawn(rng))
+
+    def fitted(self, scenario: str | Path | Scenario) -> Scenario:
+        """A scenario as this environment flies it: agents have their names.
+
+        Args:
+            scenario: A scenario, its name or its file.
+
+        Raises:
+            InputError: There is no such scenario, or its file is wrong.
+            ValueError: It does not fit.
+        """
+        if not isinstance(scenario, Scenario):
+            scenario = _loaded(scenario)
+        has = Room.of(scenario)
+        for name, noun, count, most in zip(Room._fields, _NOUNS, has, self.room, strict=True):
+            if count > most:
+                raise ValueError(
+                    f"scenario {scenario.name!r} has {count} {noun}, this environment has room "
+                    f"for {most}: make it with MissionSource(generator, {name}={count})"
+                )
+        if all(uas.name == name for uas, name in zip(scenario.uas, self.names, strict=False)):
+            return scenario
+        fleet = (
+            uas.model_copy(update={"name": name})
+            for uas, name in zip(scenario.uas, self.names, strict=False)
+        )
+        return scenario.model_copy(update={"uas": tuple(fleet)})
+
+    def _drawn(self, rng: np.random.Generator) -> Scenario:
+        scenario = self.generator(rng)
+        if not isinstance(scenario, Scenario):
+            raise ValueError(
+                f"generator {self.generator!r} returned {scenario!r} of type "
+                f"{type(scenario).__name__}; it should return a Scenario"
+            )
+        return scenario
+
+
+ScenarioLike = str | Path | Scenario | MissionSource | ScenarioGenerator
+"""What environments take as `scenario=`, see `MissionSource.of`."""
+
+
+def _loaded(scenario: Any) -> Scenario:
+    if isinstance(scenario, Scenario):
+        return scenario
+    if not is_path(scenario) and scenario not in scenario_names():
+        raise InputError(
+            f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, the "
+            f"family {', '.join(FAMILIES)}, the path of a .toml file, or a function rng -> Scenario"
+        )
+    return load_scenario(scenario)
