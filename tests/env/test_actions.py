@@ -158,12 +158,17 @@ def test_a_wrong_set_of_agents_is_refused(actions, named):
     assert_unchanged(env, before)
 
 
-def test_an_action_for_a_uas_that_has_landed_is_refused():
-    env = env_of("waypoint")
-    env.step({"uas_1": HOME_CHOICE, "uas_2": 0})
-    assert env.agents == ["uas_2"]
-    with pytest.raises(ValueError, match="uas_1, which does not fly"):
-        env.step({"uas_1": 0, "uas_2": 0})
+def test_an_action_for_a_uas_that_has_landed_is_ignored():
+    env, twin = env_of("waypoint"), env_of("waypoint")
+    for each in (env, twin):
+        each.step({"uas_1": HOME_CHOICE, "uas_2": 0})
+        assert each.agents == ["uas_2"]
+    results, expected = env.step({"uas_1": "anything", "uas_2": 0}), twin.step({"uas_2": 0})
+    assert list(results[0]) == ["uas_2"]
+    np.testing.assert_array_equal(results[0]["uas_2"], expected[0]["uas_2"])
+    np.testing.assert_array_equal(env.state(), twin.state())
+    with pytest.raises(ValueError, match="uas_2 has no action"):
+        env.step({"uas_1": 0})
 
 
 @pytest.mark.parametrize("choice", [-1, HOME_CHOICE + 1, 1.0, 0.5, True, None, "home", [1]])

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -36,7 +37,7 @@ def parallel(scenario=grounds, **settings):
     return uas_coverage_v0.parallel_env(scenario=scenario, **settings)
 
 
-def make_vec(num_envs, scenario=grounds, **settings):
+def make_vec(num_envs, scenario=grounds, **settings) -> Any:
     return gymnasium.make_vec(
         ID,
         num_envs=num_envs,
@@ -158,15 +159,19 @@ def test_uas_of_drawn_missions_have_the_names_of_the_agents():
 
 
 def test_all_interfaces_fly_the_same_missions():
-    env, turns = parallel(), uas_coverage_v0.env(scenario=grounds)
-    swarm = gymnasium.make(ID, scenario=grounds)
+    env, turns, swarm = (
+        parallel(),
+        uas_coverage_v0.env(grounds),
+        gymnasium.make(ID, scenario=grounds),
+    )
     many = make_vec(4)
     observations, _ = many.reset(seed=20)
     for i, seed in enumerate(range(20, 24)):
         expected, _ = env.reset(seed=seed)
         turns.reset(seed=seed)
         observation, info = swarm.reset(seed=seed)
-        scenarios = (turns.unwrapped.scenario, swarm.unwrapped.scenario, many.call("scenario")[i])
+        inner: tuple[Any, ...] = (turns.unwrapped, swarm.unwrapped)
+        scenarios = (*(each.scenario for each in inner), many.call("scenario")[i])
         assert all(scenario == env.scenario for scenario in scenarios)
         assert turns.agents == env.agents == list(info["uas"])
         size = observation.size // 3

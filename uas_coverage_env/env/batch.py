@@ -199,14 +199,10 @@ class CoverageBatch:
             )
         if not self._begun and not mask.all():
             raise ResetNeeded("reset of some lanes before any: reset all lanes first")
-        if not isinstance(self.pool, DrawnPool):
-            orders = self._chosen(scenarios)
-            orders[~mask] = REST
+        chosen = self.pool.chosen(scenarios, self.num_envs)
         if seed is not None:
             self.seed(seed)
-        if isinstance(self.pool, DrawnPool):
-            orders = self._begun_by(self.pool, mask, scenarios)
-        self._run(orders)
+        self._run(self._orders(mask, chosen))
         self._begun = True
         return self.observation
 
@@ -234,20 +230,20 @@ class CoverageBatch:
                     f"have ended before the next step, or choose another autoreset mode"
                 )
         self._ask(actions)
-        orders, drawing = lanes.orders, None
         if self.draws:
-            # new missions begin after the step of the others: these may still be refused
-            drawing = orders == DRAW
-            orders = np.where(drawing, REST, orders)
-        refused = self._run(orders)
+            # what is drawn begins after the step of the others, which may still be refused
+            drawing = lanes.orders == DRAW
+            refused = self._run(np.where(drawing, REST, lanes.orders))
+        else:
+            drawing, refused = None, self._run(lanes.orders)
         if refused != ACCEPTED:
             lane, i = divmod(refused, self.n_uas)
             raise ValueError(
                 f"action of UAS {i} in lane {lane} is {self.learners.asked[lane, i].tolist()}; "
                 f"give finite numbers"
             )
-        if isinstance(self.pool, DrawnPool):
-            self._draw_next(self.pool, drawing)
+        if drawing is not None:
+            self._draw_next(drawing)
         return self.observation
 
     def state_dict(self) -> dict[str, NDArray[Any]]:
@@ -326,24 +322,22 @@ class CoverageBatch:
         """The scenario that a lane flies now."""
         return self.pool.scenarios[self.lanes.scenario[lane]]
 
-    def _begun_by(
-        self, pool: DrawnPool, begins: NDArray[np.bool_], scenarios: Any = None
-    ) -> NDArray[np.int64]:
-        """Draw missions for some lanes; the orders that begin them."""
-        lanes = np.flatnonzero(begins)
-        pool.begin(lanes, self.lanes.seed, self.lanes.mission < 0, scenarios)
-        orders = np.full(self.num_envs, REST)
-        orders[lanes] = lanes
-        return orders
+    def _orders(self, begins: NDArray[np.bool_], chosen: Any = None) -> NDArray[np.int64]:
+        """Begin missions in some lanes: those chosen, or drawn."""
+        if isinstance(self.pool, DrawnPool):
+            lanes = np.flatnonzero(begins)
+            self.pool.begin(lanes, self.lanes.seed, self.lanes.mission < 0, chosen)
+            chosen = np.arange(self.num_envs)
+        return np.where(begins, DRAW if chosen is None else chosen, REST)
 
-    def _draw_next(self, pool: DrawnPool, begins: NDArray[np.bool_]) -> None:
+    def _draw_next(self, begins: NDArray[np.bool_]) -> None:
         """Begin drawn missions, as the kernel begins those of a `ScenarioPool`."""
         lanes, final = self.lanes, self.missions.final
         if self.autoreset == SAME_STEP:
             begins = lanes.terminated | lanes.truncated
         if not begins.any():
             return
-        orders = self._begun_by(pool, begins)
+        orders = self._orders(begins)
         if self.autoreset != SAME_STEP:
             self._run(orders, in_place=True)
             return
@@ -390,21 +384,6 @@ class CoverageBatch:
         # `_draw_next` comes between the end of a drawn mission and the next
         autoreset = DISABLED if self.draws and self.autoreset == SAME_STEP else self.autoreset
         return BatchRules(rules, autoreset)
-
-    def _chosen(self, scenarios: Any) -> NDArray[np.int64]:
-        if scenarios is None:
-            return np.full(self.num_envs, DRAW)
-        chosen = np.asarray(scenarios)
-        if chosen.shape != (self.num_envs,) or chosen.dtype.kind not in "iu":
-            raise ValueError(
-                f"scenarios are {scenarios!r}; give an index for each of {self.num_envs} lanes"
-            )
-        if chosen.min() < 0 or chosen.max() >= len(self.pool):
-            raise ValueError(
-                f"scenarios go from {chosen.min()} to {chosen.max()}; "
-                f"the pool has indices from 0 to {len(self.pool) - 1}"
-            )
-        return chosen.astype(np.int64)
 
     def _ask(self, actions: Any) -> None:
         actions = as_array("the swarms", actions)

@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES
 from uas_coverage_env.env.pool import MissionPool, ScenarioPool
@@ -17,7 +18,7 @@ from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 
-_MEMORIES = (ARENA, STATE, TABLES, LEARNERS, LOOK)
+_MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, LOOK)
 _WORDS = 6
 _WORD = 2**64 - 1
 
@@ -49,7 +50,7 @@ class DrawnPool:
         self.scenarios = [example.scenarios[0]] * num_envs
         self.actions = example.actions
         self.sizes = {**example.sizes, "U": source.room.n_uas, "W": source.room.n_waypoints}
-        self._slots = [Slots(memory, num_envs) for memory in _MEMORIES]
+        self._slots: list[Slots[Any]] = [Slots(memory, num_envs) for memory in _MEMORIES]
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self.drawn_from = np.zeros((num_envs, _WORDS), dtype=np.uint64)
 
@@ -61,12 +62,29 @@ class DrawnPool:
         """For kernels; to be taken anew after `begin`."""
         return MissionPool(*(slots.pool for slots in self._slots))
 
+    def chosen(self, given: Any, num_envs: int) -> Sequence[Scenario | None] | None:
+        """(L,) what lanes are to fly, None where they draw; None: all draw.
+
+        Raises:
+            ValueError: A scenario does not fit, or there is not one for each lane.
+        """
+        if given is None:
+            return None
+        if isinstance(given, str | Path | Scenario):
+            return [self._source.fitted(given)] * num_envs
+        if not isinstance(given, Sequence) or len(given) != num_envs:
+            raise ValueError(
+                f"scenario is {given!r}; give a scenario, its name or its file, or a sequence of "
+                f"{num_envs} of these, None where one is drawn"
+            )
+        return [None if each is None else self._source.fitted(each) for each in given]
+
     def begin(
         self,
         lanes: NDArray[np.integer],
         seeds: NDArray[np.uint64],
         seeded: NDArray[np.bool_],
-        given: Any = None,
+        chosen: Sequence[Scenario | None] | None = None,
     ) -> None:
         """Put the next missions of some lanes into their slots.
 
@@ -74,18 +92,17 @@ class DrawnPool:
             lanes: Which.
             seeds: (L,) of all lanes.
             seeded: (L,) whose generator begins anew from its seed.
-            given: What to fly instead of drawing, see `CoverageBatch.reset`; None: draw.
+            chosen: (L,) what to fly instead of drawing, None where to draw; None: draw them all.
 
         Raises:
             ValueError: A mission does not fit, or the generator returned none. No slot has changed.
         """
-        chosen = self._chosen(given)
         missions: list[_Mission] = []
         for lane in lanes.tolist():
             rng = self._rngs[lane]
             if seeded[lane] or rng is None:
                 rng = self._rngs[lane] = seeding.np_random(int(seeds[lane]))[0]
-            scenario = chosen[lane]
+            scenario = chosen[lane] if chosen else None
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             missions.append(_Mission(lane, scenario or self._source.draw(rng), before, rng))
         self.install(missions)
@@ -134,17 +151,6 @@ class DrawnPool:
             self.scenarios[lane] = pool.scenarios[0]
             self.drawn_from[lane] = before
             self._rngs[lane] = rng
-
-    def _chosen(self, given: Any) -> list[Scenario | None]:
-        n = len(self)
-        if given is None or isinstance(given, str | Path | Scenario):
-            return [None if given is None else self._source.fitted(given)] * n
-        if not isinstance(given, Sequence) or len(given) != n:
-            raise ValueError(
-                f"scenario is {given!r}; give a scenario, its name or its file, or a sequence of "
-                f"{n} of these, None where one is drawn"
-            )
-        return [None if each is None else self._source.fitted(each) for each in given]
 
 
 def pool_of(

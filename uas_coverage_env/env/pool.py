@@ -2,7 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import lane_view, pool_view
@@ -107,6 +110,24 @@ class ScenarioPool:
 
     def __len__(self) -> int:
         return len(self.scenarios)
+
+    def chosen(self, given: Any, num_envs: int) -> NDArray[np.int64] | None:
+        """(L,) indices of the scenarios that lanes are to fly; None: they are drawn.
+
+        Raises:
+            ValueError: There are no such scenarios, or not one for each lane.
+        """
+        if given is None:
+            return None
+        chosen = np.asarray(given)
+        if chosen.shape != (num_envs,) or chosen.dtype.kind not in "iu":
+            raise ValueError(f"scenarios are {given!r}; give an index for each of {num_envs} lanes")
+        if chosen.min() < 0 or chosen.max() >= len(self):
+            raise ValueError(
+                f"scenarios go from {chosen.min()} to {chosen.max()}; "
+                f"the pool has indices from 0 to {len(self) - 1}"
+            )
+        return chosen.astype(np.int64)
 
 
 def _loaded(scenario: str | Path | Scenario, settings: MissionSettings) -> Scenario:

@@ -179,7 +179,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def _observation(self) -> NDArray[np.float32]:
         """(U · V,) with rows of zeros for UAS that the mission does not have."""
         seen = self._episode.observation.ravel()
-        missing = self.observation_space.shape[0] - len(seen)
+        missing = self._n_uas * self._episode.observation.shape[1] - len(seen)
         return np.pad(seen, (0, missing)) if missing else seen
 
     def _action_mask(self) -> NDArray[np.int8]:

@@ -119,7 +119,8 @@ class MissionSource:
             (_, n_uas), (_, n_waypoints) = missions.n_uas, missions.n_waypoints
             return cls(missions, n_uas=n_uas, n_waypoints=n_waypoints, n_moving=0)
         if callable(missions):
-            return cls(missions)
+            generator: Any = missions
+            return cls(generator)
         scenario = _loaded(missions)
         return cls(_Always(scenario), **Room.of(scenario)._asdict())
 
