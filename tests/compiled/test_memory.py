@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.compiled.views import Layout, copy_arrays, lane_view, pool_view
 
 BOX_DTYPE = np.dtype((np.record, np.dtype([("side_m", "f8"), ("n", "i8")], align=True)))
@@ -159,3 +160,20 @@ def test_only_the_first_axis_of_a_lane_may_vary_with_the_mission():
 
     with pytest.raises(TypeError, match="x: only its first axis"):
         lane_view(Memory(Wrong), sized_by=DEPOT)
+
+
+def test_slots_hold_what_was_put_last_and_equal_arrays_once():
+    slots = Slots(DEPOT, 5)
+    rng = np.random.default_rng(0)
+    held: dict[int, Depot] = {}
+    for _ in range(200):
+        slot, seed = int(rng.integers(5)), int(rng.integers(4))
+        held[slot] = depot(1 + seed * 2, seed, seed)
+        slots.put(slot, held[slot])
+        for other, expected in held.items():
+            for array, own in zip(DEPOT.mission(slots.pool, other), expected, strict=True):
+                assert array.tobytes() == own.tobytes()
+                assert array.shape == own.shape
+        begins = {repr(d.height_m): slots.pool.first[s, 1] for s, d in held.items()}
+        assert all(slots.pool.first[s, 1] == begins[repr(d.height_m)] for s, d in held.items())
+    assert slots.pool.arrays.height_m.size == 5 * (14 + 14 // 4)

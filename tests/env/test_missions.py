@@ -96,9 +96,9 @@ def test_a_mission_can_be_asked_for_by_name_by_file_and_as_a_scenario(tmp_path):
     field = load_scenario("open_field")
     path = tmp_path / "mine.toml"
     field.to_file(path)
-    for asked in ("open_field", path, str(path), field):
+    for asked in ("open_field", path, str(path), field, "village"):
         env.reset(seed=2, options={"scenario": asked})
-        assert env.scenario == field
+        assert env.scenario == (load_scenario("village") if asked == "village" else field)
         assert env.agents == ["uas_1", "uas_2"]
     env.reset()
     after = env.scenario
@@ -229,7 +229,7 @@ def test_neither_lanes_nor_threads_change_what_is_drawn():
 
 def test_many_missions_that_are_asked_for():
     many = make_vec(3, SMALL)
-    field, ground = load_scenario("open_field"), practice_ground(n_uas=1)
+    ground, crowd = practice_ground(n_uas=1), practice_ground(n_uas=4)
     many.reset(seed=0, options={"scenario": ground})
     assert many.call("scenario") == (ground,) * 3
     many.reset(seed=0)
@@ -237,8 +237,8 @@ def test_many_missions_that_are_asked_for():
     many.reset(seed=0, options={"scenario": [ground, None, practice_ground(n_uas=2)]})
     assert many.call("scenario") == (ground, drawn[1], practice_ground(n_uas=2))
     assert many.call("brief")[0].waypoints == ground.waypoints
-    with pytest.raises(ValueError, match="'open_field' has"):
-        many.reset(options={"scenario": [field] * 3})
+    with pytest.raises(ValueError, match="'practice' has 4 UAS"):
+        many.reset(options={"scenario": [crowd] * 3})
     with pytest.raises(ValueError, match="a sequence of 3"):
         many.reset(options={"scenario": np.array([0, 1, 0])})
     assert many.call("scenario")[0] == ground  # what is refused changes nothing

@@ -16,8 +16,8 @@ ScenarioGenerator = Callable[[np.random.Generator], Scenario]
 """Draws a scenario, the same one from a generator of random numbers in the same state."""
 
 _EXAMPLES = 32
-# Beyond the most that the examples have: room costs nothing, a mission refused costs a training.
-_SPARE = 2
+# Room for what is asked for, and for rare draws: it costs nothing, a mission refused much.
+_SPARE, _MOVING = 2, 4
 
 
 class Room(NamedTuple):
@@ -50,10 +50,10 @@ class _Always:
 class MissionSource:
     """Draws missions with a generator and refuses those that do not fit the spaces.
 
-    The spaces are made for the largest mission. A family knows it. Of any other generator it is
-    said here, or found out: 32 missions are drawn when the source is made; the largest fleet among
-    them is the largest that may come, and there is room for twice the waypoints and moving
-    obstacles.
+    The spaces are made for the largest mission. It is said here; or known, of a family; or found
+    out by drawing 32 missions when the source is made. The largest fleet of a family, or among
+    these 32, is then the largest that may come; there is room for twice the waypoints and moving
+    obstacles, and for four of the latter at least.
 
     UAS i of a drawn mission is agent i of the environment and bears its name: `uas_1`, `uas_2`...
 
@@ -91,7 +91,8 @@ class MissionSource:
         rng = np.random.default_rng(0)
         examples = [self._drawn(rng) for _ in range(_EXAMPLES if None in said.values() else 1)]
         most = Room(*map(max, zip(*map(Room.of, examples), strict=True)))
-        found = Room(most.n_uas, _SPARE * most.n_waypoints, _SPARE * most.n_moving)
+        spare = _SPARE * most.n_waypoints, max(_MOVING, _SPARE * most.n_moving)
+        found = Room(most.n_uas, *spare)
         self.room = found._replace(**{k: count for k, count in said.items() if count is not None})
         first = examples[0]
         self.names = tuple(
@@ -117,7 +118,7 @@ class MissionSource:
             return missions
         if isinstance(missions, GeneratedScenarios):
             (_, n_uas), (_, n_waypoints) = missions.n_uas, missions.n_waypoints
-            return cls(missions, n_uas=n_uas, n_waypoints=n_waypoints, n_moving=0)
+            return cls(missions, n_uas=n_uas, n_waypoints=_SPARE * n_waypoints, n_moving=_MOVING)
         if callable(missions):
             generator: Any = missions
             return cls(generator)

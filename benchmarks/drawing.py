@@ -1,0 +1,86 @@
+"""What missions that are drawn at reset cost, beside missions that are given.
+
+    python benchmarks/drawing.py
+
+Processor time: of a reset that draws a generated scenario, and of its parts; and of the steps of a
+batch that draws its missions, beside a batch that was handed the same missions in a list. In most
+steps no mission ends, and the median is of these.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from functools import partial
+from statistics import median
+
+import numpy as np
+
+from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.env import CoverageBatch, MissionSettings
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.scenario import FAMILIES, Scenario
+
+FAMILY = FAMILIES["generated"]
+
+
+def milliseconds(work: Callable[[], object]) -> float:
+    """Processor time of a piece of work [ms]."""
+    begun_s = time.process_time()
+    work()
+    return 1e3 * (time.process_time() - begun_s)
+
+
+def reset_table(n_missions: int) -> None:
+    """Print what a reset takes."""
+    env = uas_coverage_v0.parallel_env(scenario="generated")
+    env.reset(seed=0)
+    compiled = COMPILATIONS.n_compiled
+    rng, settings = np.random.default_rng(0), MissionSettings()
+    scenarios: list[Scenario] = []
+    rows = {"a reset that draws": [milliseconds(env.reset) for _ in range(n_missions)]}
+    rows["  of which the draw"] = [
+        milliseconds(lambda: scenarios.append(FAMILY(rng))) for _ in range(n_missions)
+    ]
+    rows["  of which arrays"] = [
+        milliseconds(partial(Episode, scenario, settings)) for scenario in scenarios
+    ]
+    env = uas_coverage_v0.parallel_env(scenario=scenarios[0])
+    rows["a reset in a given scenario"] = [milliseconds(env.reset) for _ in range(n_missions)]
+    print(f"{'processor time':32} {'median, ms':>10} {'90 %, ms':>10}")
+    for name, times in rows.items():
+        print(f"{name:32} {median(times):10.2f} {np.quantile(times, 0.9):10.2f}")
+    print(f"compilations after the first reset: {COMPILATIONS.n_compiled - compiled}")
+
+
+def step_table(num_envs: int, n_steps: int) -> None:
+    """Print what steps of batches take, in turns."""
+    drawing = CoverageBatch(num_envs, FAMILY, max_cycles=100_000)
+    drawing.reset(seed=0)
+    given = CoverageBatch(num_envs, drawing.pool.scenarios, max_cycles=100_000)
+    given.reset(seed=0, scenarios=np.arange(num_envs))
+    rng = np.random.default_rng(0)
+    times: dict[str, list[float]] = {"drawn": [], "a list": []}
+    shape = (num_envs, drawing.n_uas, drawing.actions.size)
+    for _ in range(n_steps):
+        actions = rng.uniform(-0.1, 0.1, shape)
+        for name, batch in (("drawn", drawing), ("a list", given)):
+            times[name].append(milliseconds(partial(batch.step, actions)))
+    print(f"\n{f'step of {num_envs} missions':32} {'median, ms':>10} {'90 %, ms':>10}")
+    for name, taken in times.items():
+        print(f"{name:32} {median(taken):10.2f} {np.quantile(taken, 0.9):10.2f}")
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--missions", type=int, default=100, help="resets that are timed")
+    parser.add_argument("--lanes", type=int, default=256, help="missions of a batch")
+    parser.add_argument("--steps", type=int, default=100, help="steps of a batch that are timed")
+    given = parser.parse_args()
+    reset_table(given.missions)
+    step_table(given.lanes, given.steps)
+
+
+if __name__ == "__main__":
+    main()
