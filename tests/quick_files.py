@@ -32,6 +32,11 @@ QUICK = {
     ),
     "env/test_actions.py": "",
     "env/test_batch.py": "",
+    "env/test_missions.py": (
+        "only test_a_seed_repeats_the_mission_and_its_flight_in_a_fresh_environment_too "
+        "test_spaces_stay_and_smaller_fleets_leave_agents_out "
+        "test_all_interfaces_fly_the_same_missions"
+    ),
     "env/test_observation.py": "",
     "env/test_parallel_env.py": "",
     "env/test_rewards.py": "",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uas_coverage_env.env import OBSERVATION_SIZE, CoverageBatch, observation_columns
-from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.scenario import GeneratedScenarios, generate_scenario
 
 pytest.importorskip("stable_baselines3")
 
@@ -18,7 +18,7 @@ from uas_coverage_agents.training.vec_env import CoverageVecEnv
 TOWNS = tuple(
     generate_scenario(1_000_000 + n, n_uas=n, n_waypoints=10, n_obstacles=3) for n in (1, 2, 3)
 )
-
+FAMILY = GeneratedScenarios(n_uas=(1, 3), n_waypoints=(6, 10), n_obstacles=(0, 3))
 
 torch.set_num_threads(1)
 FLYING_COLUMN = int(observation_columns("own", "flying")[0, 0])
@@ -140,13 +140,14 @@ def test_a_seed_reproduces_every_weight():
     assert any((a != b).any() for a, b in zip(first, other, strict=True))
 
 
-def test_missions_go_on_bit_for_bit_from_a_saved_state():
-    env = CoverageVecEnv(3, TOWNS, max_cycles=12)
+@pytest.mark.parametrize("scenario", [TOWNS, FAMILY], ids=["towns", "family"])
+def test_missions_go_on_bit_for_bit_from_a_saved_state(scenario):
+    env = CoverageVecEnv(3, scenario, max_cycles=12)
     env.seed(1)
     env.reset()
     list(fly(env, 20, seed=1))
     saved = env.state_dict()
-    twin = CoverageVecEnv(3, TOWNS, max_cycles=12)
+    twin = CoverageVecEnv(3, scenario, max_cycles=12)
     np.testing.assert_array_equal(twin.load_state_dict(saved), env.batch.observation.reshape(9, -1))
     pairs = zip(fly(env, 30, seed=2), fly(twin, 30, seed=2), strict=True)
     for (flew, result), (twin_flew, twin_result) in pairs:

@@ -57,8 +57,9 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         Where `scenario` is the name of a family, a `MissionSource` or a function
         `generator(rng) -> Scenario`, every mission is drawn when it begins, after an autoreset
         too: sub-environment i flies what `CoverageSwarmEnv` draws after `reset(seed=s + i)`, one
-        mission after the other. Drawing happens in Python and takes some 20 ms for a generated
-        scenario: where most of a training would be drawing, draw a sequence beforehand.
+        mission after the other; `call("scenario")` has them. Drawing happens in Python and takes
+        some 20 ms for a generated scenario: where most of a training would be drawing, draw a
+        sequence beforehand.
         `reset(options={"scenario": ...})` takes one scenario (its name, its file), or a sequence
         with one for each sub-environment, None where it draws.
 
