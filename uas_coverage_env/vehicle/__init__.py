@@ -61,11 +61,7 @@ from uas_coverage_env.vehicle.params import (
     vehicle_names,
 )
 from uas_coverage_env.vehicle.plant import plant_step
-from uas_coverage_env.vehicle.range import (
-    dod_per_s,
-    margin_to_land,
-    seconds_to_land,
-)
+from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
 

@@ -20,10 +20,10 @@ from uas_coverage_baselines.order import (
 )
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.range import ORDER_GUIDE
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
-_LANDING_S = 4.0  # coming to rest above the start
 _MOVES_PER_WAYPOINT = 40_000  # of the first search, before take-off
 _MOVES_AT_MOST = 4_000_000
 _MOVES_AFTERWARDS = 60_000  # of each decision's, at most
@@ -165,7 +165,7 @@ class OrderGuide:
             first_s=first_s,
             between_s=self._legs.between_s,
             kind=self._legs.kind,
-            home_s=self._legs.home_s + _LANDING_S,
+            home_s=self._legs.home_s + ORDER_GUIDE.landing_s,
             idle_s=np.where(active, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
             velocity_mps=np.ascontiguousarray(x[:, 3:5]),
