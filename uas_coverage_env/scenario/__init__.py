@@ -2,18 +2,18 @@
 
 from uas_coverage_env.scenario.checks import warnings
 from uas_coverage_env.scenario.family import draw_scenario
-from uas_coverage_env.scenario.generator import generate_scenario
-from uas_coverage_env.scenario.load import load_scenario, scenario_names
-from uas_coverage_env.scenario.model import (
+from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
     MovingObstacle,
     Obstacle,
-    Scenario,
     ScheduledVelocity,
     Uas,
     Waypoint,
 )
+from uas_coverage_env.scenario.generator import generate_scenario
+from uas_coverage_env.scenario.load import load_scenario, scenario_names
+from uas_coverage_env.scenario.model import Scenario
 
 __all__ = [
     "Decoration",

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.scenario.fields import UncheckedScenario
 from uas_coverage_env.vehicle.range import (
     GENERATED,
     Speeds,
@@ -21,9 +21,6 @@ from uas_coverage_env.vehicle.range import (
     speeds_of,
     vertical_seconds,
 )
-
-if TYPE_CHECKING:
-    from uas_coverage_env.scenario.model import Scenario
 
 # Power on the way, relative to hovering: drag at speed, climbs and turns.
 _POWER = 1.11
@@ -49,7 +46,7 @@ class RoughPlan:
         return float(self.flight_s.max())
 
 
-def back_and_forth(scenario: Scenario, spare: float = 0.0) -> RoughPlan:
+def back_and_forth(scenario: UncheckedScenario, spare: float = 0.0) -> RoughPlan:
     """Visit the waypoints row by row, split into one run per UAS of about equal time.
 
     Args:
@@ -83,7 +80,7 @@ def back_and_forth(scenario: Scenario, spare: float = 0.0) -> RoughPlan:
 class _Legs:
     """Flight times between points: straight where that is free, else over the obstacles."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: UncheckedScenario) -> None:
         slowest = np.min([speeds_of(vehicle) for vehicle in scenario.vehicles], axis=0)
         self.speeds = Speeds(*slowest.tolist())
         radius_m = max(uas.radius_m for uas in scenario.uas)

@@ -6,16 +6,16 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from uas_coverage_env.scenario.model import (
+from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
     MovingObstacle,
     Obstacle,
-    Scenario,
     ScheduledVelocity,
     Uas,
     Waypoint,
 )
+from uas_coverage_env.scenario.model import Scenario
 
 _TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration)
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
