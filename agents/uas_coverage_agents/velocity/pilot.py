@@ -11,6 +11,7 @@ from uas_coverage_agents.velocity.patience import Patience
 from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
+from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState, Velocity
 
@@ -40,11 +41,15 @@ def gaze(hidden: int, keys: int) -> Gaze:
 class VelocityPilot:
     """Every UAS on its own, with the same network: its observation in, its velocity out.
 
+    Args:
+        policy: Of the interface "velocity".
+        assistants: Those that fly along; they change nothing here.
+
     Raises:
         ValueError: The policy was trained on another observation, or gives other outputs.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy, assistants: Assistants) -> None:
         description = policy.description
         if not description.observation.has_the_numbers_of(observation()):
             raise ValueError("its observation is not that of this version; train it anew")
