@@ -19,7 +19,7 @@ from uas_coverage_baselines.order import (
     no_order,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX, VY
 from uas_coverage_env.vehicle.range import ORDER_GUIDE
 from uas_coverage_env.world import SwarmState
 
@@ -168,7 +168,7 @@ class OrderGuide:
             home_s=self._legs.home_s + ORDER_GUIDE.landing_s,
             idle_s=np.where(active, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
-            velocity_mps=np.ascontiguousarray(x[:, 3:5]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
             speed_mps=self._legs.speed_mps,
             acceleration_mps2=self._legs.acceleration_mps2,
             start_m=np.ascontiguousarray(self._legs.starts_m[:, :2]),

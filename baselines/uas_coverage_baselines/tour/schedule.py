@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX, VY
 from uas_coverage_env.vehicle.range import TOUR
 from uas_coverage_env.world import Arena
 
@@ -189,7 +189,7 @@ class Schedule:
             home_s=legs.home_s + TOUR.landing_s,
             idle_s=np.where(view.may_work, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
-            velocity_mps=np.ascontiguousarray(x[:, 3:5]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
             speed_mps=self.legs.speed_mps,
             acceleration_mps2=self.legs.acceleration_mps2,
             start_m=np.ascontiguousarray(legs.starts_m[:, :2]),

@@ -118,7 +118,7 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
     if problem.tours:
         return _along(problem.tours[uas])
     waypoints = problem.waypoints_m
-    ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, 3:6]
+    ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, VX : VZ + 1]
     near = np.argsort(_travel_m(waypoints - ahead), kind="stable")[: _BRANCHES[0]]
     between = _travel_m(waypoints[:, None] - waypoints[None])
     neighbours = np.argsort(between, axis=1, kind="stable")
