@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.targets import Targets
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.vehicle import dod_per_s
 from uas_coverage_env.vehicle.range import LAWNMOWER, level_seconds, speeds_of
 from uas_coverage_env.world import Command, SwarmState
 
 # Share of the charge that a run may be planned to use.
-_USABLE = 0.8
+_USABLE = 0.9
 
 
 class Lawnmower:
@@ -115,15 +116,10 @@ class _Cuts:
 
 
 def _allowed_times_s(brief: MissionBrief) -> NDArray[np.float64]:
-    """(U,) [s] flight that the charge of each UAS allows, at the power of hovering."""
+    """(U,) [s] flight at full speed that the charge of each UAS allows."""
     return np.array(
         [
-            _USABLE
-            * (uas.dod_max - (1.0 - uas.soc_0))
-            * vehicle.battery.capacity_Ah
-            * vehicle.battery.voltage_nominal_V
-            * 3600.0
-            / vehicle.power.hover_W
+            _USABLE * (uas.dod_max - (1.0 - uas.soc_0)) / dod_per_s(vehicle, uas.dod_max)
             for uas, vehicle in zip(brief.uas, brief.vehicles, strict=True)
         ]
     )
