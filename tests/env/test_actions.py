@@ -81,7 +81,7 @@ def test_every_vehicle_has_its_own_limits():
     scenario = practice_ground(vehicles=("s500_v2", "hexacopter"))
     ranges = actions_of("wrench", scenario).ranges
     lifts = [load_vehicle(name).limits.lift_max_N for name in ("s500_v2", "hexacopter")]
-    assert ranges["highest"][:, 0].tolist() == pytest.approx(lifts)
+    assert ranges[:, 0, 2].tolist() == pytest.approx(lifts)
     assert lifts[0] != lifts[1]
 
 
@@ -295,4 +295,4 @@ def test_extreme_but_valid_actions_never_leave_the_observation_space(name, seed)
 def test_the_village_has_the_altitudes_that_the_documentation_says():
     scenario = load_scenario("village")
     ranges = actions_of("velocity", scenario).ranges
-    assert (ranges["lowest"][0, 2], ranges["highest"][0, 2]) == pytest.approx((1.5, 48.5))
+    assert (ranges[0, 2, 0], ranges[0, 2, 2]) == pytest.approx((1.5, 48.5))

@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.batch import CoverageBatch, masks_of
+from uas_coverage_env.env.batch import CoverageBatch
 from uas_coverage_env.env.batch_kernel import (
     SWARM_COVERED,
     SWARM_ENERGY,
@@ -298,7 +298,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         if self._batch.filters:
             infos["filtered"] = report[:, :, FILTERED] > 0.0
         if self._batch.chooses:
-            masks = masks_of(candidates).reshape(self.num_envs, -1)
+            masks = self._batch.actions.kind.masks(candidates).reshape(self.num_envs, -1)
             infos["action_mask"] = (masks & mask[:, None]).astype(np.int8)
         infos.update({f"_{name}": mask for name in infos})
         return infos
