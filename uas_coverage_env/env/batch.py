@@ -27,6 +27,7 @@ from uas_coverage_env.env.batch_kernel import (
     step_batch,
     step_batch_in_threads,
 )
+from uas_coverage_env.env.express import joint_action_of, moment_of
 from uas_coverage_env.env.kernel import ACCEPTED, Rules
 from uas_coverage_env.env.memory import LEARNERS, Learners
 from uas_coverage_env.env.observe import observing_of
@@ -34,8 +35,9 @@ from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING, SwarmState, WorldState
+from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
 from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
@@ -289,6 +291,35 @@ class CoverageBatch:
             moving_position_m=np.array(scenario.moving_positions(time_s)).reshape(-1, 3),
             moving_velocity_mps=np.array(scenario.moving_velocities(time_s)).reshape(-1, 3),
         )
+
+    def actions_of(
+        self, commands: Sequence[Mapping[str, Command]], *, clip: bool = False
+    ) -> NDArray[Any]:
+        """The actions that fly planners' commands in the coming step, for imitation.
+
+        Args:
+            commands: Of each lane one for each UAS that flies; empty where a mission has ended.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            (L, U, size) float32 or (L, U) choices, see `CoverageParallelEnv.action_of`; zero where
+            a UAS does not fly.
+
+        Raises:
+            ValueError: No action of this kind flies a command, or one that flies has none.
+        """
+        if len(commands) != self.num_envs:
+            raise ValueError(f"commands for {len(commands)} of {self.num_envs} lanes")
+        rows = []
+        for lane, given in enumerate(commands):
+            s = int(self.lanes.scenario[lane])
+            moment = moment_of(self.pool, s, self.worlds, self.learners, lane)
+            rows.append(joint_action_of(self.actions, moment, given, clip, n_uas=self.n_uas))
+        return np.stack(rows)
+
+    def brief_of(self, lane: int) -> MissionBrief:
+        """What a planner may know of the mission of a lane."""
+        return MissionBrief.of(self.scenario_of(lane))
 
     def scenario_of(self, lane: int) -> Scenario:
         """The scenario that a lane flies now."""

@@ -11,6 +11,7 @@ from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.express import Moment
 from uas_coverage_env.env.global_state import global_space, global_state
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
@@ -211,6 +212,12 @@ class Episode:
     def swarm_state(self) -> SwarmState:
         """What a player sees now."""
         return self._world.swarm_state()
+
+    def moment(self) -> Moment:
+        """The mission now, for `express`."""
+        world = self._world
+        arrays = (world.arena, world.state, self.tables, self._learners)
+        return Moment(self.names, *arrays, world.dynamics == "nonlinear")
 
     def info(self, i: int, row: list[float]) -> dict[str, Any]:
         """What is told about a UAS beside its observation and reward, see `CoverageParallelEnv`."""
