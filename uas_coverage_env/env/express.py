@@ -101,7 +101,8 @@ def _shares(
         beyond = max(lowest - value, value - highest)
         if beyond > _ROUNDING * (highest - lowest) and not clip:
             raise ValueError(
-                f"{names[k]} is {value:g}, and the action reaches from {lowest:g} to {highest:g}"
+                f"{names[k]} is {value:g}, and the action reaches from {lowest:g} to {highest:g}; "
+                f"clip=True takes the end"
             )
         reach = highest - middle if value > middle else middle - lowest
         if reach > 0.0:
