@@ -6,6 +6,7 @@ import os
 import pickle
 import subprocess
 import sys
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -94,9 +95,9 @@ def test_it_flies_in_a_batch_as_in_single_missions(kind, helped):
 @pytest.mark.parametrize("kind", OWN, ids=NAMES)
 def test_every_environment_takes_it(kind):
     ground = practice_ground(n_uas=2)
-    single = gymnasium.make("UASCoverage-v0", scenario=ground, action=kind)
+    single: Any = gymnasium.make("UASCoverage-v0", scenario=ground, action=kind)
     many = many_of(ground, kind)
-    turns = uas_coverage_v0.env(ground, action=kind)
+    turns: Any = uas_coverage_v0.env(ground, action=kind)
     assert many.single_action_space == single.action_space
     single.reset(seed=0)
     many.reset(seed=0)
@@ -108,8 +109,7 @@ def test_every_environment_takes_it(kind):
     np.testing.assert_array_equal(together[2], alone)
     for row in np.reshape(action, (2, -1)):
         turns.step(row[0] if kind.choices else row)
-    last = turns.unwrapped.swarm_state().x
-    np.testing.assert_array_equal(last, single.unwrapped.swarm_state().x)
+    np.testing.assert_array_equal(turns.swarm_state().x, single.unwrapped.swarm_state().x)
 
 
 def test_choices_have_the_mask_that_the_kind_says():

@@ -39,7 +39,7 @@ class Scripted:
 
     def act(self, swarm) -> Mapping[str, Command]:
         command = self.commands[swarm.step % len(self.commands)]
-        return dict.fromkeys(swarm.active, command)
+        return {name: command for name in swarm.active}
 
 
 def flown_inside(env: Any, planner: Any, **options: Any) -> np.ndarray:
@@ -131,7 +131,7 @@ def test_an_expert_is_asked_on_the_states_that_another_policy_visits():
 
 
 def test_the_swarm_as_one_agent_and_many_missions_fly_the_same_actions():
-    many = gymnasium.make_vec(
+    many: Any = gymnasium.make_vec(
         "UASCoverage-v0",
         num_envs=2,
         vectorization_mode="vector_entry_point",

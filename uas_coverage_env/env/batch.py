@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import Constant, machine_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
-from uas_coverage_env.env.actions import as_array
+from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
     DISABLED,
     DRAW,

@@ -53,6 +53,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         the observation, or home (12). `infos[agent]["action_mask"]` is 1 for choices that exist;
         another choice keeps the former target or, where there is none, the place.
 
+        An `ActionKind` of one's own: what it says.
+
         Finite numbers beyond ±1 are clipped. An action that is NaN, infinite, of a wrong type or
         shape, missing, or for an agent that does not fly raises a ValueError and changes nothing.
 

@@ -7,7 +7,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import ActionKind, kind_of
+from uas_coverage_env.env.actions import ActionKind
+from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
 from uas_coverage_env.scenario import Scenario

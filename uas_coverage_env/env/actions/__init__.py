@@ -1,9 +1,9 @@
 """What a learner may do: kinds of action, each one file with its numbers and its kernel."""
 
-from uas_coverage_env.env.actions.given import Actions, actions_of, as_array
+from uas_coverage_env.env.actions.given import Actions, actions_of
 from uas_coverage_env.env.actions.kind import ActionKind, Range
-from uas_coverage_env.env.actions.kinds import ACTION_NAMES, ACTIONS, kind_of
-from uas_coverage_env.env.actions.velocity import ALTITUDE_MARGIN_M, altitude_range
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES, ACTIONS
+from uas_coverage_env.env.actions.velocity import ALTITUDE_MARGIN_M
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 
 __all__ = [
@@ -15,7 +15,4 @@ __all__ = [
     "Actions",
     "Range",
     "actions_of",
-    "altitude_range",
-    "as_array",
-    "kind_of",
 ]

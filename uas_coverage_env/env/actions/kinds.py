@@ -12,6 +12,7 @@ ACTIONS = (VELOCITY, ACCELERATION, WRENCH, WAYPOINT)
 """The kinds that `action=` knows by their names."""
 
 ACTION_NAMES = tuple(kind.name for kind in ACTIONS)
+"""Their names."""
 
 
 def kind_of(action: Any) -> ActionKind:

@@ -15,7 +15,7 @@ ALTITUDE_MARGIN_M = 1.0
 """Altitudes of the velocity action keep this much more than the fence's margin [m]."""
 
 
-def altitude_range(scenario: Scenario) -> Range:
+def _altitude_range(scenario: Scenario) -> Range:
     """Lowest, middle and highest altitude of the velocity action [m]."""
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     lowest, highest = float(altitudes_m.min()), float(altitudes_m.max())
@@ -27,7 +27,7 @@ def altitude_range(scenario: Scenario) -> Range:
 def _ranges(vehicle: VehicleParams, scenario: Scenario) -> tuple[Range, ...]:
     speed_mps = vehicle.limits.v_xy_max_mps
     level = (-speed_mps, 0.0, speed_mps)
-    return level, level, altitude_range(scenario)
+    return level, level, _altitude_range(scenario)
 
 
 @inlined_kernel
