@@ -166,10 +166,10 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """The choices that exist now, of all UAS one after the other (sb3-contrib's MaskablePPO).
 
         Raises:
-            ValueError: The action is not "waypoint".
+            ValueError: The action is no choice.
         """
         if not self._episode.chooses:
-            raise ValueError("only actions that are choices (waypoint) have masks")
+            raise ValueError("only actions that are choices have masks; this one is continuous")
         masks = [self._episode.action_mask(i) for i in range(len(self._episode.names))]
         return np.concatenate(masks).astype(np.bool_)
 

@@ -206,10 +206,10 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         """(num_envs, U · choices) the choices that exist now.
 
         Raises:
-            ValueError: The action is not "waypoint".
+            ValueError: The action is no choice.
         """
         if not self._batch.chooses:
-            raise ValueError("only actions that are choices (waypoint) have masks")
+            raise ValueError("only actions that are choices have masks; this one is continuous")
         return self._batch.action_masks().reshape(self.num_envs, -1)
 
     def actions_of(
