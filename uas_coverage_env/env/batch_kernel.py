@@ -12,7 +12,8 @@ from uas_coverage_env.compiled.borrow import borrow
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
-from uas_coverage_env.env.actions import first_not_finite
+from uas_coverage_env.env.act import acting_of, first_not_finite
+from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.kernel import ACCEPTED, Rules, step_learners
 from uas_coverage_env.env.memory import (
     CONTACT_WITH,
@@ -369,7 +370,8 @@ class _Given(NamedTuple):
 def _example() -> _Given:
     pool = ScenarioPool("open_field")
     paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
-    rules = Rules(0, False, np.zeros(0, np.int64), paying, observing_of(OBSERVATION))
+    acting = acting_of(VELOCITY)
+    rules = Rules(acting, False, np.zeros(0, np.int64), paying, observing_of(OBSERVATION))
     return _Given(pool.arrays, new_missions(pool, 1, 1), rules)
 
 

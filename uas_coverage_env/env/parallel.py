@@ -14,13 +14,14 @@ from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.express import action_of
 from uas_coverage_env.env.memory import REWARD, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import FLYING, Command, SwarmState
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
@@ -51,6 +52,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         waypoint, `Discrete(13)`: which of the 12 nearest open waypoints to fly to, in the order of
         the observation, or home (12). `infos[agent]["action_mask"]` is 1 for choices that exist;
         another choice keeps the former target or, where there is none, the place.
+
+        An `ActionKind` of one's own: what it says.
 
         Finite numbers beyond ±1 are clipped. An action that is NaN, infinite, of a wrong type or
         shape, missing, or for an agent that does not fly raises a ValueError and changes nothing.
@@ -260,6 +263,28 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     def swarm_state(self) -> SwarmState:
         """What a planner sees now, in arrays of its own: its commands can be learned from."""
         return self._episode.swarm_state()
+
+    def action_of(self, agent: str, command: Command, *, clip: bool = False) -> Any:
+        """The action that flies a planner's command in the coming step, for imitation.
+
+        Args:
+            agent: One that flies.
+            command: What a planner gives it. With actions that do not go to places, a GoTo is the
+                velocity that guidance flies now.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            Of `action_space`; exact but for the rounding to float32.
+
+        Raises:
+            ValueError: No action of this kind flies the command; says why.
+        """
+        episode = self._episode
+        return action_of(episode.actions, episode.moment(), agent, command, clip)
+
+    def actions_of(self, commands: Mapping[str, Command], *, clip: bool = False) -> dict[str, Any]:
+        """The actions that fly a planner's commands, see `action_of`: `env.step(actions)`."""
+        return {agent: self.action_of(agent, each, clip=clip) for agent, each in commands.items()}
 
     def state(self) -> NDArray[np.float32]:
         """The whole mission as one vector of `state_space`."""

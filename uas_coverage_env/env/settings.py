@@ -7,7 +7,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import ACTION_NAMES
+from uas_coverage_env.env.actions import ActionKind
+from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
 from uas_coverage_env.scenario import Scenario
@@ -21,7 +22,7 @@ class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
 
     Attributes:
-        action: "velocity", "acceleration", "wrench" or "waypoint".
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world takes a UAS home in time, whatever it is asked for.
         safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
@@ -34,7 +35,7 @@ class MissionSettings:
         ValueError: A value is none of what is allowed; says what is.
     """
 
-    action: str = "velocity"
+    action: str | ActionKind = "velocity"
     dynamics: Dynamics = "lpv"
     return_mode: bool = False
     safety_filter: bool = False
@@ -44,8 +45,7 @@ class MissionSettings:
     reward: tuple[RewardTerm, ...] = REWARD
 
     def __post_init__(self) -> None:
-        if self.action not in ACTION_NAMES:
-            raise ValueError(f"action is {self.action!r}; it is one of {', '.join(ACTION_NAMES)}")
+        kind_of(self.action)
         if self.dynamics not in get_args(Dynamics):
             allowed = ", ".join(get_args(Dynamics))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
@@ -91,9 +91,14 @@ class MissionSettings:
         return sum(block.size for block in self.observation)
 
     @property
+    def kind(self) -> ActionKind:
+        """The kind of action."""
+        return kind_of(self.action)
+
+    @property
     def chooses(self) -> bool:
-        """Whether the action is a choice of waypoints."""
-        return self.action == "waypoint"
+        """Whether the action is a choice."""
+        return self.kind.choices > 0
 
     def limited(self, scenario: Scenario) -> Scenario:
         """The scenario with this time limit; return mode and the observed time know it."""

@@ -1,5 +1,6 @@
 """The single-agent environment: one agent flies the whole swarm (Gymnasium)."""
 
+from collections.abc import Mapping
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.express import joint_action_of
 from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import FLYING, Command, SwarmState
 
 
 @with_tables
@@ -144,14 +146,30 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """What a planner sees now, in arrays of its own: its commands can be learned from."""
         return self._episode.swarm_state()
 
+    def actions_of(self, commands: Mapping[str, Command], *, clip: bool = False) -> NDArray[Any]:
+        """The action that flies a planner's commands in the coming step, for imitation.
+
+        Args:
+            commands: One for each UAS that flies, see `CoverageParallelEnv.action_of`.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            Of `action_space`; zero for UAS that do not fly.
+
+        Raises:
+            ValueError: No action of this kind flies a command, or one that flies has none.
+        """
+        episode = self._episode
+        return joint_action_of(episode.actions, episode.moment(), commands, clip).ravel()
+
     def action_masks(self) -> NDArray[np.bool_]:
         """The choices that exist now, of all UAS one after the other (sb3-contrib's MaskablePPO).
 
         Raises:
-            ValueError: The action is not "waypoint".
+            ValueError: The action is no choice.
         """
         if not self._episode.chooses:
-            raise ValueError('only action="waypoint" has masks; the others are continuous')
+            raise ValueError("only actions that are choices have masks; this one is continuous")
         masks = [self._episode.action_mask(i) for i in range(len(self._episode.names))]
         return np.concatenate(masks).astype(np.bool_)
 

@@ -66,9 +66,8 @@ class VelocityPilot:
         self._observer = Observer(brief)
         self._patience = Patience(len(brief.uas), len(brief.waypoints), brief.dt_s)
         ranges = actions_of("velocity", brief.as_scenario()).ranges
-        self._middle = ranges["middle"][:, :OUTPUTS]
-        self._below = self._middle - ranges["lowest"][:, :OUTPUTS]
-        self._above = ranges["highest"][:, :OUTPUTS] - self._middle
+        lowest, self._middle, highest = np.moveaxis(ranges, 2, 0)
+        self._below, self._above = self._middle - lowest, highest - self._middle
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """The mean action of the policy, scaled to the vehicle as the environment does."""
