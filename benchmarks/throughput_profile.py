@@ -76,7 +76,7 @@ def _whole(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _world(arena, state, tables, view, rules, spare, row):
-    advance(arena, state, view.commands, False, NOBODY, view.outcome)
+    advance(arena, state, view.commands, False, NOBODY, None, view.outcome)
 
 
 @compiled

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import Constant, machine_code
+from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.actions import HOME_CHOICE, as_array
 from uas_coverage_env.env.batch_kernel import (
     DISABLED,
@@ -19,7 +21,6 @@ from uas_coverage_env.env.batch_kernel import (
     NEXT_STEP,
     REST,
     SAME_STEP,
-    SEEDS,
     BatchRules,
     Lanes,
     new_missions,
@@ -315,7 +316,8 @@ class CoverageBatch:
         paying = paying_of(settings.reward, settings.weights)
         observing = observing_of(settings.observation)
         nonlinear = settings.dynamics == "nonlinear"
-        rules = Rules(self.actions.kind, nonlinear, called, paying, observing)
+        pushed = disturbance_code(self.pool.disturbances)
+        rules = Rules(self.actions.kind, nonlinear, called, pushed, paying, observing)
         return BatchRules(rules, self.autoreset)
 
     def _chosen(self, scenarios: Any) -> NDArray[np.int64]:

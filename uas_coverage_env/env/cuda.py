@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
+from uas_coverage_env.disturbances.act import runs_on_gpu
 from uas_coverage_env.env.actions import first_not_finite, write_commands
 from uas_coverage_env.env.kernel import ACCEPTED, finish_step
 from uas_coverage_env.env.memory import (
@@ -109,7 +110,7 @@ def step_mission(pool, paying, observing, missions, kind, nonlinear, lane):
         scratch.commands,
     )  # fmt: skip
     begin_step(state, scratch.commands, scratch.outcome)
-    carry_out(arena, state, nonlinear, scratch.outcome)
+    carry_out(arena, state, nonlinear, None, scratch.outcome)
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
@@ -176,6 +177,11 @@ class CudaMissions:
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
         pool = ScenarioPool(scenario, given)
+        for disturbance in pool.disturbances:
+            if not runs_on_gpu(disturbance):
+                raise ValueError(
+                    f"disturbance {disturbance.name} does not run on a GPU; constant_wind does"
+                )
         paying = paying_of(DEFAULT_REWARD, given.weights)
         observing = observing_of(OBSERVATION)
         n_uas = pool.sizes["U"]

@@ -37,6 +37,8 @@ class Rules(NamedTuple):
     """Whether the 6-DOF plant is flown."""
     assistants: Any
     """Which help to fly, see `world.advance`."""
+    disturbances: Any
+    """What pushes back, likewise."""
     paying: Paying
     observing: Observing
 
@@ -87,7 +89,10 @@ def step_learners(arena, state, tables, learners, scratch, rules, observation):
         state, rules.kind, tables.ranges, learners.asked, learners.candidates, learners.targets,
         scratch.commands,
     )  # fmt: skip
-    advance(arena, state, scratch.commands, rules.nonlinear, rules.assistants, scratch.outcome)
+    advance(
+        arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.disturbances,
+        scratch.outcome,
+    )  # fmt: skip
     finish_step(
         arena, state, tables, learners, scratch, rules.paying, rules.observing, observation, None
     )
@@ -104,8 +109,8 @@ def step_episode(at, kind, nonlinear, before, observation):
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
 
     Args:
-        at: Where the arrays of `EPISODE` lie, then the assistants: to hand over every array would
-            take longer than the flight of a UAS.
+        at: Where the arrays of `EPISODE` lie, then the disturbances, then the assistants: to hand
+            over every array would take longer than the flight of a UAS.
         kind: See `Rules`, also the next.
         nonlinear: Whether.
         before: (U, V) float32, the observation of the step before.
@@ -122,7 +127,10 @@ def step_episode(at, kind, nonlinear, before, observation):
         if state.status[i] != FLYING:
             for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
-    assistants = part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
-    rules = Rules(kind, nonlinear, assistants, paying, observing)
+    n_disturbances = arena.disturbances.shape[0]
+    disturbances = part(at, _N_NUMBERS, n_disturbances)
+    first = _N_NUMBERS + n_disturbances
+    assistants = part(at, first, at.shape[0] - first)
+    rules = Rules(kind, nonlinear, assistants, disturbances, paying, observing)
     step_learners(arena, state, tables, learners, scratch, rules, observation)
     return ACCEPTED

@@ -159,7 +159,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`; the mission itself holds nothing random.
+            seed: Seeds `np_random` and what disturbances draw, in this mission and those after it;
+                without disturbances the mission holds nothing random.
             options: None are known; they are ignored.
 
         Returns:
@@ -168,7 +169,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         if seed is not None:
             self.np_random, self.np_random_seed = seeding.np_random(seed)
         episode = self._episode
-        episode.reset()
+        episode.reset(seed)
         self.agents = list(self.possible_agents)
         self._begun = True
         if self.render_mode is not None:

@@ -13,6 +13,7 @@ from uas_coverage_env.scenario.model import (
     ScheduledVelocity,
     Uas,
     Waypoint,
+    Wind,
 )
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "ScheduledVelocity",
     "Uas",
     "Waypoint",
+    "Wind",
     "draw_scenario",
     "generate_scenario",
     "load_scenario",

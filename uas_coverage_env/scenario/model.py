@@ -15,9 +15,11 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    SerializerFunctionWrapHandler,
     Strict,
     ValidationInfo,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -229,6 +231,21 @@ class Decoration(StrictModel):
     polygon_m: Outline_m
 
 
+class Wind(StrictModel):
+    """Wind that is the same everywhere and at all times; no planner is told of it.
+
+    Attributes:
+        mean_mps: Horizontal speed of the air [m/s].
+        from_deg: Where it comes from, clockwise from north [degrees]: 270 is a west wind, which
+            blows towards the east.
+        up_mps: Vertical speed of the air, positive upward [m/s].
+    """
+
+    mean_mps: Annotated[float, Field(ge=0.0, le=60.0)]
+    from_deg: Annotated[float, Field(ge=0.0, le=360.0)]
+    up_mps: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
+
+
 class Scenario(StrictModel):
     """A mission, complete and checked; immutable, hashable, the same for all players.
 
@@ -246,6 +263,7 @@ class Scenario(StrictModel):
         uas: The fleet.
         waypoints: What is to be covered.
         decorations: Drawn only.
+        wind: Wind; without it, the air is still.
     """
 
     schema_version: int = Field(alias="schema", ge=1, le=1)
@@ -261,6 +279,15 @@ class Scenario(StrictModel):
     uas: Annotated[tuple[Uas, ...], Strict(False), Field(min_length=1)]
     waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
     decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
+    wind: Wind | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # files, and what is computed from their content, are those of scenarios before the table
+        data = serialise(self)
+        if self.wind is None:
+            del data["wind"]
+        return data
 
     def __getstate__(self) -> dict[Any, Any]:
         # unlike the rest of what is computed: where the copy goes their files may be others

@@ -15,9 +15,10 @@ from uas_coverage_env.scenario.model import (
     ScheduledVelocity,
     Uas,
     Waypoint,
+    Wind,
 )
 
-_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration)
+_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration, Wind)
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
