@@ -22,7 +22,10 @@ BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
 HIGH = ((100.0, 100.0, -25.0),)
 
 
-def flown(world, steps, command=Wrench(0.0, 0.0, 0.0, 0.0)):
+LEVEL = Wrench(0.0, 0.0, 0.0, 0.0)
+
+
+def flown(world, steps, command=LEVEL):
     """States after each step."""
     states = []
     for _ in range(steps):
@@ -108,9 +111,8 @@ def test_standing_in_wind_takes_what_flying_through_still_air_takes(dynamics):
     in_still_air = World(meadow(HIGH), dynamics=dynamics)
     at_rest = World(meadow(HIGH), dynamics=dynamics)
     in_still_air.state.x[0, VX] = 6.0
-    stand = Wrench(0.0, 0.0, 0.0, 0.0)
     there, here, rest = (
-        world.step({"uas_1": stand})[0] for world in (in_wind, in_still_air, at_rest)
+        world.step({"uas_1": LEVEL})[0] for world in (in_wind, in_still_air, at_rest)
     )
     assert there["current_A"] == pytest.approx(here["current_A"], rel=1e-12)
     assert there["voltage_V"] == pytest.approx(here["voltage_V"], rel=1e-12)
@@ -144,17 +146,17 @@ def test_disturbances_add_up():
 def test_inputs_that_are_changed_are_flown_and_kept_within_the_limits(dynamics):
     starts = ((60.0, 60.0, -25.0), (140.0, 140.0, -25.0))
     world = World(meadow(starts), dynamics=dynamics, disturbances=(weak_rotors(0.1),), seed=4)
-    outcome = world.step(dict.fromkeys(world.active, Wrench(0.0, 0.0, 0.0, 0.0)))
+    outcome = world.step(dict.fromkeys(world.active, LEVEL))
     weight_N = world.arena.vehicles["weight_N"]
     lost = -outcome["u"][:, LIFT] / weight_N
     assert (lost > 0.0).all()
     assert (lost < 0.1).all()
     assert lost[0] != lost[1]
     assert (world.state.x[:, VZ] > 0.0).all()
-    again = world.step(dict.fromkeys(world.active, Wrench(0.0, 0.0, 0.0, 0.0)))
+    again = world.step(dict.fromkeys(world.active, LEVEL))
     assert again["u"][:, LIFT].tolist() == outcome["u"][:, LIFT].tolist()
     strong = World(meadow(starts), dynamics=dynamics, disturbances=(weak_rotors(-100.0),))
-    lifted = strong.step(dict.fromkeys(strong.active, Wrench(0.0, 0.0, 0.0, 0.0)))
+    lifted = strong.step(dict.fromkeys(strong.active, LEVEL))
     assert lifted["u"][:, LIFT].tolist() == strong.arena.vehicles["lift_max_N"].tolist()
     assert not lifted["u"][:, TAU_X].any()
 
@@ -177,7 +179,7 @@ def test_gusts_have_the_spread_and_the_memory_that_they_are_made_with():
     wind_mps = []
     for _ in range(4000):
         world.state.x[:] = world._start.x
-        wind_mps.append(world.step({"uas_1": Wrench(0.0, 0.0, 0.0, 0.0)})[0]["wind_mps"].copy())
+        wind_mps.append(world.step({"uas_1": LEVEL})[0]["wind_mps"].copy())
     wind_mps = np.array(wind_mps)[50:]
     np.testing.assert_allclose(wind_mps.std(axis=0), 2.0, rtol=0.15)
     assert (abs(wind_mps.mean(axis=0)) < 0.4).all()
@@ -189,7 +191,7 @@ def test_each_uas_draws_its_own_numbers_unless_they_are_common():
     starts = ((60.0, 60.0, -25.0), (140.0, 140.0, -25.0))
     for common in (False, True):
         world = World(meadow(starts), disturbances=(gusts(common=common),))
-        outcome = world.step(dict.fromkeys(world.active, Wrench(0.0, 0.0, 0.0, 0.0)))
+        outcome = world.step(dict.fromkeys(world.active, LEVEL))
         assert (outcome[0]["wind_mps"] == outcome[1]["wind_mps"]).all() == common
 
 
@@ -218,7 +220,7 @@ def test_a_speed_over_ground_that_wind_adds_is_judged_with_the_tolerance_of_dist
             world = World(meadow(HIGH), disturbances=disturbances)
             still_left = world.arena.vehicles["axis_A"][0, 1, 1]
             world.state.x[0, VX] = share * limit_mps / still_left
-            masks.append(world.step({"uas_1": Wrench(0.0, 0.0, 0.0, 0.0)})[0]["limits_exceeded"])
+            masks.append(world.step({"uas_1": LEVEL})[0]["limits_exceeded"])
         assert masks[0] & 1
         assert bool(masks[1] & 1) == exceeds
 

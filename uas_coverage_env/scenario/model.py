@@ -26,6 +26,7 @@ from pydantic import (
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario.checks import first_of, problems
+from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
 
@@ -264,6 +265,8 @@ class Scenario(StrictModel):
         waypoints: What is to be covered.
         decorations: Drawn only.
         wind: Wind; without it, the air is still.
+        disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
+            are those of the package that installed NAME.
     """
 
     schema_version: int = Field(alias="schema", ge=1, le=1)
@@ -280,13 +283,15 @@ class Scenario(StrictModel):
     waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
     decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
     wind: Wind | None = None
+    disturbances: DisturbanceTables = ()
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # files, and what is computed from their content, are those of scenarios before the table
         data = serialise(self)
-        if self.wind is None:
-            del data["wind"]
+        for name in ("wind", "disturbances"):
+            if not getattr(self, name):
+                data.pop(name, None)
         return data
 
     def __getstate__(self) -> dict[Any, Any]:
