@@ -3,6 +3,7 @@
 import pickle
 
 import gymnasium
+import numba
 import numpy as np
 import pytest
 from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
@@ -162,16 +163,20 @@ def test_the_settings_decide_over_the_scenario():
 def test_numbers_that_are_not_finite_end_a_step_with_a_line():
     action = np.zeros((2, 2, 3))
     env = uas_coverage_v0.parallel_env(GROUND, disturbances=(NOT_FINITE,))
-    batch = CoverageBatch(2, GROUND, disturbances=(NOT_FINITE,))
-    env.reset()
-    batch.reset()
-    for _ in range(3):
-        env.step(dict(zip(env.agents, action[0], strict=True)))
-        batch.step(action)
-    for step in (
+    batch, threaded = (
+        CoverageBatch(2, GROUND, disturbances=(NOT_FINITE,), threads=threads)
+        for threads in (1, min(2, numba.get_num_threads()))
+    )
+    steps = (
         lambda: env.step(dict(zip(env.agents, action[0], strict=True))),
         lambda: batch.step(action),
-    ):
+        lambda: threaded.step(action),
+    )
+    for reset in (env.reset, batch.reset, threaded.reset):
+        reset()
+    for step in steps:
+        for _ in range(3):
+            step()
         with pytest.raises(ValueError, match="not finite; correct their kernels"):
             step()
 
@@ -187,3 +192,14 @@ def test_what_does_not_fit_is_refused():
     for case, match in cases:
         with pytest.raises(ValueError, match=match):
             case()
+
+
+def test_threads_draw_what_one_thread_draws():
+    threads = min(2, numba.get_num_threads())
+    batches = [CoverageBatch(5, GROUND, disturbances=OWN, threads=n) for n in (1, threads)]
+    for batch in batches:
+        batch.reset(1)
+    actions = np.full((5, 2, 3), 0.1)
+    for _ in range(15):
+        one, many = (batch.step(actions) for batch in batches)
+        np.testing.assert_array_equal(one, many)

@@ -304,8 +304,13 @@ class CoverageBatch:
         else:
             threads = numba.get_num_threads()
             numba.set_num_threads(self._threads)
-            refused = self._kernel(*given)
-            numba.set_num_threads(threads)
+            try:
+                refused = self._kernel(*given)
+            except SystemError as error:
+                # what a kernel raises in a parallel loop comes wrapped
+                raise error.__cause__ or error from None
+            finally:
+                numba.set_num_threads(threads)
         if refused == ACCEPTED:
             self._observations = free, before
         return refused
