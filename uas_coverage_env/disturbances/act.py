@@ -1,4 +1,8 @@
-"""Disturbances in a step: their kernels are called at their addresses, and so compiled alone."""
+"""Disturbances in a step: their kernels are called at their addresses, and so compiled alone.
+
+What calls them is called at an address, too: the step of those who fly in still air stays as short
+as it was.
+"""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +24,8 @@ from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, STATE
 
 DisturbanceCode = NDArray[np.int64]
-"""Addresses of the kernels, in the order of `Arena.disturbances`; they hold for one process."""
+"""The address of what calls them all, then theirs, in the order of `Arena.disturbances`; where
+there are none, a zero. They hold for one process."""
 
 
 @cache
@@ -37,14 +42,28 @@ _SIGNATURE = Signature("arena state outcome i parameters memory random", _types)
 _act = _SIGNATURE.call
 
 
+@cache
+def _types_of_all() -> tuple[types.Type, ...]:
+    arena, state, outcome, *_ = _types()
+    return arena, state, types.Array(types.int64, 1, "C"), outcome
+
+
+_ALL = Signature("arena state disturbances outcome", _types_of_all)
+_act_all = _ALL.call
+
+
 def disturbance_code(disturbances: Sequence[Disturbance]) -> DisturbanceCode:
     """Compile the kernels, or load them from the cache.
 
     Raises:
         ValueError: One cannot be compiled.
     """
-    addresses = [_SIGNATURE.address_of(disturbance.act) for disturbance in disturbances]
-    return np.array(addresses, dtype=np.int64)
+    code = np.zeros(1 + len(disturbances), dtype=np.int64)
+    if disturbances:
+        code[0] = _ALL.address_of(_disturb)
+    for d, disturbance in enumerate(disturbances):
+        code[1 + d] = _SIGNATURE.address_of(disturbance.act)
+    return code
 
 
 def runs_on_gpu(disturbance: Disturbance) -> bool:
@@ -82,6 +101,19 @@ def disturb(arena, state, disturbances, outcome):
     Raises:
         ValueError: What acts is not finite.
     """
+    if disturbances is None:
+        _act_on_all(arena, state, disturbances, outcome)
+    else:
+        _act_all(disturbances[0], arena, state, disturbances, outcome)
+
+
+@kernel
+def _disturb(arena, state, disturbances, outcome):
+    _act_on_all(arena, state, disturbances, outcome)
+
+
+@inlined_kernel
+def _act_on_all(arena, state, disturbances, outcome):
     for i in range(state.status.shape[0]):
         event = outcome[i]
         for axis in range(3):
@@ -99,7 +131,7 @@ def disturb(arena, state, disturbances, outcome):
             if disturbances is None:
                 blow(arena, state, outcome, i, parameters, memory, random)
             else:
-                _act(disturbances[d], arena, state, outcome, i, parameters, memory, random)
+                _act(disturbances[1 + d], arena, state, outcome, i, parameters, memory, random)
         total = 0.0
         for axis in range(3):
             total += abs(event.wind_mps[axis]) + abs(event.force_N[axis])

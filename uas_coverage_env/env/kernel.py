@@ -127,9 +127,9 @@ def step_episode(at, kind, nonlinear, before, observation):
         if state.status[i] != FLYING:
             for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
-    n_disturbances = arena.disturbances.shape[0]
-    disturbances = part(at, _N_NUMBERS, n_disturbances)
-    first = _N_NUMBERS + n_disturbances
+    n_called = 1 + arena.disturbances.shape[0]
+    disturbances = part(at, _N_NUMBERS, n_called)
+    first = _N_NUMBERS + n_called
     assistants = part(at, first, at.shape[0] - first)
     rules = Rules(kind, nonlinear, assistants, disturbances, paying, observing)
     step_learners(arena, state, tables, learners, scratch, rules, observation)
