@@ -78,8 +78,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         with the safety filter.
 
     Starting State:
-        All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
-        random: the seed seeds `np_random` alone, and equal actions make equal missions.
+        All UAS at rest at their starts, with the charge that the scenario gives them. Without
+        disturbances nothing is random: the seed seeds `np_random` alone, and equal actions make
+        equal missions. What disturbances draw depends on the seed and on the number of the mission
+        since.
 
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
