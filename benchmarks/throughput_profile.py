@@ -220,7 +220,7 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
     fleet = batch.worlds.status.shape
     paying = paying_of(REWARD, np.ones(len(REWARD)))
-    rules = Rules(VELOCITY, False, NOBODY, paying, observing_of(OBSERVATION))
+    rules = Rules(VELOCITY, False, NOBODY, None, paying, observing_of(OBSERVATION))
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,
         np.zeros(fleet, COMMAND_DTYPE), np.zeros(fleet, OUTCOME_DTYPE),

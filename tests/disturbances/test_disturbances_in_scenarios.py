@@ -11,6 +11,7 @@ from pydantic import Field
 from small_worlds import meadow
 
 from uas_coverage_env import MissionBrief, World, load_scenario, rollout
+from uas_coverage_env.cli.app import main
 from uas_coverage_env.disturbances import disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
@@ -160,3 +161,13 @@ def test_the_seed_of_a_rollout_is_that_of_what_disturbances_draw():
     np.testing.assert_array_equal(flights[0].x, flights[1].x)
     assert (flights[0].x != flights[2].x).any()
     assert flights[0].disturbances == ("gusts",)
+
+
+def test_the_check_of_a_scenario_says_what_disturbs(installed, file_with, tmp_path, capsys):
+    picture = str(tmp_path / "drawn.png")
+    assert main(["scenarios", "check", str(file_with(*WIND, *GUSTS)), "--picture", picture]) == 0
+    told = capsys.readouterr().out
+    assert "disturbed  wind of 4 m/s from 270 degrees\n" in told
+    assert "disturbed  gusts\n" in told
+    assert main(["scenarios", "check", "village", "--picture", f"{picture}.png"]) == 0
+    assert "disturbed" not in capsys.readouterr().out
