@@ -134,6 +134,7 @@ def scenario_fields() -> str:
     schema = scenario_schema()
     tables = [("The file", schema)]
     for name, entry in schema["properties"].items():
+        entry = entry.get("anyOf", [entry])[0]  # or null: it may be left out
         reference = entry.get("items", entry).get("$ref", "").rpartition("/")[2]
         if reference:
             title = f"`[[{name}]]`" if "items" in entry else f"`[{name}]`"
@@ -167,6 +168,8 @@ def _type(entry: dict[str, Any]) -> str:
         least = f", at least {entry['minItems']}" if "minItems" in entry else ""
         of = "tables" if "$ref" in entry["items"] else f"entries of {_type(entry['items'])}"
         return f"{of}{least}"
+    if entry["type"] == "object":
+        return "tables by name"
     word = {"number": "number", "integer": "whole number", "string": "text"}[entry["type"]]
     limits = [f"{sign} {entry[key]:g}" for key, sign in _LIMITS.items() if key in entry]
     return ", ".join([word, *limits])

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import Constant, machine_code
+from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
@@ -20,7 +22,6 @@ from uas_coverage_env.env.batch_kernel import (
     NEXT_STEP,
     REST,
     SAME_STEP,
-    SEEDS,
     BatchRules,
     Lanes,
     new_missions,
@@ -338,8 +339,13 @@ class CoverageBatch:
         else:
             threads = numba.get_num_threads()
             numba.set_num_threads(self._threads)
-            refused = self._kernel(*given)
-            numba.set_num_threads(threads)
+            try:
+                refused = self._kernel(*given)
+            except SystemError as error:
+                # what a kernel raises in a parallel loop comes wrapped
+                raise error.__cause__ or error from None
+            finally:
+                numba.set_num_threads(threads)
         if refused == ACCEPTED:
             self._observations = free, before
         return refused
@@ -351,7 +357,8 @@ class CoverageBatch:
         paying = paying_of(settings.reward, settings.weights)
         observing = observing_of(settings.observation)
         nonlinear = settings.dynamics == "nonlinear"
-        rules = Rules(acting_of(kind), nonlinear, called, paying, observing)
+        pushed = disturbance_code(self.pool.disturbances)
+        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, observing)
         return BatchRules(rules, self.autoreset)
 
     def _chosen(self, scenarios: Any) -> NDArray[np.int64]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
+from uas_coverage_env.disturbances.act import runs_on_gpu
 from uas_coverage_env.env.act import (
     acting_of,
     begin_command,
@@ -113,7 +114,7 @@ def step_mission(pool, acting, paying, observing, missions, nonlinear, lane):
     max_steps = arena.rules[0].max_steps
     write_commands(arena, state, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
-    carry_out(arena, state, nonlinear, scratch.outcome)
+    carry_out(arena, state, nonlinear, None, scratch.outcome)
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
@@ -211,6 +212,11 @@ class CudaMissions:
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
         pool = ScenarioPool(scenario, given)
+        for disturbance in pool.disturbances:
+            if not runs_on_gpu(disturbance):
+                raise ValueError(
+                    f"disturbance {disturbance.name} does not run on a GPU; constant_wind does"
+                )
         acting = acting_of(given.kind, on_gpu=True)
         self._launched: Any = _own_step(given.kind.write) if is_own(acting) else _step_missions
         paying = paying_of(DEFAULT_REWARD, given.weights)

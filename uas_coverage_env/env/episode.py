@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
+from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.express import Moment
@@ -64,7 +66,10 @@ class Episode:
             return_mode=settings.return_mode,
             safety_filter=settings.safety_filter,
             measured_m=0.0,  # only what counts: nothing more is told
+            disturbances=settings.disturbances_in(scenario),
         )
+        self._seed = int(np.random.default_rng().integers(SEEDS, dtype=np.uint64))
+        self._mission = -1
         self.scenario = scenario
         self.names = self._world.names
         self.max_cycles = scenario.max_steps
@@ -103,7 +108,7 @@ class Episode:
         )  # fmt: skip
         called = assistants(world.return_mode, world.safety_filter, goes_to=kind.goes_to)
         # what the kernel is given in every step: the arrays are written in place
-        at = np.array([*addresses, *called])
+        at = np.array([*addresses, *disturbance_code(world.disturbances), *called])
         self._given = (at, world.dynamics == "nonlinear")
         seen = self.observation
         # to assign a record field by field takes ten times as long
@@ -120,9 +125,17 @@ class Episode:
         self.asked = self._learners.asked  # one array again, not two equal ones
         self._prepare()
 
-    def reset(self) -> None:
-        """Begin a new mission."""
-        self._world.reset()
+    def reset(self, seed: int | None = None) -> None:
+        """Begin a new mission.
+
+        Args:
+            seed: Of all that disturbances draw in this mission and in those after it, each of which
+                draws other numbers; None: missions go on, at first from a seed of no meaning.
+        """
+        if seed is not None:
+            self._seed, self._mission = seed % SEEDS, -1
+        self._mission += 1
+        self._world.reset(self._seed, self._mission)
         self.steps = 0
         if self._first is None:
             self._first = first_look(

@@ -37,6 +37,8 @@ class Rules(NamedTuple):
     """Whether the 6-DOF plant is flown."""
     assistants: Any
     """Which help to fly, see `world.advance`."""
+    disturbances: Any
+    """What pushes back, likewise."""
     paying: Paying
     observing: Observing
 
@@ -84,7 +86,10 @@ def step_learners(arena, state, tables, learners, scratch, rules, observation):
         observation: (U, V) float32; that of a UAS that did not fly stays.
     """
     write_commands(arena, state, tables, learners, scratch, rules.acting, None)
-    advance(arena, state, scratch.commands, rules.nonlinear, rules.assistants, scratch.outcome)
+    advance(
+        arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.disturbances,
+        scratch.outcome,
+    )  # fmt: skip
     finish_step(
         arena, state, tables, learners, scratch, rules.paying, rules.observing, observation, None
     )
@@ -101,8 +106,8 @@ def step_episode(at, nonlinear, before, observation):
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
 
     Args:
-        at: Where the arrays of `EPISODE` lie, then the assistants: to hand over every array would
-            take longer than the flight of a UAS.
+        at: Where the arrays of `EPISODE` lie, then the disturbances, then the assistants: to hand
+            over every array would take longer than the flight of a UAS.
         nonlinear: See `Rules`.
         before: (U, V) float32, the observation of the step before.
         observation: (U, V) float32, another array; written.
@@ -118,7 +123,10 @@ def step_episode(at, nonlinear, before, observation):
         if state.status[i] != FLYING:
             for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
-    assistants = part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
-    rules = Rules(acting, nonlinear, assistants, paying, observing)
+    n_called = 1 + arena.disturbances.shape[0]
+    disturbances = part(at, _N_NUMBERS, n_called)
+    first = _N_NUMBERS + n_called
+    assistants = part(at, first, at.shape[0] - first)
+    rules = Rules(acting, nonlinear, assistants, disturbances, paying, observing)
     step_learners(arena, state, tables, learners, scratch, rules, observation)
     return ACCEPTED

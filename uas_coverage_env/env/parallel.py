@@ -81,8 +81,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         with the safety filter.
 
     Starting State:
-        All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
-        random: the seed seeds `np_random` alone, and equal actions make equal missions.
+        All UAS at rest at their starts, with the charge that the scenario gives them. Without
+        disturbances nothing is random: the seed seeds `np_random` alone, and equal actions make
+        equal missions. What disturbances draw depends on the seed and on the number of the mission
+        since.
 
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
@@ -162,7 +164,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`; the mission itself holds nothing random.
+            seed: Seeds `np_random` and what disturbances draw, in this mission and those after it;
+                without disturbances the mission holds nothing random.
             options: None are known; they are ignored.
 
         Returns:
@@ -171,7 +174,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         if seed is not None:
             self.np_random, self.np_random_seed = seeding.np_random(seed)
         episode = self._episode
-        episode.reset()
+        episode.reset(seed)
         self.agents = list(self.possible_agents)
         self._begun = True
         if self.render_mode is not None:

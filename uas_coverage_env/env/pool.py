@@ -14,6 +14,7 @@ from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.disturbance import in_slots
 from uas_coverage_env.world.state import STATE
 
 
@@ -61,6 +62,7 @@ class ScenarioPool:
         sizes: The largest of every named size.
         n_uas: (S,).
         n_waypoints: (S,).
+        disturbances: One of each kind that acts in any of the scenarios.
 
     Raises:
         ValueError: There is no scenario, or one is none of what is allowed.
@@ -75,7 +77,9 @@ class ScenarioPool:
         settings = settings or MissionSettings()
         self.settings = settings
         self.scenarios = tuple(_loaded(entry, settings) for entry in given)
-        worlds = pool_worlds(self.scenarios, measured_m=0.0)  # only what counts
+        acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
+        self.disturbances, slots = in_slots(acting)
+        worlds = pool_worlds(self.scenarios, measured_m=0.0, slots=slots)  # only what counts
         actions = [actions_of(settings.action, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
         tables = [tables_of(*both) for both in zip(self.scenarios, actions, strict=True)]

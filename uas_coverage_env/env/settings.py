@@ -7,12 +7,14 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.world.disturbance import checked_disturbances
 
 _LONGEST = 100_000
 
@@ -30,6 +32,8 @@ class MissionSettings:
         max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
         observation: Blocks that the observation is made of, see `ObservationBlock`.
         reward: Terms that the reward is made of, see `RewardTerm`.
+        disturbances: What pushes back, see `Disturbance`; None: what each scenario says; with ()
+            nothing does.
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.
@@ -43,6 +47,7 @@ class MissionSettings:
     max_cycles: int | None = None
     observation: tuple[ObservationBlock, ...] = OBSERVATION
     reward: tuple[RewardTerm, ...] = REWARD
+    disturbances: tuple[Disturbance, ...] | None = None
 
     def __post_init__(self) -> None:
         kind_of(self.action)
@@ -61,6 +66,8 @@ class MissionSettings:
         object.__setattr__(self, "observation", checked_blocks(self.observation))
         object.__setattr__(self, "reward", checked_terms(self.reward))
         weights_of(self.reward, self.reward_weights)
+        if self.disturbances is not None:
+            object.__setattr__(self, "disturbances", checked_disturbances(self.disturbances))
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "MissionSettings":
@@ -99,6 +106,10 @@ class MissionSettings:
     def chooses(self) -> bool:
         """Whether the action is a choice."""
         return self.kind.choices > 0
+
+    def disturbances_in(self, scenario: Scenario) -> tuple[Disturbance, ...]:
+        """What pushes back in the missions of a scenario."""
+        return disturbances_of(scenario) if self.disturbances is None else self.disturbances
 
     def limited(self, scenario: Scenario) -> Scenario:
         """The scenario with this time limit; return mode and the observed time know it."""

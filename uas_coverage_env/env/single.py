@@ -101,11 +101,12 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`; the mission itself holds nothing random.
+            seed: Seeds `np_random` and what disturbances draw, in this mission and those after it;
+                without disturbances the mission holds nothing random.
             options: None are known; they are ignored.
         """
         super().reset(seed=seed)
-        self._episode.reset()
+        self._episode.reset(seed)
         self._begun = True
         if self.render_mode is not None:
             self._screen.begin()

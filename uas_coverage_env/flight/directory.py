@@ -109,10 +109,13 @@ def _plan_rows(flight: FlightRecord, times: Sequence[str]) -> Iterator[list[Any]
 
 def _run(flight: FlightRecord) -> dict[str, Any]:
     """How the flight came about: what no other file says, decision by decision."""
+    # in still air the file is as it was before there were disturbances
+    disturbed = {"disturbances": list(flight.disturbances)} if flight.disturbances else {}
     return {
         "dynamics": flight.dynamics,
         "return_mode": flight.return_mode,
         "safety_filter": flight.safety_filter,
+        **disturbed,
         "ended": flight.ended,
         "decisions": [dataclasses.asdict(decision) for decision in flight.decisions],
     }

@@ -93,10 +93,11 @@ class FlightRecord:
         scenario: The scenario flown.
         planner: Name of the planner.
         planner_options: Its options as plain data.
-        seed: The seed of the planner.
+        seed: The seed of the planner, and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
         return_mode: Whether the world brought UAS home in time.
         safety_filter: Whether the world kept commands clear of harm.
+        disturbances: Names of what pushed back.
         ended: `complete` (nobody flies any more), `steps` (limit of steps) or `stopped` (by hand).
         x: (T, U, 14) states, see `uas_coverage_env.vehicle.layout`.
         u: (T, U, 5) inputs, zero once landed or lost.
@@ -122,6 +123,7 @@ class FlightRecord:
     dynamics: str
     return_mode: bool
     safety_filter: bool
+    disturbances: tuple[str, ...]
     ended: str
     x: NDArray[np.float64]
     u: NDArray[np.float64]

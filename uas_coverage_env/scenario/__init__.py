@@ -1,6 +1,7 @@
 """What a mission is: scenarios from files, from code and from a seed, checked at the door."""
 
 from uas_coverage_env.scenario.checks import warnings
+from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.family import draw_scenario
 from uas_coverage_env.scenario.fields import (
     Decoration,
@@ -10,6 +11,7 @@ from uas_coverage_env.scenario.fields import (
     ScheduledVelocity,
     Uas,
     Waypoint,
+    Wind,
 )
 from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
@@ -17,6 +19,7 @@ from uas_coverage_env.scenario.model import Scenario
 
 __all__ = [
     "Decoration",
+    "DisturbanceTable",
     "Geofence",
     "MovingObstacle",
     "Obstacle",
@@ -24,6 +27,7 @@ __all__ = [
     "ScheduledVelocity",
     "Uas",
     "Waypoint",
+    "Wind",
     "draw_scenario",
     "generate_scenario",
     "load_scenario",

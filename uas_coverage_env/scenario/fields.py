@@ -14,13 +14,16 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    SerializerFunctionWrapHandler,
     Strict,
     ValidationInfo,
     field_validator,
+    model_serializer,
 )
 
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
 
 _NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
@@ -225,6 +228,21 @@ class Decoration(StrictModel):
     polygon_m: Outline_m
 
 
+class Wind(StrictModel):
+    """Wind that is the same everywhere and at all times; no planner is told of it.
+
+    Attributes:
+        mean_mps: Horizontal speed of the air [m/s].
+        from_deg: Where it comes from, clockwise from north [degrees]: 270 is a west wind, which
+            blows towards the east.
+        up_mps: Vertical speed of the air, positive upward [m/s].
+    """
+
+    mean_mps: Annotated[float, Field(ge=0.0, le=60.0)]
+    from_deg: Annotated[float, Field(ge=0.0, le=360.0)]
+    up_mps: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
+
+
 class UncheckedScenario(StrictModel):
     """The fields of a `Scenario`, each allowed by itself; what checks and estimates read."""
 
@@ -241,6 +259,17 @@ class UncheckedScenario(StrictModel):
     uas: Annotated[tuple[Uas, ...], Strict(False), Field(min_length=1)]
     waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
     decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
+    wind: Wind | None = None
+    disturbances: DisturbanceTables = ()
+
+    @model_serializer(mode="wrap")
+    def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # files, and what is computed from their content, are those of scenarios before the table
+        data = serialise(self)
+        for name in ("wind", "disturbances"):
+            if not getattr(self, name):
+                data.pop(name, None)
+        return data
 
     @cached_property
     def fence(self) -> ConvexPolytope:

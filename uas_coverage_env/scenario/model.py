@@ -30,6 +30,9 @@ class Scenario(UncheckedScenario):
         uas: The fleet.
         waypoints: What is to be covered.
         decorations: Drawn only.
+        wind: Wind; without it, the air is still.
+        disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
+            are those of the package that installed NAME.
     """
 
     def __getstate__(self) -> dict[Any, Any]:

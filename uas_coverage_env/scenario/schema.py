@@ -14,10 +14,11 @@ from uas_coverage_env.scenario.fields import (
     ScheduledVelocity,
     Uas,
     Waypoint,
+    Wind,
 )
 from uas_coverage_env.scenario.model import Scenario
 
-_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration)
+_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration, Wind)
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 

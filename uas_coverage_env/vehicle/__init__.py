@@ -1,5 +1,6 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
+from uas_coverage_env.vehicle.air import enter_air, leave_air
 from uas_coverage_env.vehicle.battery import (
     battery_current_A,
     battery_segments,
@@ -104,10 +105,12 @@ __all__ = [
     "delta_thrust",
     "dod_per_s",
     "endurance",
+    "enter_air",
     "exact_delta_thrust",
     "fit_thrust_correction",
     "flight_time_s",
     "fly_kinematics",
+    "leave_air",
     "limit_names",
     "limits_exceeded",
     "linear_model",

@@ -61,6 +61,9 @@ NONLINEAR_TOLERANCE = 0.15
 """The same in the nonlinear plant, where a step does not end where the linear model says: the inner
 loop overshoots the speed by up to 9 % at steps of 1 s and by up to 12 % at 2 s."""
 
+DISTURBED_TOLERANCE = 0.15
+"""The same in both models where disturbances act, of which the inner loop knows nothing."""
+
 
 def bounds_of(vehicle: VehicleParams) -> NDArray[np.float64]:
     """(N_LIMITS,) the bound of each limit, in its unit."""
@@ -106,7 +109,7 @@ def write_limited(x, voltage_V, current_A, nonlinear, values):
 
 
 @kernel
-def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear):
+def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear, disturbed):
     """The limits exceeded by more than the tolerance, as a mask: bit k for LIMITS[k].
 
     Args:
@@ -114,11 +117,16 @@ def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear):
         x: See `write_limited`, also the next three.
         voltage_V: [V].
         current_A: [A].
-        nonlinear: Which tolerance holds.
+        nonlinear: See `write_limited`; it has a tolerance of its own.
+        disturbed: Whether disturbances act; likewise.
     """
     values = room(N_LIMITS)
     write_limited(x, voltage_V, current_A, nonlinear, values)
-    tolerance = NONLINEAR_TOLERANCE if nonlinear else LPV_TOLERANCE
+    tolerance = LPV_TOLERANCE
+    if nonlinear:
+        tolerance = NONLINEAR_TOLERANCE
+    if disturbed:
+        tolerance = max(tolerance, DISTURBED_TOLERANCE)
     more = 1.0 + tolerance
     mask = 0
     for k in range(_VOLTAGE):

@@ -103,7 +103,7 @@ class WaypointPilot:
         self._returning = np.zeros(n_uas, dtype=np.bool_)
         self._blocked = np.zeros(n_waypoints, dtype=np.bool_)
         self._desk = Desk(
-            state=STATE.zeros({"U": n_uas, "W": n_waypoints}),
+            state=STATE.zeros({"U": n_uas, "W": n_waypoints, "D": 0}),
             commands=np.zeros(n_uas, dtype=COMMAND_DTYPE),
             outcome=np.zeros(n_uas, dtype=OUTCOME_DTYPE),
             choices=Choices(

@@ -147,7 +147,7 @@ def fly_on(
         if i != NOBODY:
             return i
         write_commands(state, targets, commands)
-        advance(arena, state, commands, False, assistants, outcome)
+        advance(arena, state, commands, False, assistants, None, outcome)
         account[TIME] += arena.rules[0].dt_s
         for j in range(targets.shape[0]):
             account[ENERGY] += outcome[j].energy_Wh
