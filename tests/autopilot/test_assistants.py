@@ -60,7 +60,7 @@ def test_what_lies_at_the_addresses_does_what_the_functions_do():
         call_home(arena, direct, False, expected)
         steer(arena, direct, False, expected)
         filter_commands(arena, direct, False, expected)
-        carry_out(arena, direct, False, expected)
+        carry_out(arena, direct, False, None, expected)
         assert outcome.tobytes() == expected.tobytes()
         for left, right in zip(called, direct, strict=True):
             assert np.array_equal(left, right)

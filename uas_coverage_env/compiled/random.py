@@ -7,6 +7,7 @@ aside with, and the numbers are the same wherever the mission is flown.
 import math
 
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
@@ -63,3 +64,8 @@ def normal(random: NDArray[np.uint64]) -> float:
     # 1 - u is above 0: its logarithm is finite
     radius = math.sqrt(-2.0 * math.log(1.0 - uniform(random)))
     return radius * math.cos(2.0 * math.pi * uniform(random))
+
+
+if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    # that the numbers overflow is meant; NumPy warns of it
+    mixed, counted, bits = (np.errstate(over="ignore")(each) for each in (mixed, counted, bits))
