@@ -12,12 +12,15 @@ FloatArray = NDArray[np.float64]
 
 # docs/flight_directory.md: share of a limit by which it may be exceeded
 _TOLERANCE = {"lpv": 0.01, "nonlinear": 0.15}
+_TOLERANCE_DISTURBED = 0.15
 _ROUNDING = 1e-9
 
 
 def limits_exceeded(record: FlightRecord) -> Iterator[tuple[float, str, str, str]]:
     """Limits exceeded by more than the tolerance: (first time [s], UAS, `limit`, its name)."""
     tolerance = _TOLERANCE[record.dynamics]
+    if record.disturbed:
+        tolerance = max(tolerance, _TOLERANCE_DISTURBED)
     for track in record.tracks:
         flown = _shares(track, record.dynamics == "nonlinear")
         for name, share in flown.items():

@@ -90,6 +90,7 @@ class FlightRecord:
         moving_m: (T, M, 3) [m] centres of the moving obstacles at every sample.
         plan: (step, UAS) -> (n, 3) [m] positions predicted at that step.
         dynamics: `lpv` or `nonlinear`.
+        disturbed: Whether `run.json` names disturbances.
     """
 
     scenario: dict[str, Any]
@@ -98,6 +99,7 @@ class FlightRecord:
     moving_m: FloatArray
     plan: dict[tuple[int, str], FloatArray]
     dynamics: str
+    disturbed: bool
 
     @property
     def dt_s(self) -> float:
@@ -122,7 +124,8 @@ def read_record(directory: Path) -> FlightRecord:
         name = "summary.json"
         summary = json.loads((directory / name).read_text(encoding="utf-8"))
         name = "run.json"
-        dynamics = json.loads((directory / name).read_text(encoding="utf-8"))["dynamics"]
+        run = json.loads((directory / name).read_text(encoding="utf-8"))
+        dynamics, disturbed = run["dynamics"], bool(run.get("disturbances"))
         vehicles = []
         for uas in scenario["uas"]:
             # shipped ones by their names, a user's own by the file beside the scenario
@@ -142,7 +145,7 @@ def read_record(directory: Path) -> FlightRecord:
         reason = " ".join(str(error).split())
         kind = type(error).__name__
         raise BadFlightError(f"{directory / name}: was damaged ({kind}: {reason})") from error
-    return FlightRecord(scenario, summary, tracks, moving_m, plan, dynamics)
+    return FlightRecord(scenario, summary, tracks, moving_m, plan, dynamics, disturbed)
 
 
 def _rows(path: Path) -> list[dict[str, str]]:

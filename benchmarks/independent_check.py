@@ -256,7 +256,8 @@ def _motion_gap_m(track: Track, dt_s: float, landing_speed_mps: float) -> FloatA
     """(steps,) how much farther each step is from its velocities than a vehicle explains [m].
 
     Position over a step is the mean velocity, corrected by the change of acceleration, which the
-    tilt gives up to the drag; a landed UAS's row holds no velocity and no tilt any more.
+    tilt gives up to the drag; a landed UAS's row holds no velocity and no tilt any more. Wind and
+    forces of disturbances are held over a step: they change the acceleration at samples only.
     """
     v, tilt = track.velocity_mps, np.zeros((len(track.modes), 3))
     tilt[:, 0], tilt[:, 1] = -track.columns["theta_rad"], track.columns["phi_rad"]
@@ -328,7 +329,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         *("--plan-tolerance-m", "-p"),
         type=float,
         default=PLAN_TOLERANCE_M,
-        help="how far a plan's first step may be from what was flown; more for nonlinear flights",
+        help="how far a plan's first step may be from what was flown; more for nonlinear "
+        "flights and for those with disturbances",
     )
     arguments = parser.parse_args(argv)
     clean = True

@@ -31,7 +31,9 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from uas_coverage_baselines.milp_mpc.model.energy import seconds_home as milp_seconds_home
+from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
+    seconds_home as milp_seconds_home,
+)
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
 from uas_coverage_env.autopilot import seconds_home

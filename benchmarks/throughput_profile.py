@@ -11,15 +11,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from rich.table import Table
 
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.borrow import borrow, part
+from uas_coverage_env.compiled.views import lane_view
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.actions import write_commands
+from uas_coverage_env.env.act import acting_of, write_commands
+from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.kernel import Rules, step_learners
-from uas_coverage_env.env.memory import Learners, Scratch
+from uas_coverage_env.env.memory import SCRATCH, Learners, Scratch
 from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE
 from uas_coverage_env.env.observation.block import firsts_of
 from uas_coverage_env.env.observation.moving_obstacles import write_moving_obstacles
@@ -34,7 +35,8 @@ from uas_coverage_env.env.rewards import REWARD
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.pool import arena_of, state_of
 from uas_coverage_env.vehicle import lpv_step
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, OUTCOME_DTYPE, VELOCITY
+from uas_coverage_env.world import FLYING
+from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (
     check_limits,
     count_breaches,
@@ -47,6 +49,8 @@ from uas_coverage_env.world.coverage import cover, land
 N_LANES = 256
 N_STEPS = 60
 WHOLE = "the whole step"
+
+_scratch_of = lane_view(SCRATCH, sized_by=ARENA)
 
 compiled = njit(error_model="numpy")
 
@@ -62,21 +66,17 @@ class View(NamedTuple):
     """What `step_learners` needs of one lane."""
 
     learners: Learners
-    commands: NDArray[np.void]
-    outcome: NDArray[np.void]
+    scratch: Scratch
 
 
 @compiled
 def _whole(arena, state, tables, view, rules, spare, row):
-    step_learners(
-        arena, state, tables, view.learners, Scratch(view.commands, view.outcome),
-        rules, row,
-    )  # fmt: skip
+    step_learners(arena, state, tables, view.learners, view.scratch, rules, row)
 
 
 @compiled
 def _world(arena, state, tables, view, rules, spare, row):
-    advance(arena, state, view.commands, False, NOBODY, view.outcome)
+    advance(arena, state, view.scratch.commands, False, NOBODY, None, view.scratch.outcome)
 
 
 @compiled
@@ -88,17 +88,14 @@ def _observation(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _actions(arena, state, tables, view, rules, spare, row):
-    write_commands(
-        state, VELOCITY, tables.ranges, view.learners.asked, view.learners.candidates,
-        view.learners.targets, view.commands,
-    )  # fmt: skip
+    write_commands(arena, state, tables, view.learners, view.scratch, rules.acting, None)
 
 
 @compiled
 def _inner_loop(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            command = view.commands[i]
+            command = view.scratch.commands[i]
             reference = state.reference[i]
             command_wrench(arena.vehicles[i], state.x[i], reference, command, spare)
 
@@ -107,32 +104,31 @@ def _inner_loop(arena, state, tables, view, rules, spare, row):
 def _model(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            lpv_step(arena.vehicles[i], state.x[i], view.outcome[i].u, spare)
+            lpv_step(arena.vehicles[i], state.x[i], view.scratch.outcome[i].u, spare)
 
 
 @compiled
 def _obstacles(arena, state, tables, view, rules, spare, row):
-    judge_obstacles(arena, state, view.outcome)
+    judge_obstacles(arena, state, view.scratch.outcome)
 
 
 @compiled
 def _other_contacts(arena, state, tables, view, rules, spare, row):
-    judge_separation(arena, state, view.outcome)
-    judge_fence_and_battery(arena, state, view.outcome)
-    count_breaches(arena, state, view.outcome)
-    check_limits(arena, state, False, view.outcome)
+    judge_separation(arena, state, view.scratch.outcome)
+    judge_fence_and_battery(arena, state, view.scratch.outcome)
+    count_breaches(arena, state, view.scratch.outcome)
+    check_limits(arena, state, False, view.scratch.outcome)
 
 
 @compiled
 def _coverage(arena, state, tables, view, rules, spare, row):
-    cover(arena, state, view.outcome)
-    land(arena, state, view.outcome)
+    cover(arena, state, view.scratch.outcome)
+    land(arena, state, view.scratch.outcome)
 
 
 @compiled
 def _reward(arena, state, tables, view, rules, spare, row):
-    scratch = Scratch(view.commands, view.outcome)
-    pay(arena, state, tables, view.learners, scratch, rules.paying, None)
+    pay(arena, state, tables, view.learners, view.scratch, rules.paying, None)
 
 
 @compiled
@@ -192,7 +188,7 @@ def _over_lanes(timed: Any) -> Callable[..., None]:
     timed = njit(error_model="numpy", forceinline=True)(timed.py_func)
 
     @compiled
-    def run(pool, missions, commands, outcome, rules, spare, observation):
+    def run(pool, missions, scratch, rules, spare, observation):
         arena = arena_of(pool.arenas, 0)
         tables = tables_at(pool.tables, 0)
         n_uas = arena.uas.shape[0]
@@ -201,8 +197,7 @@ def _over_lanes(timed: Any) -> Callable[..., None]:
             # views that count no references, as in the batch
             view = View(
                 learners_of(missions.learners, lane, pool.arenas, 0),
-                borrow(commands, lane, (n_uas,)),
-                borrow(outcome, lane, (n_uas,)),
+                _scratch_of(scratch, lane, pool.arenas, 0),
             )
             row = borrow(observation, lane, (n_uas, OBSERVATION_SIZE))
             timed(arena, state, tables, view, rules, spare, row)
@@ -218,13 +213,11 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     shape = batch.learners.asked.shape
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
-    fleet = batch.worlds.status.shape
     paying = paying_of(REWARD, np.ones(len(REWARD)))
-    rules = Rules(VELOCITY, False, NOBODY, paying, observing_of(OBSERVATION))
+    rules = Rules(acting_of(VELOCITY), False, NOBODY, None, paying, observing_of(OBSERVATION))
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,
-        np.zeros(fleet, COMMAND_DTYPE), np.zeros(fleet, OUTCOME_DTYPE),
-        rules, np.zeros(14), batch.observation,
+        SCRATCH.zeros(batch.pool.sizes, lanes=n_lanes), rules, np.zeros(14), batch.observation,
     )  # fmt: skip
     # once, so that there are outcomes for the parts to go on from
     _over_lanes(PARTS[WHOLE])(*arguments)

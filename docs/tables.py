@@ -19,9 +19,9 @@ from typing import Any
 
 from gymnasium import spaces
 
-import uas_coverage_env.env.actions as actions
-from uas_coverage_env import Acceleration, Velocity, Wrench, load_scenario, uas_coverage_v0
+from uas_coverage_env import load_scenario, uas_coverage_v0
 from uas_coverage_env.env import CoverageParallelEnv
+from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE, actions_of
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.settings import MissionSettings
@@ -30,7 +30,6 @@ from uas_coverage_env.scenario.schema import scenario_schema
 
 DOCS = Path(__file__).resolve().parent
 SCHEMA = DOCS / "scenario.schema.json"
-COMMANDS = {"velocity": Velocity, "acceleration": Acceleration, "wrench": Wrench}
 SCENARIO = "village"
 
 
@@ -70,29 +69,26 @@ def action_tables() -> str:
     """What each number of each kind of action means, for the shipped vehicle in the village."""
     scenario = load_scenario(SCENARIO)
     rows = []
-    for name in actions.ACTION_NAMES:
-        kind = actions.actions_of(name, scenario)
-        one, all_ = _shown(kind.space()), _shown(kind.joint_space(len(scenario.uas)))
-        rows.append((f"`{name}`", f"`{one}`", f"`{all_}`"))
+    for kind in ACTIONS:
+        actions = actions_of(kind, scenario)
+        one, all_ = _shown(actions.space()), _shown(actions.joint_space(len(scenario.uas)))
+        rows.append((f"`{kind.name}`", f"`{one}`", f"`{all_}`"))
     parts = [table(("`action`", "one UAS", "the swarm as one agent (two UAS)"), rows)]
-    for name, command in COMMANDS.items():
-        kind = actions.actions_of(name, scenario)
-        ranges = kind.ranges[0]
-        names = [field.name for field in fields(command)][: kind.size]
+    for kind in ACTIONS:
+        if kind.choices:
+            continue
+        ranges = actions_of(kind, scenario).ranges[0]
         rows = [
-            (str(k), f"`{number}`", *(f"{ranges[end][k]:.3g}" for end in _ENDS))
-            for k, number in enumerate(names)
+            (str(k), f"`{number}`", *(f"{end:.3g}" for end in ranges[k]))
+            for k, number in enumerate(kind.numbers)
         ]
-        parts += [f"**{name}**", table(("index", "number", "-1", "0", "1"), rows)]
+        parts += [f"**{kind.name}**", table(("index", "number", "-1", "0", "1"), rows)]
     choices = [
-        (f"0 … {actions.HOME_CHOICE - 1}", "that one of the nearest open waypoints, nearest first"),
-        (str(actions.HOME_CHOICE), "home"),
+        (f"0 … {HOME_CHOICE - 1}", "that one of the nearest open waypoints, nearest first"),
+        (str(HOME_CHOICE), "home"),
     ]
     parts += ["**waypoint**", table(("choice", "flies to"), choices)]
     return "\n\n".join(parts)
-
-
-_ENDS = ("lowest", "middle", "highest")
 
 
 def _shown(space: spaces.Space[Any]) -> str:
@@ -138,6 +134,7 @@ def scenario_fields() -> str:
     schema = scenario_schema()
     tables = [("The file", schema)]
     for name, entry in schema["properties"].items():
+        entry = entry.get("anyOf", [entry])[0]  # or null: it may be left out
         reference = entry.get("items", entry).get("$ref", "").rpartition("/")[2]
         if reference:
             title = f"`[[{name}]]`" if "items" in entry else f"`[{name}]`"
@@ -171,6 +168,8 @@ def _type(entry: dict[str, Any]) -> str:
         least = f", at least {entry['minItems']}" if "minItems" in entry else ""
         of = "tables" if "$ref" in entry["items"] else f"entries of {_type(entry['items'])}"
         return f"{of}{least}"
+    if entry["type"] == "object":
+        return "tables by name"
     word = {"number": "number", "integer": "whole number", "string": "text"}[entry["type"]]
     limits = [f"{sign} {entry[key]:g}" for key, sign in _LIMITS.items() if key in entry]
     return ", ".join([word, *limits])

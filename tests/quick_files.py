@@ -38,6 +38,10 @@ QUICK = {
         "test_all_interfaces_fly_the_same_missions"
     ),
     "env/test_observation.py": "",
+    "env/test_planner_actions.py": (
+        "only test_a_planner_flies_waypoint_actions_as_it_flies_by_itself_to_the_bit "
+        "test_what_a_kind_cannot_express_is_refused_with_the_reason"
+    ),
     "env/test_parallel_env.py": "",
     "env/test_rewards.py": "",
     "files/test_strict_toml.py": "",

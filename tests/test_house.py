@@ -1,5 +1,6 @@
 """What the whole repository keeps: the walls between rooms, types, form, the wheel."""
 
+import ast
 import os
 import re
 import shutil
@@ -9,8 +10,10 @@ import tomllib
 import zipfile
 from email import message_from_bytes
 from email.message import Message
+from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 from packaging.requirements import Requirement
 
@@ -21,6 +24,7 @@ PACKAGES = {
     "uas_coverage_agents": ROOT / "agents" / "uas_coverage_agents",
 }
 LONGEST_FILE = 440
+MOST_PARAMETERS = 12
 TEXT = {".py", ".md", ".toml", ".txt", ".cff", ".yaml", ".yml", ".json", ".csv", ".ipynb", ".lp"}
 
 
@@ -46,6 +50,48 @@ def test_no_room_imports_a_room_above_it():
     tool = Path(sys.executable).with_name("lint-imports")
     output = checked(str(tool), "--no-cache", PYTHONPATH=os.pathsep.join(_source_folders()))
     assert "0 broken" in output
+
+
+def test_no_imports_run_in_a_circle():
+    # those in functions, and for types only, count as well
+    graph = grimp.build_graph(*PACKAGES, cache_dir=None)
+    imports = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    assert len(imports) > 200
+    TopologicalSorter(imports).prepare()  # raises a CycleError that names them
+    rooms: dict[str, set[str]] = {}
+    for name, imported in imports.items():
+        if "." in name:
+            rooms.setdefault(_room(name), set()).update(map(_room, imported))
+    TopologicalSorter({name: used - {name} for name, used in rooms.items()}).prepare()
+
+
+def _room(module: str) -> str:
+    return ".".join(module.split(".")[:2])
+
+
+def test_no_function_takes_more_than_12_parameters():
+    found = [
+        f"{path.relative_to(ROOT)}:{node.lineno}: {n}"
+        for folder in PACKAGES.values()
+        for path in folder.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        if (n := _n_parameters(node.args)) > MOST_PARAMETERS and not _is_command(node)
+    ]
+    assert not found
+
+
+def _n_parameters(arguments: ast.arguments) -> int:
+    return len(arguments.posonlyargs) + len(arguments.args) + len(arguments.kwonlyargs)
+
+
+def _is_command(node: ast.AST) -> bool:
+    """Whether a function is a command of the command line: each option is a parameter."""
+    return any(ast.unparse(made).startswith("app.command") for made in _decorators(node))
+
+
+def _decorators(node: ast.AST) -> list[ast.expr]:
+    return getattr(node, "decorator_list", [])
 
 
 def _source_folders() -> list[str]:

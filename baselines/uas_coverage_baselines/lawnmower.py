@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.targets import Targets
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.vehicle import dod_per_s
+from uas_coverage_env.vehicle.range import LAWNMOWER, level_seconds, speeds_of
 from uas_coverage_env.world import Command, SwarmState
 
-# Share of the cruise speed that is left on average by turns, climbs and stops.
-_PACE = 0.8
 # Share of the charge that a run may be planned to use.
-_USABLE = 0.8
+_USABLE = 0.9
 
 
 class Lawnmower:
@@ -79,13 +79,15 @@ class _Cuts:
     """Ways to cut an order of waypoints; times are those of straight flight."""
 
     def __init__(self, brief: MissionBrief, order: Sequence[int]) -> None:
-        limits = [vehicle.limits for vehicle in brief.vehicles]
-        speed_mps = _PACE * min(limit.v_cruise_mps for limit in limits)
+        cruise_mps = min(vehicle.limits.v_cruise_mps for vehicle in brief.vehicles)
+        speeds = speeds_of(brief.vehicles[0])._replace(level_mps=cruise_mps)
         route_m = np.array([brief.waypoints[waypoint].position_m for waypoint in order])
         homes_m = np.array([uas.start_m for uas in brief.uas])
         between_m = np.linalg.norm(np.diff(route_m, axis=0), axis=1)
-        self._at_s = np.concatenate([[0.0], np.cumsum(between_m)]) / speed_mps
-        self._home_s = np.linalg.norm(route_m - homes_m[:, None], axis=2) / speed_mps
+        at_m = np.concatenate([[0.0], np.cumsum(between_m)])
+        self._at_s = level_seconds(LAWNMOWER, speeds, at_m)
+        home_m = np.linalg.norm(route_m - homes_m[:, None], axis=2)
+        self._home_s = level_seconds(LAWNMOWER, speeds, home_m)
         self._order = list(order)
         # whoever starts nearer to the beginning of the order takes the earlier part
         self._takers = self._home_s[:, 0].argsort(kind="stable")
@@ -114,15 +116,10 @@ class _Cuts:
 
 
 def _allowed_times_s(brief: MissionBrief) -> NDArray[np.float64]:
-    """(U,) [s] flight that the charge of each UAS allows, at the power of hovering."""
+    """(U,) [s] flight at full speed that the charge of each UAS allows."""
     return np.array(
         [
-            _USABLE
-            * (uas.dod_max - (1.0 - uas.soc_0))
-            * vehicle.battery.capacity_Ah
-            * vehicle.battery.voltage_nominal_V
-            * 3600.0
-            / vehicle.power.hover_W
+            _USABLE * (uas.dod_max - (1.0 - uas.soc_0)) / dod_per_s(vehicle, uas.dod_max)
             for uas, vehicle in zip(brief.uas, brief.vehicles, strict=True)
         ]
     )

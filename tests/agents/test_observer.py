@@ -15,19 +15,19 @@ def test_a_player_sees_what_a_learner_sees(name, assisted):
         else generate_scenario(900_500, n_uas=3, n_waypoints=9, n_obstacles=5)
     )
     env = CoverageParallelEnv(scenario, return_mode=assisted, safety_filter=assisted)
-    env.reset(seed=0)
-    episode = env._episode
+    observations, _ = env.reset(seed=0)
     observer = Observer(MissionBrief.of(scenario))
     lots = np.random.default_rng(4)
     held = {}
     for k in range(120):
-        swarm = episode.swarm_state()
+        swarm = env.swarm_state()
         seen = observer.observe(swarm)
-        flies = swarm.status == FLYING
-        assert np.array_equal(seen[flies], episode.observation[flies])
+        for i, agent in enumerate(env.possible_agents):
+            if swarm.status[i] == FLYING:
+                assert np.array_equal(seen[i], observations[agent])
         if not env.agents:
             break
         if k % 5 == 0:
             held = {agent: lots.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents}
-        env.step({agent: held[agent] for agent in env.agents})
+        observations, *_ = env.step({agent: held[agent] for agent in env.agents})
     assert k > 10

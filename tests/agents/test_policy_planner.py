@@ -39,12 +39,12 @@ def test_a_policy_flies_as_its_actions_do_in_the_environment(directory, scenario
     flight = rollout(scenario, planner, max_steps=40)
     env = CoverageParallelEnv(scenario, return_mode=True, safety_filter=True)
     views, _ = env.reset()
-    positions_m = [env._episode.positions_m.copy()]
+    positions_m = [env.swarm_state().x[:, :3]]
     for _ in range(40):
         outputs = planner.policy.forward(np.stack([views[agent] for agent in env.agents]))
         actions = np.clip(outputs, -1, 1).astype(np.float64)
         views, *_ = env.step(dict(zip(env.agents, actions, strict=True)))
-        positions_m.append(env._episode.positions_m.copy())
+        positions_m.append(env.swarm_state().x[:, :3])
     assert np.array_equal(flight.x[:, :, :3], positions_m)
 
 

@@ -55,12 +55,12 @@ def test_what_lies_at_the_addresses_does_what_the_functions_do():
             commands["kind"][0], commands["values"][0, 0] = GO_TO, step % 20
         if step == 40:
             called.uncovered[:] = direct.uncovered[:] = False
-        advance(arena, called, commands, False, aboard, outcome)
+        advance(arena, called, commands, False, aboard, None, outcome)
         begin_step(direct, commands, expected)
         call_home(arena, direct, False, expected)
         steer(arena, direct, False, expected)
         filter_commands(arena, direct, False, expected)
-        carry_out(arena, direct, False, expected)
+        carry_out(arena, direct, False, None, expected)
         assert outcome.tobytes() == expected.tobytes()
         for left, right in zip(called, direct, strict=True):
             assert np.array_equal(left, right)
@@ -80,7 +80,7 @@ def test_a_step_with_guidance_left_out_is_the_same_step():
     for _ in range(40):
         drawn(rng, commands)
         for state, outcome, aboard in zip(states, outcomes, choices, strict=True):
-            advance(arena, state, commands, False, aboard, outcome)
+            advance(arena, state, commands, False, aboard, None, outcome)
         assert outcomes[0].tobytes() == outcomes[1].tobytes()
         for left, right in zip(*states, strict=True):
             assert np.array_equal(left, right)

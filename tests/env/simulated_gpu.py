@@ -12,14 +12,14 @@ from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.memory import LIMITS, REWARD
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.scenario import Wind
 from uas_coverage_env.vehicle import limit_names
 
 N_LANES, N_STEPS = 2, 25
 
 
-def compare():
+def compare(ground):
     """Fly both ways, lanes with different actions, past the end of missions."""
-    ground = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
     missions = CudaMissions(N_LANES, ground)
     episodes = [Episode(ground, MissionSettings()) for _ in range(N_LANES)]
     for episode in episodes:
@@ -51,6 +51,7 @@ def compare():
         "restarts": restarts,
         "refused": missions.missions.refused.tolist(),
         "changed": changed,
+        "x": missions.missions.worlds.x[1].tolist(),
         "acted": int(missions.missions.acted.sum()),
         "limits_exceeded": limits_exceeded(),
     }
@@ -67,4 +68,6 @@ def limits_exceeded():
 
 
 if __name__ == "__main__":
-    print(json.dumps(compare()))
+    still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
+    windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
+    print(json.dumps({"still": compare(still), "windy": compare(windy)}))

@@ -1,6 +1,7 @@
 import functools
 import math
 import re
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from practice_grounds import practice_ground
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import GoTo, uas_coverage_v0
 from uas_coverage_env.env import ACTION_NAMES, HOME_CHOICE, K_WAYPOINTS
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.scenario import load_scenario
@@ -21,20 +22,16 @@ def env_of(action="velocity", **settings):
     return env
 
 
-def commands_after(env, action):
-    """Values of the command that uas_1 gets."""
-    hover = {"waypoint": HOME_CHOICE}.get(env_kind(env), np.zeros_like(np.asarray(action)))
-    env.step({"uas_1": action, "uas_2": hover})
-    return env._episode._scratch.commands[0]["values"].tolist()
-
-
-def env_kind(env):
-    return "waypoint" if env._episode.chooses else "continuous"
+def commands_after(action, kind="velocity"):
+    """Values of the command that the action of uas_1 becomes."""
+    env = env_of(kind, safety_filter=True)
+    *_, infos = env.step({"uas_1": action, "uas_2": np.zeros_like(np.asarray(action))})
+    return infos["uas_1"]["filter"]["asked"]["values"]
 
 
 def snapshot(env):
-    state = env._episode._world.state
-    return [array.copy() for array in state] + [env._episode.observation.copy()]
+    swarm = env.swarm_state()
+    return [getattr(swarm, field.name) for field in fields(swarm)] + [env.state()]
 
 
 def assert_unchanged(env, before):
@@ -44,13 +41,13 @@ def assert_unchanged(env, before):
 
 def test_velocity_is_scaled_to_the_speed_limit_and_the_fence():
     limit = load_vehicle("s500_v2").limits.v_xy_max_mps
-    values = commands_after(env_of(), np.array([1.0, -0.5, 0.0], np.float32))
+    values = commands_after(np.array([1.0, -0.5, 0.0], np.float32))
     assert values[:3] == pytest.approx([limit, -limit / 2, 20.0])
 
 
 @pytest.mark.parametrize(("share", "altitude_m"), [(-1.0, 1.5), (0.0, 20.0), (1.0, 38.5)])
 def test_altitudes_run_from_margin_to_margin_of_the_fence(share, altitude_m):
-    values = commands_after(env_of(), np.array([0.0, 0.0, share]))
+    values = commands_after(np.array([0.0, 0.0, share]))
     assert values[2] == pytest.approx(altitude_m)
 
 
@@ -59,9 +56,9 @@ def test_acceleration_is_scaled_per_axis():
     level = vehicle.airframe.gravity_mps2 * vehicle.limits.tilt_max_rad
     up = vehicle.limits.lift_max_N / vehicle.airframe.mass_kg
     down = -vehicle.limits.lift_min_N / vehicle.airframe.mass_kg
-    values = commands_after(env_of("acceleration"), np.array([1.0, -1.0, -1.0]))
+    values = commands_after(np.array([1.0, -1.0, -1.0]), "acceleration")
     assert values[:3] == pytest.approx([level, -level, -up])
-    values = commands_after(env_of("acceleration"), np.array([0.5, 0.0, 1.0]))
+    values = commands_after(np.array([0.5, 0.0, 1.0]), "acceleration")
     assert values[:3] == pytest.approx([level / 2, 0.0, down])
 
 
@@ -70,10 +67,10 @@ def test_wrench_spans_the_uneven_limits_of_lift():
     limits = vehicle.limits
     tau_x = vehicle.airframe.inertia_kgm2[0] * limits.angular_acceleration_xy_max_radps2
     tau_z = vehicle.airframe.inertia_kgm2[2] * limits.angular_acceleration_z_max_radps2
-    low = commands_after(env_of("wrench"), np.array([-1.0, 1.0, 0.0, -1.0]))
+    low = commands_after(np.array([-1.0, 1.0, 0.0, -1.0]), "wrench")
     assert low == pytest.approx([limits.lift_min_N, tau_x, 0.0, -tau_z])
-    assert commands_after(env_of("wrench"), np.zeros(4)) == [0.0, 0.0, 0.0, 0.0]
-    high = commands_after(env_of("wrench"), np.array([1.0, 0.0, 0.0, 0.0]))
+    assert commands_after(np.zeros(4), "wrench") == [0.0, 0.0, 0.0, 0.0]
+    high = commands_after(np.array([1.0, 0.0, 0.0, 0.0]), "wrench")
     assert high[0] == pytest.approx(limits.lift_max_N)
 
 
@@ -81,7 +78,7 @@ def test_every_vehicle_has_its_own_limits():
     scenario = practice_ground(vehicles=("s500_v2", "hexacopter"))
     ranges = actions_of("wrench", scenario).ranges
     lifts = [load_vehicle(name).limits.lift_max_N for name in ("s500_v2", "hexacopter")]
-    assert ranges["highest"][:, 0].tolist() == pytest.approx(lifts)
+    assert ranges[:, 0, 2].tolist() == pytest.approx(lifts)
     assert lifts[0] != lifts[1]
 
 
@@ -89,7 +86,7 @@ def test_numbers_out_of_bounds_are_clipped():
     inside, outside = env_of(), env_of()
     for env, action in ((inside, [1.0, -1.0, 0.5]), (outside, [7.0, -1e30, 0.5])):
         env.step({"uas_1": np.array(action), "uas_2": np.zeros(3)})
-    np.testing.assert_array_equal(inside._episode.observation, outside._episode.observation)
+    assert_unchanged(outside, snapshot(inside))
 
 
 @pytest.mark.parametrize(
@@ -102,12 +99,12 @@ def test_numbers_out_of_bounds_are_clipped():
     ],
 )
 def test_other_number_types_fly_the_same(action):
-    expected = commands_after(env_of(), np.array([0.25, 0.5, 0.0], np.float32))
-    assert commands_after(env_of(), action) == pytest.approx(expected)
+    expected = commands_after(np.array([0.25, 0.5, 0.0], np.float32))
+    assert commands_after(action) == pytest.approx(expected)
 
 
 def test_whole_numbers_are_numbers():
-    assert commands_after(env_of(), np.array([0, 1, 0])) == pytest.approx([0.0, 12.0, 20.0, 0.0])
+    assert commands_after(np.array([0, 1, 0])) == pytest.approx([0.0, 12.0, 20.0, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -136,7 +133,7 @@ def test_an_invalid_action_names_agent_and_value_and_changes_nothing(action, nam
     assert named in str(error.value)
     assert_unchanged(env, before)
     env.step({"uas_1": np.zeros(3), "uas_2": np.zeros(3)})
-    assert env._episode.steps == 1
+    assert env.swarm_state().step == 1
 
 
 @pytest.mark.parametrize(
@@ -182,11 +179,12 @@ def test_a_choice_that_does_not_exist_is_refused(choice):
 
 @pytest.mark.parametrize("choice", [1, np.int64(1), np.int32(1), np.uint8(1), np.array(1)])
 def test_any_whole_number_is_a_choice(choice):
-    env = env_of("waypoint")
+    env, usual, other = env_of("waypoint"), env_of("waypoint"), env_of("waypoint")
     env.step({"uas_1": choice, "uas_2": 0})
-    assert (
-        env._episode._learners.targets[0] == env_of("waypoint")._episode._learners.candidates[0, 1]
-    )
+    usual.step({"uas_1": 1, "uas_2": 0})
+    other.step({"uas_1": 0, "uas_2": 0})
+    assert_unchanged(env, snapshot(usual))
+    assert (env.swarm_state().x != other.swarm_state().x).any()
 
 
 def test_the_mask_allows_open_waypoints_and_home():
@@ -198,20 +196,22 @@ def test_the_mask_allows_open_waypoints_and_home():
 
 
 def test_a_masked_choice_keeps_the_former_target():
-    env = env_of("waypoint")
+    env, twin = env_of("waypoint"), env_of("waypoint")
+    target = next(GoTo(w) for w in range(3) if env.action_of("uas_1", GoTo(w)) == 1)
     env.step({"uas_1": 1, "uas_2": 0})
-    target = int(env._episode._learners.targets[0])
+    twin.step({"uas_1": 1, "uas_2": 0})
     for _ in range(3):
         env.step({"uas_1": 7, "uas_2": 0})
-    assert int(env._episode._learners.targets[0]) == target
+        twin.step({"uas_1": twin.action_of("uas_1", target), "uas_2": 0})
+    assert_unchanged(env, snapshot(twin))
 
 
 def test_a_masked_choice_without_a_target_stays_in_place():
     env = env_of("waypoint")
-    start_m = env._episode.positions_m[0].copy()
+    start_m = env.swarm_state().x[0, :3]
     for _ in range(5):
         env.step({"uas_1": 7, "uas_2": 0})
-    np.testing.assert_allclose(env._episode.positions_m[0], start_m, atol=1e-6)
+    np.testing.assert_allclose(env.swarm_state().x[0, :3], start_m, atol=1e-6)
     assert "uas_1" in env.agents
 
 
@@ -275,7 +275,7 @@ def test_whatever_is_given_is_flown_or_refused_and_nothing_becomes_nan(name, dat
         else:
             assert all(np.isfinite(row).all() for row in observations.values())
             assert all(math.isfinite(reward) for reward in rewards.values())
-            assert np.isfinite(env._episode._world.state.x).all()
+            assert np.isfinite(env.swarm_state().x).all()
             assert np.isfinite(env.state()).all()
 
 
@@ -300,4 +300,4 @@ def test_extreme_but_valid_actions_never_leave_the_observation_space(name, seed)
 def test_the_village_has_the_altitudes_that_the_documentation_says():
     scenario = load_scenario("village")
     ranges = actions_of("velocity", scenario).ranges
-    assert (ranges["lowest"][0, 2], ranges["highest"][0, 2]) == pytest.approx((1.5, 48.5))
+    assert (ranges[0, 2, 0], ranges[0, 2, 2]) == pytest.approx((1.5, 48.5))

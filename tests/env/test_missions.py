@@ -11,9 +11,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from practice_grounds import practice_ground
 
-from uas_coverage_env import load_scenario, uas_coverage_v0
+from uas_coverage_env import generate_scenario, load_scenario, uas_coverage_v0
 from uas_coverage_env.compiled.progress import COMPILATIONS
-from uas_coverage_env.env import CoverageBatch, CoverageSwarmEnv, ScenarioPool
+from uas_coverage_env.env import CoverageBatch, CoverageSwarmEnv, CoverageVectorEnv, ScenarioPool
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.scenario_sets import SETS
 from uas_coverage_env.scenario import FAMILIES, GeneratedScenarios, MissionSource
@@ -400,3 +400,40 @@ def test_families_never_draw_what_players_are_compared_on():
     scenario = FAMILIES["generated"](np.random.default_rng(0))
     seed = int(scenario.name.split("-")[1][1:])
     assert seed > max(max(seeds) for seeds in SETS.values())
+
+
+def windy(rng):
+    """A small mission in a wind that is drawn, too."""
+    town = generate_scenario(int(rng.integers(100)), n_uas=2, n_waypoints=4, n_obstacles=2)
+    wind = {"mean_mps": float(rng.uniform(1.0, 5.0)), "from_deg": float(rng.uniform(0.0, 360.0))}
+    return type(town).model_validate({**town.model_dump(by_alias=True), "wind": wind})
+
+
+def test_a_wind_that_is_drawn_blows_in_single_and_batched_missions():
+    single, many = CoverageSwarmEnv(windy), make_vec(2, windy)
+    seen, rows = single.reset(seed=3)[0], many.reset(seed=2)[0]
+    np.testing.assert_array_equal(seen, rows[1])
+    assert single.scenario.wind == many.call("scenario")[1].wind
+    action = np.zeros(single.action_space.shape, np.float32)
+    for _ in range(5):
+        seen, rows = single.step(action)[0], many.step(np.stack([action] * 2))[0]
+        np.testing.assert_array_equal(seen, rows[1])
+    calm = CoverageSwarmEnv(single.scenario.model_copy(update={"wind": None}))
+    calm.reset()
+    still = [calm.step(action)[0] for _ in range(5)][-1]
+    assert not np.array_equal(still, seen)
+
+
+def test_a_disturbance_that_no_example_had_is_refused_in_a_batch():
+    drawn = []
+
+    def surprising(rng):
+        drawn.append(None)
+        town = generate_scenario(1, n_uas=1, n_waypoints=4, n_obstacles=0)
+        if len(drawn) <= 32:
+            return town
+        wind = {"mean_mps": 3.0, "from_deg": 0.0}
+        return type(town).model_validate({**town.model_dump(by_alias=True), "wind": wind})
+
+    with pytest.raises(ValueError, match="disturbance wind is new"):
+        CoverageVectorEnv(2, surprising).reset(seed=0)

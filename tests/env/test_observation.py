@@ -101,7 +101,7 @@ def test_observations_have_the_same_space_in_every_scenario(scenario):
 def test_own_state_is_scaled_by_fence_and_limits():
     scenario = practice_ground(vehicles=("s500_v2", "hexacopter"), soc_0=0.8)
     env, observations = flown(scenario)
-    state = env._episode._world.state
+    state = env.swarm_state()
     for i, agent in enumerate(env.agents):
         limits = scenario.vehicles[i].limits
         x, seen = state.x[i], observations[agent]
@@ -115,7 +115,7 @@ def test_own_state_is_scaled_by_fence_and_limits():
             "velocity": speeds,
             "attitude": angles,
             "rates": x[WX : WX + 3] / rates,
-            "reference": state.reference[i] / limits.v_xy_max_mps,
+            "reference": state.reference_mps[i] / limits.v_xy_max_mps,
             "flying": 1.0,
             "departed": state.departed[i],
             "returning": 0.0,
@@ -133,7 +133,7 @@ def test_own_state_is_scaled_by_fence_and_limits():
 
 def test_home_is_seen_where_it_is():
     env, observations = flown(practice_ground())
-    state = env._episode._world.state
+    state = env.swarm_state()
     for i, agent in enumerate(env.agents):
         way = env.scenario.uas[i].start_m - state.x[i, :3]
         level_m = math.hypot(way[0], way[1])
@@ -147,7 +147,7 @@ def test_home_is_seen_where_it_is():
 
 def test_the_nearest_open_waypoints_come_first():
     env, observations = flown(load_scenario("village"), steps=8)
-    state = env._episode._world.state
+    state = env.swarm_state()
     scenario = env.scenario
     places = np.array([w.position_m for w in scenario.waypoints])
     weights = np.array([w.weight for w in scenario.waypoints])
@@ -157,7 +157,6 @@ def test_the_nearest_open_waypoints_come_first():
         to = places - state.x[i, :3]
         away_m = np.linalg.norm(to, axis=1)
         order = np.argsort(away_m)[:K_WAYPOINTS]
-        assert env._episode._learners.candidates[i].tolist() == order.tolist()
         np.testing.assert_array_equal(feature(seen, "waypoints", "valid"), np.ones((12, 1)))
         columns = {
             "closeness": close(away_m[order]),
@@ -203,13 +202,15 @@ def test_a_covered_waypoint_is_no_longer_seen():
 def test_a_waypoint_that_another_flies_to_is_taken():
     env = uas_coverage_v0.parallel_env(practice_ground(), action="waypoint")
     env.reset()
+    places = np.array([waypoint.position_m for waypoint in env.scenario.waypoints])
+    before = np.linalg.norm(places - env.swarm_state().x[0, :3], axis=1)
     observations, *_ = env.step({"uas_1": 0, "uas_2": 12})
-    target = int(env._episode._learners.targets[0])
     own, other = (
         feature(observations[a], "waypoints", "taken")[:3, 0] for a in env.possible_agents
     )
     assert not own.any()
-    assert other.tolist() == (env._episode._learners.candidates[1, :3] == target).tolist()
+    order = np.argsort(np.linalg.norm(places - env.swarm_state().x[1, :3], axis=1))
+    assert other.tolist() == (order == before.argmin()).tolist()
 
 
 def test_sectors_and_centre_describe_all_that_is_open():
@@ -259,7 +260,7 @@ def test_rays_end_at_obstacles_and_fence():
     level.append((half, -half))
     directions = [(*d, 0.0) for d in level] + [(0, 0, -1.0), (0, 0, 1.0)]
     for i, agent in enumerate(env.agents):
-        position_m = env._episode.positions_m[i]
+        position_m = env.swarm_state().x[i, :3]
         rays = feature(observations[agent], "surroundings", "rays")[0]
         for ray, direction in zip(rays, directions, strict=True):
             free_m = marched(scenario, position_m, direction)
@@ -279,7 +280,7 @@ def test_a_ray_and_the_clearance_see_the_tower():
     assert feature(seen, "surroundings", "clearance").item() == 1.0
     for _ in range(9):
         observations, *_ = env.step({"uas_1": np.array([0.0, -0.25, -0.5])})
-    clearance_m = scenario.hulls[0].signed_distance(env._episode.positions_m[0])
+    clearance_m = scenario.hulls[0].signed_distance(env.swarm_state().x[0, :3])
     assert 3 < clearance_m < 15
     seen = feature(observations["uas_1"], "surroundings", "clearance").item()
     assert seen == pytest.approx(clearance_m / 20, abs=1e-5)
@@ -287,7 +288,7 @@ def test_a_ray_and_the_clearance_see_the_tower():
 
 def test_the_nearest_other_uas_come_first():
     env, observations = flown(practice_ground(n_uas=5), steps=6)
-    x = env._episode._world.state.x
+    x = env.swarm_state().x
     limit = env.scenario.vehicles[0].limits.v_xy_max_mps
     for i, agent in enumerate(env.agents):
         to = x[:, :3] - x[i, :3]
@@ -322,9 +323,9 @@ def test_a_uas_that_has_ended_is_no_longer_seen_and_sees_itself_ended():
 
 def test_the_nearest_moving_obstacles_come_first():
     env, observations = flown(practice_ground(n_moving=4), steps=4)
-    step = env._episode.steps
+    step = env.swarm_state().step
     centres = env.scenario.moving_positions(float(step))
-    x = env._episode._world.state.x
+    x = env.swarm_state().x
     for i, agent in enumerate(env.agents):
         to = centres - x[i, :3]
         level_m = np.hypot(to[:, 0], to[:, 1])

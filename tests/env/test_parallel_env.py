@@ -98,7 +98,7 @@ def test_after_the_end_an_empty_step_gives_nothing():
     assert env.agents == []
     assert env.step({}) == ({}, {}, {}, {}, {})
     assert env.step({"uas_1": np.zeros(3)}) == ({}, {}, {}, {}, {})
-    assert env._episode.steps == 1
+    assert env.swarm_state().step == 1
 
 
 def test_reset_begins_the_same_mission_again():
@@ -132,7 +132,7 @@ def test_infos_count_energy_and_coverage():
         *_, infos = env.step(dict.fromkeys(env.agents, 0))
         assert infos["uas_1"]["energy_Wh"] > spent
         spent = infos["uas_1"]["energy_Wh"]
-    covered = int((~env._episode._world.state.uncovered).sum())
+    covered = int((~env.swarm_state().uncovered).sum())
     assert infos["uas_1"]["covered"] == infos["uas_2"]["covered"] == covered > 0
 
 
@@ -189,7 +189,7 @@ def test_a_copy_in_mid_flight_flies_on_in_the_same_way(duplicate):
     np.testing.assert_array_equal(env.state(), other.state())
     np.testing.assert_array_equal(env.render(), other.render())
     env.step(dict.fromkeys(env.agents, 0))
-    assert other._episode.steps == env._episode.steps - 1
+    assert other.swarm_state().step == env.swarm_state().step - 1
     assert not np.array_equal(env.state(), other.state())
 
 
@@ -302,7 +302,7 @@ def test_in_turns_an_invalid_action_is_refused_at_once():
     with pytest.raises(ValueError, match="uas_2"):
         env.step(np.full(3, np.nan))
     env.step(np.zeros(3))
-    assert env.unwrapped._episode.steps == 1
+    assert env.swarm_state().step == 1
 
 
 def test_in_turns_and_at_once_the_same_mission_is_flown():

@@ -154,7 +154,7 @@ def test_observations_stay_as_they_were_unless_copies_are_spared():
         assert np.array_equal(kept, as_it_was) == copy
 
 
-def flown(env, singles, steps=6):
+def flown(env, singles, steps=6, watch=None):
     """Fly both with the same actions; waypoints are covered and paths drawn on the way."""
     env.reset(seed=0)
     for single in singles:
@@ -165,6 +165,8 @@ def flown(env, singles, steps=6):
         env.step(actions)
         for single, action in zip(singles, actions, strict=True):
             single.step(action[: single.action_space.shape[0]])
+        if watch is not None:
+            watch()
 
 
 def test_pictures_show_every_mission_as_it_is_shown_alone():
@@ -187,16 +189,20 @@ def test_pictures_show_every_mission_as_it_is_shown_alone():
 def test_a_tile_is_the_picture_of_its_mission(num_envs, rows, columns, size_px):
     env = make(num_envs, render_mode="rgb_array_tiled")
     singles = [CoverageSwarmEnv(GROUND, render_mode="rgb_array") for _ in range(num_envs)]
-    flown(env, singles, steps=3)
+    screens = [Screen(GROUND, "rgb_array", size_px=size_px) for _ in singles]
+
+    def watch():
+        for screen, single in zip(screens, singles, strict=True):
+            screen.see(single.swarm_state().x[:, :3])
+
+    watch()
+    flown(env, singles, steps=3, watch=watch)
     picture = env.render()
     assert picture.shape == (rows * size_px, columns * size_px, 3)
     tiles = picture.reshape(rows, size_px, columns, size_px, 3).swapaxes(1, 2)
     tiles = tiles.reshape(rows * columns, size_px, size_px, 3)
-    for tile, single in zip(tiles, singles, strict=False):
-        screen = Screen(GROUND, "rgb_array", size_px=size_px)
-        for positions_m in single._screen._path_m:
-            screen.see(positions_m)
-        np.testing.assert_array_equal(tile, screen.render(single._episode.swarm_state()))
+    for tile, screen, single in zip(tiles, screens, singles, strict=False):
+        np.testing.assert_array_equal(tile, screen.render(single.swarm_state()))
     assert all((tile == tile[0, 0]).all() for tile in tiles[num_envs:]), "the rest is paper"
 
 

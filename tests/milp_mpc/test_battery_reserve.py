@@ -12,9 +12,9 @@ from uas_coverage_baselines.milp_mpc.model.blocks import BatteryReserve, Capabil
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     _ALLOWANCE_S,
     cost_per_s,
+    seconds_home,
     short_s,
 )
-from uas_coverage_baselines.milp_mpc.model.energy import seconds_home
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan

@@ -52,7 +52,7 @@ PUBLIC = {
     Waypoint: {"kind", "position_m", "radius_m", "weight"},
     Decoration: {"name", "kind", "polygon_m"},
 }
-HIDDEN = {MovingObstacle: {"schedule"}}
+HIDDEN = {Scenario: {"wind", "disturbances"}, MovingObstacle: {"schedule"}}
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,10 @@ import pytest
 from flight_distances import curve, cylinder_distance, hull_distance, least_on_segments
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_disturbances import gusts
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
+from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import Wrench
 
@@ -63,6 +65,31 @@ def test_it_agrees_on_a_mission_that_ends_well(covered_town):
 def test_it_agrees_on_both_dynamics_and_on_flights_cut_short(lively_town, tmp_path, dynamics):
     flown(tmp_path / "f", lively_town, "lawnmower", dynamics=dynamics, max_steps=40)
     assert problems(tmp_path / "f") == ""
+
+
+@pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
+def test_it_agrees_on_flights_with_disturbances(lively_town, tmp_path, dynamics):
+    pushed = (constant_wind(3.0, 200.0), gusts(1.0))
+    flight = {"dynamics": dynamics, "max_steps": 40, "disturbances": pushed}
+    flown(tmp_path / "f", lively_town, "lawnmower", **flight)
+    assert problems(tmp_path / "f") == ""
+
+
+def test_a_limit_is_judged_by_the_tolerance_of_disturbances_only_where_they_act(
+    lively_town, tmp_path
+):
+    flown(tmp_path / "f", lively_town, "lawnmower", max_steps=10, disturbances=(gusts(0.0),))
+
+    def faster(rows):
+        rows[8]["vx_mps"] = 1.1 * lively_town.vehicles[0].limits.v_xy_max_mps
+        rows[8]["vy_mps"] = 0.0
+
+    rewrite(tmp_path / "f" / "flight.csv", faster)
+    assert "limit of speed" not in problems(tmp_path / "f")
+    run = json.loads((tmp_path / "f" / "run.json").read_text())
+    assert run.pop("disturbances") == ["gusts"]
+    (tmp_path / "f" / "run.json").write_text(json.dumps(run))
+    assert "limit of speed" in problems(tmp_path / "f")
 
 
 def test_it_agrees_that_a_swarm_hovers_until_its_batteries_are_empty(lively_town, tmp_path):

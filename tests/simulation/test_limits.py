@@ -9,7 +9,7 @@ from small_worlds import meadow
 
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, LIMIT_NAMES, LIMITS, U_TH, limit_names, load_vehicle
-from uas_coverage_env.vehicle.limits import LPV_TOLERANCE, NONLINEAR_TOLERANCE
+from uas_coverage_env.vehicle.limits import DISTURBED_TOLERANCE, LPV_TOLERANCE, NONLINEAR_TOLERANCE
 from uas_coverage_env.world import FLYING, Acceleration, Velocity, Wrench
 
 S500 = load_vehicle("s500_v2")
@@ -141,3 +141,5 @@ def test_the_limits_are_told_in_the_documentation_as_they_are():
         assert f"| {bit} | `{limit.name}` | {limit.unit} | {limit.meaning} |" in text
     assert f"tolerance is {LPV_TOLERANCE:.0%} of the limit" in text.replace(" %", "%")
     assert f'With `dynamics="nonlinear"` it is {NONLINEAR_TOLERANCE:.0%}' in text.replace(" %", "%")
+    disturbed = f"act it is {DISTURBED_TOLERANCE:.0%} in both models"
+    assert disturbed in text.replace(" %", "%")

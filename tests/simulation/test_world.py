@@ -16,7 +16,8 @@ SHORT_FLIGHT = """
 import sys
 import numpy as np
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.world import World, Velocity, Acceleration, GoTo, Wrench
+from uas_coverage_env.simulation import World
+from uas_coverage_env.world import Velocity, Acceleration, GoTo, Wrench
 
 def fly(n_steps, **switches):
     world = World(load_scenario("village"), **switches)

@@ -1,7 +1,9 @@
 """What flies a UAS: control, guidance past obstacles, return mode and safety filter."""
 
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
+from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.guidance import guide, path_length_home_m, target_position
+from uas_coverage_env.autopilot.guided import velocity_of
 from uas_coverage_env.autopilot.return_mode import has_to_return, seconds_home
 
 __all__ = [
@@ -12,4 +14,7 @@ __all__ = [
     "path_length_home_m",
     "seconds_home",
     "target_position",
+    "velocity_of",
+    "write_brake",
+    "write_command",
 ]

@@ -3,24 +3,20 @@
 from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
+from uas_coverage_env.vehicle.range import RETURN_MODE, Speeds, flight_seconds
 from uas_coverage_env.world.state import FLYING
 
-_SPEED_SHARE = 2.0 / 3.0
-_LANDING_S = 12.0
 _CLOCK_RESERVE_S = 30.0
 
 
 @kernel
 def seconds_home(arena, i, x):
-    """Time [s] that UAS i needs to fly home and land, estimated with reserve.
-
-    Two thirds of its top speed on the way, then the descent, one after the other: on the way
-    home it turns, climbs over roofs, and is held up by others.
-    """
+    """Time [s] that UAS i needs to fly home and land, estimated with reserve (`RETURN_MODE`)."""
     uas = arena.uas[i]
     altitude_m = max(-x[Z] + uas.home_m[2], 0.0)
-    flying_s = path_length_home_m(arena, i, x) / (_SPEED_SHARE * uas.speed_mps)
-    return flying_s + altitude_m / uas.descent_mps + _LANDING_S
+    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    way_m = path_length_home_m(arena, i, x)
+    return flight_seconds(RETURN_MODE, speeds, 0.0, way_m, 0.0, altitude_m)
 
 
 @kernel
@@ -35,7 +31,7 @@ def has_to_return(arena, state, i):
     rules = arena.rules[0]
     home_s = seconds_home(arena, i, x)
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
-    if home_s + _CLOCK_RESERVE_S - _LANDING_S > time_left_s:
+    if home_s + _CLOCK_RESERVE_S - RETURN_MODE.landing_s > time_left_s:
         return True
     return x[DOD] + home_s * arena.uas[i].dod_per_s >= arena.uas[i].dod_max
 

@@ -68,12 +68,22 @@ def _lines(scenario: Scenario) -> list[str]:
         f"waypoints  {len(scenario.waypoints)}, sum of weights {weight:g}",
         f"obstacles  {len(scenario.obstacles)} fixed, {len(scenario.moving_obstacles)} moving",
         f"time       at most {scenario.max_steps} steps of {scenario.dt_s:g} s",
+        *(f"disturbed  {line}" for line in _disturbances(scenario)),
         *(
             f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, "
             f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}"
             for uas in scenario.uas
         ),
     ]
+
+
+def _disturbances(scenario: Scenario) -> list[str]:
+    wind = scenario.wind
+    lines = [name for name, _ in scenario.disturbances]
+    if wind is not None:
+        up = f", {wind.up_mps:g} m/s upward" if wind.up_mps else ""
+        lines.insert(0, f"wind of {wind.mean_mps:g} m/s from {wind.from_deg:g} degrees{up}")
+    return lines
 
 
 def _size(scenario: Scenario) -> str:

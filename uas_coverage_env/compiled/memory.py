@@ -199,6 +199,24 @@ class Memory(Generic[T]):
             made[field.name] = pool.arrays[f][first : first + math.prod(shape)].reshape(shape)
         return self.made_of(made)
 
+    def lane(self, lanes: T, lane: int, sizes: Mapping[str, int]) -> T:
+        """The declaration of one lane, views of the first rows of each array in it.
+
+        Args:
+            lanes: The declaration, its arrays with an axis of lanes in front.
+            lane: Which.
+            sizes: Of the mission in it; sizes that are not named are those of the lanes.
+        """
+        made = {}
+        for field, array in zip(self.fields, lanes, strict=True):
+            mine = array[lane]
+            shape = tuple(
+                sizes.get(str(axis), size)
+                for axis, size in zip(field.axes, mine.shape, strict=True)
+            )
+            made[field.name] = mine.reshape(-1)[: math.prod(shape)].reshape(shape)
+        return self.made_of(made)
+
     def size(self, pool: Pool, name: str) -> NDArray[np.int64]:
         """One size of all missions of a pool, (S,)."""
         return pool.sizes[:, self.names.index(name)]

@@ -164,15 +164,7 @@ def lane_view(memory: Memory[T], sized_by: Memory) -> Callable[[T, Any, Pool, An
 
     def plain(lanes: T, lane: int, pool: Pool, s: int) -> T:
         known = dict(zip(sized_by.names, pool.sizes[s].tolist(), strict=True))
-        made = {}
-        for field, array in zip(memory.fields, lanes, strict=True):
-            mine = array[lane]
-            shape = tuple(
-                known.get(str(axis), size)
-                for axis, size in zip(field.axes, mine.shape, strict=True)
-            )
-            made[field.name] = mine.reshape(-1)[: math.prod(shape)].reshape(shape)
-        return memory.made_of(made)
+        return memory.lane(lanes, lane, known)
 
     def typed(typing_context, lanes, lane, pool, s):
         def generate(context, builder, signature, arguments):

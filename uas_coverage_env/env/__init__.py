@@ -1,6 +1,6 @@
 """What a learner sees: environments for PettingZoo and Gymnasium on one world."""
 
-from uas_coverage_env.env.actions import ACTION_NAMES, HOME_CHOICE
+from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, ActionKind
 from uas_coverage_env.env.aec import env, raw_env
 from uas_coverage_env.env.batch import CoverageBatch
 from uas_coverage_env.env.observation import (
@@ -23,6 +23,7 @@ from uas_coverage_env.env.single import CoverageSwarmEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv
 
 __all__ = [
+    "ACTIONS",
     "ACTION_NAMES",
     "GYMNASIUM_ID",
     "HOME_CHOICE",
@@ -32,6 +33,7 @@ __all__ = [
     "PETTINGZOO_ID",
     "REWARD",
     "REWARD_TERMS",
+    "ActionKind",
     "CoverageBatch",
     "CoverageParallelEnv",
     "CoverageSwarmEnv",

@@ -9,7 +9,9 @@ from pettingzoo.utils import BaseWrapper
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from uas_coverage_env.env.parallel import CoverageParallelEnv
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import ScenarioLike
+from uas_coverage_env.world import Command, SwarmState
 
 
 class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
@@ -27,8 +29,25 @@ class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
         """
         agent = self.agent_selection
         if self.agents and not (self.terminations[agent] or self.truncations[agent]):
-            cast(CoverageParallelEnv, self.unwrapped).check_action(agent, action)
+            self._parallel.check_action(agent, action)
         super().step(action)
+
+    @property
+    def brief(self) -> MissionBrief:
+        """See `CoverageParallelEnv.brief`."""
+        return self._parallel.brief
+
+    def swarm_state(self) -> SwarmState:
+        """See `CoverageParallelEnv.swarm_state`: the same for all agents of a round."""
+        return self._parallel.swarm_state()
+
+    def action_of(self, agent: str, command: Command, *, clip: bool = False) -> Any:
+        """See `CoverageParallelEnv.action_of`."""
+        return self._parallel.action_of(agent, command, clip=clip)
+
+    @property
+    def _parallel(self) -> CoverageParallelEnv:
+        return cast(CoverageParallelEnv, self.unwrapped)
 
 
 def raw_env(
@@ -43,9 +62,7 @@ def raw_env(
     return parallel_to_aec(CoverageParallelEnv(scenario, **settings))
 
 
-def env(
-    scenario: ScenarioLike = "village", **settings: Any
-) -> AECEnv[str, NDArray[np.float32], Any]:
+def env(scenario: ScenarioLike = "village", **settings: Any) -> ChecksAtOnce:
     """The environment in turns; an invalid action is refused at once.
 
     Args:

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import Constant, machine_code
-from uas_coverage_env.env.actions import HOME_CHOICE, as_array
+from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.disturbances.act import disturbance_code
+from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
+from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
     DISABLED,
     DRAW,
@@ -19,7 +22,6 @@ from uas_coverage_env.env.batch_kernel import (
     NEXT_STEP,
     REST,
     SAME_STEP,
-    SEEDS,
     BatchRules,
     Lanes,
     new_missions,
@@ -27,14 +29,16 @@ from uas_coverage_env.env.batch_kernel import (
     step_batch_in_threads,
 )
 from uas_coverage_env.env.drawn import DrawnPool, pool_of
+from uas_coverage_env.env.express import joint_action_of, moment_of
 from uas_coverage_env.env.kernel import ACCEPTED, Rules
 from uas_coverage_env.env.memory import LEARNERS, Learners
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.put_aside import check_like, check_values
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, SwarmState, WorldState
+from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
 from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
@@ -136,8 +140,8 @@ class CoverageBatch:
         return self.worlds.status == FLYING
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """(L, U, K_WAYPOINTS + 1) choices that name a waypoint, and home."""
-        return masks_of(self.learners.candidates)
+        """(L, U, choices) the choices that exist now."""
+        return self.actions.kind.masks(self.learners.candidates)
 
     def seed(self, seed: int | Sequence[int | None]) -> None:
         """Seed the lanes, each of which counts its missions from 0 again.
@@ -244,6 +248,9 @@ class CoverageBatch:
             )
         if drawing is not None:
             self._draw_next(drawing)
+        if self._rules is not None and is_own(self._rules.rules.acting):
+            names = [f"UAS {i}" for i in range(self.n_uas)]
+            refuse_what_it_wrote(self.actions.kind, self.learners.asked, names)
         return self.observation
 
     def state_dict(self) -> dict[str, NDArray[Any]]:
@@ -318,6 +325,35 @@ class CoverageBatch:
             moving_velocity_mps=np.array(scenario.moving_velocities(time_s)).reshape(-1, 3),
         )
 
+    def actions_of(
+        self, commands: Sequence[Mapping[str, Command]], *, clip: bool = False
+    ) -> NDArray[Any]:
+        """The actions that fly planners' commands in the coming step, for imitation.
+
+        Args:
+            commands: Of each lane one for each UAS that flies; empty where a mission has ended.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            (L, U, size) float32 or (L, U) choices, see `CoverageParallelEnv.action_of`; zero where
+            a UAS does not fly.
+
+        Raises:
+            ValueError: No action of this kind flies a command, or one that flies has none.
+        """
+        if len(commands) != self.num_envs:
+            raise ValueError(f"commands for {len(commands)} of {self.num_envs} lanes")
+        rows = []
+        for lane, given in enumerate(commands):
+            s = int(self.lanes.scenario[lane])
+            moment = moment_of(self.pool, s, self.worlds, self.learners, lane)
+            rows.append(joint_action_of(self.actions, moment, given, clip, n_uas=self.n_uas))
+        return np.stack(rows)
+
+    def brief_of(self, lane: int) -> MissionBrief:
+        """What a planner may know of the mission of a lane."""
+        return MissionBrief.of(self.scenario_of(lane))
+
     def scenario_of(self, lane: int) -> Scenario:
         """The scenario that a lane flies now."""
         return self.pool.scenarios[self.lanes.scenario[lane]]
@@ -368,19 +404,26 @@ class CoverageBatch:
         else:
             threads = numba.get_num_threads()
             numba.set_num_threads(self._threads)
-            refused = self._kernel(*given)
-            numba.set_num_threads(threads)
+            try:
+                refused = self._kernel(*given)
+            except SystemError as error:
+                # what a kernel raises in a parallel loop comes wrapped
+                raise error.__cause__ or error from None
+            finally:
+                numba.set_num_threads(threads)
         if refused == ACCEPTED and not in_place:
             self._observations = free, before
         return refused
 
     def _compiled_rules(self) -> BatchRules:
         settings = self.settings
-        called = assistants(settings.return_mode, settings.safety_filter, goes_to=self.chooses)
+        kind = self.actions.kind
+        called = assistants(settings.return_mode, settings.safety_filter, goes_to=kind.goes_to)
         paying = paying_of(settings.reward, settings.weights)
         observing = observing_of(settings.observation)
         nonlinear = settings.dynamics == "nonlinear"
-        rules = Rules(self.actions.kind, nonlinear, called, paying, observing)
+        pushed = disturbance_code(self.pool.disturbances)
+        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, observing)
         # `_draw_next` comes between the end of a drawn mission and the next
         autoreset = DISABLED if self.draws and self.autoreset == SAME_STEP else self.autoreset
         return BatchRules(rules, autoreset)
@@ -396,10 +439,11 @@ class CoverageBatch:
         if actions.dtype.kind not in ("iu" if self.chooses else "fiu"):
             kind = "whole numbers" if self.chooses else "real numbers"
             raise ValueError(f"actions have dtype {actions.dtype}; give {kind}")
-        if self.chooses and (actions.min() < 0 or actions.max() > HOME_CHOICE):
+        choices = self.actions.kind.choices
+        if self.chooses and (actions.min() < 0 or actions.max() >= choices):
             raise ValueError(
                 f"actions go from {actions.min()} to {actions.max()}; "
-                f"give whole numbers from 0 to {HOME_CHOICE} (home)"
+                f"give whole numbers from 0 to {choices - 1}"
             )
         asked[:] = actions.reshape(asked.shape)
 
@@ -408,10 +452,3 @@ def _check_count(name: str, count: Any, most: int) -> None:
     whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
     if not whole or not 1 <= count <= most:
         raise ValueError(f"{name} is {count!r}; give a whole number from 1 to {most}")
-
-
-def masks_of(candidates: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which choices name a waypoint, and home: (..., K_WAYPOINTS) -> (..., K_WAYPOINTS + 1)."""
-    masks = np.ones((*candidates.shape[:-1], HOME_CHOICE + 1), dtype=np.bool_)
-    np.greater_equal(candidates, 0, out=masks[..., :HOME_CHOICE])
-    return masks

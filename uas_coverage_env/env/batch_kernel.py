@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.borrow import borrow
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.random import SEEDS, counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
-from uas_coverage_env.env.actions import first_not_finite
+from uas_coverage_env.disturbances.act import begin_random
+from uas_coverage_env.env.act import acting_of, first_not_finite
+from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.kernel import ACCEPTED, Rules, step_learners
 from uas_coverage_env.env.memory import (
     CONTACT_WITH,
@@ -47,9 +50,6 @@ from uas_coverage_env.world.state import STATE
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
 """When a mission that has ended begins anew: in the next step, in the same, or never by itself."""
-
-SEEDS = 2**64
-"""Seeds of lanes are below."""
 
 FLY, REST, DRAW = -3, -2, -1
 """What a lane does in the coming step: fly, nothing, or begin a mission that is drawn; a number
@@ -145,14 +145,6 @@ _scratch_of = lane_view(SCRATCH, sized_by=ARENA)
 
 
 @kernel
-def _mixed(z):
-    """The output function of SplitMix64 (Steele, Lea, Flood 2014): every bit depends on all."""
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return z ^ (z >> np.uint64(31))
-
-
-@kernel
 def drawn(seed, mission, n):
     """Which of n scenarios a mission is flown in: a function of seed and number, with no state.
 
@@ -163,8 +155,7 @@ def drawn(seed, mission, n):
     """
     if n == 1:
         return 0
-    counter = np.uint64(mission + 1) * np.uint64(0x9E3779B97F4A7C15)
-    return np.int64(_mixed(_mixed(seed) + counter) % np.uint64(n))
+    return np.int64(counted(seed, mission) % np.uint64(n))
 
 
 @kernel
@@ -185,7 +176,12 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     lanes.scenario[lane] = s
     lanes.mission[lane] += 1
     lanes.orders[lane] = FLY
-    copy_arrays(start_of(pool.starts, s), state_of(missions.worlds, lane, pool.arenas, s))
+    state = state_of(missions.worlds, lane, pool.arenas, s)
+    copy_arrays(start_of(pool.starts, s), state)
+    begin_random(
+        arena_of(pool.arenas, s).disturbances, state.disturbance_random, lanes.seed[lane],
+        lanes.mission[lane],
+    )  # fmt: skip
     first = first_learners_at(pool.learners, s)
     copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
     n_uas = first.report.shape[0]
@@ -378,7 +374,9 @@ class _Given(NamedTuple):
 def _example() -> _Given:
     pool = ScenarioPool("open_field")
     paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
-    rules = Rules(0, False, np.zeros(0, np.int64), paying, observing_of(OBSERVATION))
+    acting = acting_of(VELOCITY)
+    none = np.zeros(0, np.int64)
+    rules = Rules(acting, False, none, none, paying, observing_of(OBSERVATION))
     return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
 
 

@@ -12,12 +12,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, cuda
+from numba import config, cuda, njit
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
-from uas_coverage_env.env.actions import first_not_finite, write_commands
+from uas_coverage_env.disturbances.act import runs_on_gpu
+from uas_coverage_env.env.act import (
+    acting_of,
+    begin_command,
+    first_not_finite,
+    is_own,
+    refuse_unflyable,
+    write_commands,
+)
 from uas_coverage_env.env.kernel import ACCEPTED, finish_step
 from uas_coverage_env.env.memory import (
     LEARNERS,
@@ -74,15 +82,15 @@ _look_of = lane_view(LOOK, sized_by=ARENA)
 
 
 @kernel
-def step_mission(pool, paying, observing, missions, kind, nonlinear, lane):
+def step_mission(pool, acting, paying, observing, missions, nonlinear, lane):
     """Fly one lane for one step; see `Missions`.
 
     Args:
         pool: `MissionPool` of one scenario.
+        acting: `Acting`.
         paying: `Paying`.
         observing: `Observing`.
         missions: `Missions`; the lane is written.
-        kind: Kind of command that the actions become, not GO_TO.
         nonlinear: Whether the 6-DOF plant is flown.
         lane: Which.
     """
@@ -104,12 +112,9 @@ def step_mission(pool, paying, observing, missions, kind, nonlinear, lane):
     tables = tables_at(pool.tables, 0)
     scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
     max_steps = arena.rules[0].max_steps
-    write_commands(
-        state, kind, tables.ranges, learners.asked, learners.candidates, learners.targets,
-        scratch.commands,
-    )  # fmt: skip
+    write_commands(arena, state, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
-    carry_out(arena, state, nonlinear, scratch.outcome)
+    carry_out(arena, state, nonlinear, None, scratch.outcome)
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
@@ -133,10 +138,41 @@ def _all_on_device(arrays: Any) -> Any:
 
 
 @cuda.jit
-def _step_missions(pool, paying, observing, missions, kind, nonlinear):
+def _step_missions(pool, acting, paying, observing, missions, nonlinear):
     lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
     if lane < missions.ended.shape[0]:
-        step_mission(pool, paying, observing, missions, kind, nonlinear, lane)
+        step_mission(pool, acting, paying, observing, missions, nonlinear, lane)
+
+
+def _own_step(write: Any) -> Any:
+    """`_step_missions` for a kind of action of one's own, with its kernel as a part of it."""
+
+    @njit(error_model="numpy")
+    def act(pool, acting, missions, lane):
+        # before the step: an action that cannot be flown is refused as one that is not finite
+        arena = arena_of(pool.arenas, 0)
+        state = state_of(missions.worlds, lane, pool.arenas, 0)
+        tables = tables_at(pool.tables, 0)
+        learners = learners_of(missions.learners, lane, pool.arenas, 0)
+        scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
+        if missions.ended[lane] or first_not_finite(learners.asked) != ACCEPTED:
+            return
+        for i in range(state.status.shape[0]):
+            begin_command(tables, learners, scratch, acting, i)
+            if state.status[i] == FLYING:
+                command = scratch.commands[i]
+                values = scratch.values[i]
+                write(arena, state, tables, learners, i, acting.parameters, values, command)
+                refuse_unflyable(arena, learners, acting, i, command)
+
+    @cuda.jit
+    def step(pool, acting, paying, observing, missions, nonlinear):
+        lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
+        if lane < missions.ended.shape[0]:
+            act(pool, acting, missions, lane)
+            step_mission(pool, acting, paying, observing, missions, nonlinear, lane)
+
+    return step
 
 
 class CudaMissions:
@@ -166,16 +202,23 @@ class CudaMissions:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
         given = MissionSettings.of(settings)
-        if given.chooses or given.return_mode or given.safety_filter:
+        if given.kind.goes_to or given.return_mode or given.safety_filter:
             raise ValueError(
-                "the waypoint action, return_mode and safety_filter do not run on a GPU; take "
-                "another action and leave both switches off"
+                "actions that go to places (waypoint), return_mode and safety_filter do not run on "
+                "a GPU; take another action and leave both switches off"
             )
         if given.observation != OBSERVATION or given.reward != DEFAULT_REWARD:
             raise ValueError(
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
         pool = ScenarioPool(scenario, given)
+        for disturbance in pool.disturbances:
+            if not runs_on_gpu(disturbance):
+                raise ValueError(
+                    f"disturbance {disturbance.name} does not run on a GPU; constant_wind does"
+                )
+        acting = acting_of(given.kind, on_gpu=True)
+        self._launched: Any = _own_step(given.kind.write) if is_own(acting) else _step_missions
         paying = paying_of(DEFAULT_REWARD, given.weights)
         observing = observing_of(OBSERVATION)
         n_uas = pool.sizes["U"]
@@ -194,10 +237,10 @@ class CudaMissions:
         self._blocks = -(-num_envs // THREADS_PER_BLOCK)
         self._arguments = (
             _all_on_device(pool.arrays),
+            _all_on_device(acting),
             _all_on_device(paying),
             _all_on_device(observing),
             self.missions,
-            pool.actions.kind,
             given.dynamics == "nonlinear",
         )
 
@@ -211,8 +254,7 @@ class CudaMissions:
         """
         if asked is not None:
             self.missions.learners.asked[:] = asked
-        launched: Any = _step_missions
-        launched[self._blocks, THREADS_PER_BLOCK](*self._arguments)
+        self._launched[self._blocks, THREADS_PER_BLOCK](*self._arguments)
 
 
 def _begin_all(pool: MissionPool, missions: Missions) -> None:

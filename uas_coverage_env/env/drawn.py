@@ -16,6 +16,7 @@ from uas_coverage_env.env.put_aside import check_values
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.disturbance import fitted_to, in_slots
 from uas_coverage_env.world.state import STATE
 
 _MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, LOOK)
@@ -39,6 +40,7 @@ class DrawnPool:
         scenarios: (L,) what the lanes fly; before their first missions an example.
         actions: The kind of action.
         sizes: The largest that the arrays of a lane may need.
+        disturbances: One of each kind that may act: of those in `source.examples`.
         drawn_from: (L, 6) states of the generators from which the missions now flown were drawn;
             zero where none was drawn.
     """
@@ -46,7 +48,9 @@ class DrawnPool:
     def __init__(self, source: MissionSource, settings: MissionSettings, num_envs: int) -> None:
         self.settings = settings
         self._source = source
-        example = ScenarioPool(source.example, settings)
+        acting = [settings.disturbances_in(scenario) for scenario in source.examples]
+        self.disturbances, _ = in_slots(acting)
+        example = ScenarioPool(source.example, settings, self.disturbances)
         self.scenarios = [example.scenarios[0]] * num_envs
         self.actions = example.actions
         self.sizes = {**example.sizes, "U": source.room.n_uas, "W": source.room.n_waypoints}
@@ -104,7 +108,9 @@ class DrawnPool:
                 rng = self._rngs[lane] = seeding.np_random(int(seeds[lane]))[0]
             scenario = chosen[lane] if chosen else None
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
-            missions.append(_Mission(lane, scenario or self._source.draw(rng), before, rng))
+            scenario = scenario or self._source.draw(rng)
+            fitted_to(self.disturbances, self.settings.disturbances_in(scenario))
+            missions.append(_Mission(lane, scenario, before, rng))
         self.install(missions)
 
     def check_drawn(self) -> None:
@@ -145,7 +151,7 @@ class DrawnPool:
     def install(self, missions: Sequence["_Mission"]) -> None:
         """Put missions into the slots of their lanes."""
         for lane, scenario, before, rng in missions:
-            pool = ScenarioPool(scenario, self.settings)
+            pool = ScenarioPool(scenario, self.settings, self.disturbances)
             for memory, slots, arrays in zip(_MEMORIES, self._slots, pool.arrays, strict=True):
                 slots.put(lane, memory.mission(arrays, 0))
             self.scenarios[lane] = pool.scenarios[0]

@@ -7,7 +7,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
-from uas_coverage_env.env.actions import HOME_CHOICE, actions_of
+from uas_coverage_env.disturbances.act import disturbance_code
+from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
+from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.express import Moment
 from uas_coverage_env.env.global_state import global_state
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
@@ -39,7 +42,7 @@ class Episode:
         names: Of all UAS, in order.
         actions: The kind of action.
         max_cycles: Steps after which the episode is cut.
-        chooses: Whether the action is a choice of waypoints.
+        chooses: Whether the action is a choice.
         steps: Flown since t = 0.
         tables: What does not change during a mission.
         asked: (U, size) the actions of the coming step, to be written before it.
@@ -59,6 +62,7 @@ class Episode:
             return_mode=settings.return_mode,
             safety_filter=settings.safety_filter,
             measured_m=0.0,  # only what counts: nothing more is told
+            disturbances=settings.disturbances_in(scenario),
         )
         self.scenario = scenario
         self.names = self._world.names
@@ -87,16 +91,19 @@ class Episode:
 
     def _prepare(self) -> None:
         world = self._world
+        kind = self.actions.kind
+        self._acting = acting_of(kind)
+        self._checks = is_own(self._acting)
         self._paying = paying_of(self.settings.reward, self.settings.weights)
         self._observing = observing_of(self.settings.observation)
         addresses = EPISODE.addresses_of(
             world.arena, world.state, self.tables, self._learners, self._scratch,
-            self._paying, self._observing,
+            self._acting, self._paying, self._observing,
         )  # fmt: skip
-        called = assistants(world.return_mode, world.safety_filter, goes_to=self.chooses)
+        called = assistants(world.return_mode, world.safety_filter, goes_to=kind.goes_to)
         # what the kernel is given in every step: the arrays are written in place
-        at = np.array([*addresses, *called])
-        self._given = (at, self.actions.kind, world.dynamics == "nonlinear")
+        at = np.array([*addresses, *disturbance_code(world.disturbances), *called])
+        self._given = (at, world.dynamics == "nonlinear")
         seen = self.observation
         # to assign a record field by field takes ten times as long
         self._scratch_bytes = [array.view(np.uint8) for array in self._scratch]
@@ -104,7 +111,7 @@ class Episode:
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses and views travel
-        stays = ("_step", "_given", "_scratch_bytes", "_paying", "_observing")
+        stays = ("_step", "_given", "_scratch_bytes", "_acting", "_paying", "_observing")
         return {key: value for key, value in self.__dict__.items() if key not in stays}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -112,9 +119,14 @@ class Episode:
         self.asked = self._learners.asked  # one array again, not two equal ones
         self._prepare()
 
-    def reset(self) -> None:
-        """Begin a new mission."""
-        self._world.reset()
+    def reset(self, seed: int = 0, mission: int = 0) -> None:
+        """Begin a new mission.
+
+        Args:
+            seed: Of all that disturbances draw.
+            mission: Number of the mission since seeding; each draws other numbers.
+        """
+        self._world.reset(seed, mission)
         self.steps = 0
         if self._first is None:
             self._first = first_look(
@@ -135,7 +147,8 @@ class Episode:
             The report, one row for each UAS: the columns of `memory`.
 
         Raises:
-            ValueError: An action is not finite; names UAS and value, and nothing has changed.
+            ValueError: An action is not finite; names UAS and value, and nothing has changed. Or
+                an own kind of action wrote a command that cannot be flown.
         """
         observation = np.empty(self._observation_shape, _FLOAT32)
         invalid = self._step(*self._given, self.observation, observation)
@@ -148,6 +161,8 @@ class Episode:
         self.observation = observation
         self.steps += 1
         self._terms = self._learners.terms.tolist()
+        if self._checks:
+            refuse_what_it_wrote(self.actions.kind, self.asked, self.names)
         return self._learners.report.tolist()
 
     @property
@@ -196,6 +211,12 @@ class Episode:
         """What a player sees now."""
         return self._world.swarm_state()
 
+    def moment(self) -> Moment:
+        """The mission now, for `express`."""
+        world = self._world
+        arrays = (world.arena, world.state, self.tables, self._learners)
+        return Moment(self.names, *arrays, world.dynamics == "nonlinear")
+
     def info(self, i: int, row: list[float]) -> dict[str, Any]:
         """What is told about a UAS beside its observation and reward, see `CoverageParallelEnv`."""
         (
@@ -228,10 +249,8 @@ class Episode:
         return info
 
     def action_mask(self, i: int) -> NDArray[np.int8]:
-        """(K_WAYPOINTS + 1,) 1 where a choice of UAS i names a waypoint, and for home."""
-        mask = np.ones(HOME_CHOICE + 1, np.int8)
-        mask[:HOME_CHOICE] = self._learners.candidates[i] >= 0
-        return mask
+        """(choices,) 1 where a choice of UAS i exists now."""
+        return self.actions.kind.masks(self._learners.candidates[i]).astype(np.int8)
 
 
 def _described(command: np.void) -> dict[str, Any]:

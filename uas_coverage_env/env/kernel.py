@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from uas_coverage_env.compiled.borrow import part
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.env.actions import first_not_finite, write_commands
+from uas_coverage_env.env.act import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
     CONTACT,
     CONTACT_WITH,
@@ -16,6 +16,7 @@ from uas_coverage_env.env.memory import (
     RETURNING,
     REWARD,
     STATUS,
+    Acting,
     Observing,
     Paying,
 )
@@ -31,12 +32,13 @@ ACCEPTED = -1
 class Rules(NamedTuple):
     """What holds for all steps of a mission."""
 
-    kind: int
-    """Kind of command that the actions become."""
+    acting: Acting
     nonlinear: bool
     """Whether the 6-DOF plant is flown."""
     assistants: Any
     """Which help to fly, see `world.advance`."""
+    disturbances: Any
+    """What pushes back, likewise."""
     paying: Paying
     observing: Observing
 
@@ -83,11 +85,11 @@ def step_learners(arena, state, tables, learners, scratch, rules, observation):
         rules: `Rules`.
         observation: (U, V) float32; that of a UAS that did not fly stays.
     """
-    write_commands(
-        state, rules.kind, tables.ranges, learners.asked, learners.candidates, learners.targets,
-        scratch.commands,
+    write_commands(arena, state, tables, learners, scratch, rules.acting, None)
+    advance(
+        arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.disturbances,
+        scratch.outcome,
     )  # fmt: skip
-    advance(arena, state, scratch.commands, rules.nonlinear, rules.assistants, scratch.outcome)
     finish_step(
         arena, state, tables, learners, scratch, rules.paying, rules.observing, observation, None
     )
@@ -98,23 +100,22 @@ _N_NUMBERS = EPISODE.size
 
 
 @kernel
-def step_episode(at, kind, nonlinear, before, observation):
+def step_episode(at, nonlinear, before, observation):
     """`step_learners` called from Python.
 
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
 
     Args:
-        at: Where the arrays of `EPISODE` lie, then the assistants: to hand over every array would
-            take longer than the flight of a UAS.
-        kind: See `Rules`, also the next.
-        nonlinear: Whether.
+        at: Where the arrays of `EPISODE` lie, then the disturbances, then the assistants: to hand
+            over every array would take longer than the flight of a UAS.
+        nonlinear: See `Rules`.
         before: (U, V) float32, the observation of the step before.
         observation: (U, V) float32, another array; written.
 
     Returns:
         ACCEPTED, or the index of a UAS whose action is not finite; then nothing has changed.
     """
-    arena, state, tables, learners, scratch, paying, observing = _views(at)
+    arena, state, tables, learners, scratch, acting, paying, observing = _views(at)
     invalid = first_not_finite(learners.asked)
     if invalid != ACCEPTED:
         return invalid
@@ -122,7 +123,10 @@ def step_episode(at, kind, nonlinear, before, observation):
         if state.status[i] != FLYING:
             for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
-    assistants = part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
-    rules = Rules(kind, nonlinear, assistants, paying, observing)
+    n_called = 1 + arena.disturbances.shape[0]
+    disturbances = part(at, _N_NUMBERS, n_called)
+    first = _N_NUMBERS + n_called
+    assistants = part(at, first, at.shape[0] - first)
+    rules = Rules(acting, nonlinear, assistants, disturbances, paying, observing)
     step_learners(arena, state, tables, learners, scratch, rules, observation)
     return ACCEPTED

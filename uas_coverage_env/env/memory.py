@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.views import Layout
-from uas_coverage_env.env.actions import RANGES_DTYPE
 from uas_coverage_env.env.observation.nearest import NEIGHBOURS_DTYPE, NO_TARGET
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
@@ -25,8 +24,8 @@ REPORT_SIZE = REWARD + 1
 class Tables(NamedTuple):
     """What does not change during a mission."""
 
-    ranges: Annotated[NDArray[np.void], RANGES_DTYPE, "U"]
-    """What the numbers of an action mean."""
+    ranges: Annotated[NDArray[np.float64], "U", "A", 3]
+    """What -1, 0 and 1 mean for the numbers of an action."""
     scales: Annotated[NDArray[np.void], SCALES_DTYPE, "U"]
     """What the numbers of an observation are divided by."""
     neighbours: Annotated[NDArray[np.void], NEIGHBOURS_DTYPE, "W"]
@@ -61,6 +60,17 @@ class Scratch(NamedTuple):
 
     commands: Annotated[NDArray[np.void], COMMAND_DTYPE, "U"]
     outcome: Annotated[NDArray[np.void], OUTCOME_DTYPE, "U"]
+    values: Annotated[NDArray[np.float64], "U", "A"]
+    """The numbers of an action in their units."""
+
+
+class Acting(NamedTuple):
+    """The kind of action, for kernels."""
+
+    call: Annotated[NDArray[np.int64], 4]
+    """Which it is, the address of a kernel, whether it is a choice, and whether it goes to places
+    (see `act`)."""
+    parameters: Annotated[NDArray[np.float64], "action parameters"]
 
 
 class Paying(NamedTuple):
@@ -87,7 +97,8 @@ class Observing(NamedTuple):
 
 
 TABLES, LEARNERS, LOOK = Memory(Tables), Memory(Learners), Memory(Look)
-SCRATCH, PAYING, OBSERVING = Memory(Scratch), Memory(Paying), Memory(Observing)
+SCRATCH, ACTING = Memory(Scratch), Memory(Acting)
+PAYING, OBSERVING = Memory(Paying), Memory(Observing)
 
-EPISODE = Layout(ARENA, STATE, TABLES, LEARNERS, SCRATCH, PAYING, OBSERVING)
+EPISODE = Layout(ARENA, STATE, TABLES, LEARNERS, SCRATCH, ACTING, PAYING, OBSERVING)
 """All that a step of one mission works on."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from uas_coverage_env.env.documentation import with_tables
+from uas_coverage_env.env.express import action_of
 from uas_coverage_env.env.global_state import global_space
 from uas_coverage_env.env.memory import REWARD, STATUS
 from uas_coverage_env.env.observation import observation_bounds
@@ -19,7 +20,7 @@ from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import FLYING, Command, SwarmState
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
@@ -51,6 +52,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         the observation, or home (12). `infos[agent]["action_mask"]` is 1 for choices that exist;
         another choice keeps the former target or, where there is none, the place.
 
+        An `ActionKind` of one's own: what it says.
+
         Finite numbers beyond ±1 are clipped. An action that is NaN, infinite, of a wrong type or
         shape, missing, or for an agent that never existed raises a ValueError and changes nothing.
         An action for an agent that has ended, or that the mission does not have, is ignored.
@@ -79,9 +82,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     Starting State:
         All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
-        random but the draw of a mission where `scenario` draws: `reset(seed=...)` draws the same
-        one again, `reset()` the next, `reset(options={"scenario": ...})` flies that one. Agents
-        that a mission does not have are not in `agents`. Equal actions make equal missions.
+        random but the draw of a mission where `scenario` draws, and what disturbances draw:
+        `reset(seed=...)` draws the same again, `reset()` what comes next,
+        `reset(options={"scenario": ...})` flies that scenario. Agents that a mission does not have
+        are not in `agents`. Otherwise equal actions make equal missions.
 
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
@@ -163,7 +167,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`, with which the mission is drawn; None: it goes on drawing.
+            seed: Seeds `np_random`, with which missions are drawn, and what disturbances draw;
+                None: both go on drawing.
             options: `scenario`, a scenario, its name or its file: what to fly instead of drawing.
 
         Returns:
@@ -174,7 +179,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """
         if seed is not None:
             self.np_random, self.np_random_seed = seeding.np_random(seed)
-        episode = self._episode = self._missions.begin(self.np_random, options)
+        episode = self._episode = self._missions.begin(self.np_random, options, seed)
         self.agents = list(episode.names)
         self._begun = True
         if self.render_mode is not None:
@@ -266,6 +271,28 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     def swarm_state(self) -> SwarmState:
         """What a planner sees now, in arrays of its own: its commands can be learned from."""
         return self._episode.swarm_state()
+
+    def action_of(self, agent: str, command: Command, *, clip: bool = False) -> Any:
+        """The action that flies a planner's command in the coming step, for imitation.
+
+        Args:
+            agent: One that flies.
+            command: What a planner gives it. With actions that do not go to places, a GoTo is the
+                velocity that guidance flies now.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            Of `action_space`; exact but for the rounding to float32.
+
+        Raises:
+            ValueError: No action of this kind flies the command; says why.
+        """
+        episode = self._episode
+        return action_of(episode.actions, episode.moment(), agent, command, clip)
+
+    def actions_of(self, commands: Mapping[str, Command], *, clip: bool = False) -> dict[str, Any]:
+        """The actions that fly a planner's commands, see `action_of`: `env.step(actions)`."""
+        return {agent: self.action_of(agent, each, clip=clip) for agent, each in commands.items()}
 
     def state(self) -> NDArray[np.float32]:
         """The whole mission as one vector of `state_space`."""

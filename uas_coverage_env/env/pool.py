@@ -17,6 +17,7 @@ from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.disturbance import Disturbance, fitted_to, in_slots
 from uas_coverage_env.world.state import STATE
 
 
@@ -55,6 +56,7 @@ class ScenarioPool:
         scenario: Name of a shipped scenario, path of a scenario file, or a scenario; or a
             sequence of these.
         settings: How missions are flown and paid; None: as usual.
+        disturbances: One of each kind that there is to be room for; None: those that act.
 
     Attributes:
         settings: As given.
@@ -64,6 +66,7 @@ class ScenarioPool:
         sizes: The largest of every named size.
         n_uas: (S,).
         n_waypoints: (S,).
+        disturbances: One of each kind that acts in any of the scenarios.
 
     Raises:
         ValueError: There is no scenario, or one is none of what is allowed.
@@ -73,6 +76,7 @@ class ScenarioPool:
         self,
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario],
         settings: MissionSettings | None = None,
+        disturbances: Sequence[Disturbance] | None = None,
     ) -> None:
         if callable(scenario):
             raise ValueError(
@@ -82,7 +86,13 @@ class ScenarioPool:
         settings = settings or MissionSettings()
         self.settings = settings
         self.scenarios = tuple(_loaded(entry, settings) for entry in given)
-        worlds = pool_worlds(self.scenarios, measured_m=0.0)  # only what counts
+        acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
+        if disturbances is None:
+            self.disturbances, slots = in_slots(acting)
+        else:
+            self.disturbances = tuple(disturbances)
+            slots = [fitted_to(disturbances, own) for own in acting]
+        worlds = pool_worlds(self.scenarios, measured_m=0.0, slots=slots)  # only what counts
         actions = [actions_of(settings.action, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
         tables = [tables_of(*both) for both in zip(self.scenarios, actions, strict=True)]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium.error import ResetNeeded
 
+from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
@@ -33,6 +34,8 @@ class MissionSequence:
         self._settings = settings
         self._flown = self.source.example
         self._drawn = self.source.fixed
+        self._seed = int(np.random.default_rng().integers(SEEDS, dtype=np.uint64))
+        self._mission = -1
         self.episode = self._made()
 
     @property
@@ -46,12 +49,16 @@ class MissionSequence:
             raise ResetNeeded("no mission is drawn yet: call reset() first")
         return self.episode.scenario
 
-    def begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
+    def begin(
+        self, rng: np.random.Generator, options: Mapping[str, Any] | None, seed: int | None
+    ) -> Episode:
         """Begin the next mission.
 
         Args:
             rng: To draw it with.
             options: Of `reset`: `scenario`, what to fly instead of drawing.
+            seed: Of all that disturbances draw in this mission and in those after it, each of which
+                draws other numbers; None: missions go on, at first from a seed of no meaning.
 
         Raises:
             ValueError: An option is wrong, or the mission does not fit; the former one goes on.
@@ -64,7 +71,10 @@ class MissionSequence:
             self._flown = scenario
             self.episode = self._made()
         self._drawn = True
-        self.episode.reset()
+        if seed is not None:
+            self._seed, self._mission = seed % SEEDS, -1
+        self._mission += 1
+        self.episode.reset(self._seed, self._mission)
         return self.episode
 
     def cut_after(self, steps: int) -> Episode:

@@ -7,11 +7,14 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import ACTION_NAMES
+from uas_coverage_env.disturbances import Disturbance, disturbances_of
+from uas_coverage_env.env.actions import ActionKind
+from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.world.disturbance import checked_disturbances
 
 _LONGEST = 100_000
 
@@ -21,7 +24,7 @@ class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
 
     Attributes:
-        action: "velocity", "acceleration", "wrench" or "waypoint".
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world takes a UAS home in time, whatever it is asked for.
         safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
@@ -29,12 +32,14 @@ class MissionSettings:
         max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
         observation: Blocks that the observation is made of, see `ObservationBlock`.
         reward: Terms that the reward is made of, see `RewardTerm`.
+        disturbances: What pushes back, see `Disturbance`; None: what each scenario says; with ()
+            nothing does.
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.
     """
 
-    action: str = "velocity"
+    action: str | ActionKind = "velocity"
     dynamics: Dynamics = "lpv"
     return_mode: bool = False
     safety_filter: bool = False
@@ -42,10 +47,10 @@ class MissionSettings:
     max_cycles: int | None = None
     observation: tuple[ObservationBlock, ...] = OBSERVATION
     reward: tuple[RewardTerm, ...] = REWARD
+    disturbances: tuple[Disturbance, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.action not in ACTION_NAMES:
-            raise ValueError(f"action is {self.action!r}; it is one of {', '.join(ACTION_NAMES)}")
+        kind_of(self.action)
         if self.dynamics not in get_args(Dynamics):
             allowed = ", ".join(get_args(Dynamics))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
@@ -61,6 +66,8 @@ class MissionSettings:
         object.__setattr__(self, "observation", checked_blocks(self.observation))
         object.__setattr__(self, "reward", checked_terms(self.reward))
         weights_of(self.reward, self.reward_weights)
+        if self.disturbances is not None:
+            object.__setattr__(self, "disturbances", checked_disturbances(self.disturbances))
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "MissionSettings":
@@ -91,9 +98,18 @@ class MissionSettings:
         return sum(block.size for block in self.observation)
 
     @property
+    def kind(self) -> ActionKind:
+        """The kind of action."""
+        return kind_of(self.action)
+
+    @property
     def chooses(self) -> bool:
-        """Whether the action is a choice of waypoints."""
-        return self.action == "waypoint"
+        """Whether the action is a choice."""
+        return self.kind.choices > 0
+
+    def disturbances_in(self, scenario: Scenario) -> tuple[Disturbance, ...]:
+        """What pushes back in the missions of a scenario."""
+        return disturbances_of(scenario) if self.disturbances is None else self.disturbances
 
     def limited(self, scenario: Scenario) -> Scenario:
         """The scenario with this time limit; return mode and the observed time know it."""

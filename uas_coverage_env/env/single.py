@@ -1,5 +1,6 @@
 """The single-agent environment: one agent flies the whole swarm (Gymnasium)."""
 
+from collections.abc import Mapping
 from functools import reduce
 from operator import add
 from typing import Any, ClassVar
@@ -10,16 +11,17 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import HOME_CHOICE
 from uas_coverage_env.env.documentation import with_tables
+from uas_coverage_env.env.express import joint_action_of
 from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
 from uas_coverage_env.env.observation import observation_bounds
+from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
 from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import FLYING, Command, SwarmState
 
 
 @with_tables
@@ -103,14 +105,15 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """Begin a new mission.
 
         Args:
-            seed: Seeds `np_random`, with which the mission is drawn; None: it goes on drawing.
+            seed: Seeds `np_random`, with which missions are drawn, and what disturbances draw;
+                None: both go on drawing.
             options: `scenario`, a scenario, its name or its file: what to fly instead of drawing.
 
         Raises:
             ValueError: The mission does not fit the spaces, or is none.
         """
         super().reset(seed=seed)
-        self._episode = self._missions.begin(self.np_random, options)
+        self._episode = self._missions.begin(self.np_random, options, seed)
         self._begun = True
         if self.render_mode is not None:
             self._screen.begin(self._episode.scenario)
@@ -151,14 +154,30 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """What a planner sees now, in arrays of its own: its commands can be learned from."""
         return self._episode.swarm_state()
 
+    def actions_of(self, commands: Mapping[str, Command], *, clip: bool = False) -> NDArray[Any]:
+        """The action that flies a planner's commands in the coming step, for imitation.
+
+        Args:
+            commands: One for each UAS that flies, see `CoverageParallelEnv.action_of`.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            Of `action_space`; zero for UAS that do not fly.
+
+        Raises:
+            ValueError: No action of this kind flies a command, or one that flies has none.
+        """
+        actions, moment = self._episode.actions, self._episode.moment()
+        return joint_action_of(actions, moment, commands, clip, n_uas=self._n_uas).ravel()
+
     def action_masks(self) -> NDArray[np.bool_]:
         """The choices that exist now, of all UAS one after the other (sb3-contrib's MaskablePPO).
 
         Raises:
-            ValueError: The action is not "waypoint".
+            ValueError: The action is no choice.
         """
         if not self._episode.chooses:
-            raise ValueError('only action="waypoint" has masks; the others are continuous')
+            raise ValueError("only actions that are choices have masks; this one is continuous")
         return self._action_mask().astype(np.bool_)
 
     def render(self) -> Any:
@@ -183,12 +202,11 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         return np.pad(seen, (0, missing)) if missing else seen
 
     def _action_mask(self) -> NDArray[np.int8]:
-        """(U · choices,) the only choice of UAS that the mission does not have is home."""
-        masks = np.zeros((self._n_uas, HOME_CHOICE + 1), np.int8)
-        masks[:, HOME_CHOICE] = 1
-        for i in range(len(self._episode.names)):
-            masks[i] = self._episode.action_mask(i)
-        return masks.ravel()
+        """(U · choices,) a UAS that the mission does not have has no waypoint to choose."""
+        nothing = np.full(K_WAYPOINTS, -1)
+        missing = self._episode.settings.kind.masks(nothing).astype(np.int8)
+        masks = [self._episode.action_mask(i) for i in range(len(self._episode.names))]
+        return np.concatenate(masks + [missing] * (self._n_uas - len(masks)))
 
     def _info(self, report: list[list[float]]) -> dict[str, Any]:
         episode = self._episode

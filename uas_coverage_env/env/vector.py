@@ -1,6 +1,6 @@
 """Many missions as one environment: one agent per mission flies its whole swarm (Gymnasium)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.batch import CoverageBatch, masks_of
+from uas_coverage_env.env.batch import CoverageBatch
 from uas_coverage_env.env.batch_kernel import (
     SWARM_COVERED,
     SWARM_ENERGY,
@@ -23,8 +23,8 @@ from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.screen import RENDER_FPS
 from uas_coverage_env.env.sequence import check_options
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
-from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.world import Command
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
@@ -218,11 +218,28 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         """(num_envs, U · choices) the choices that exist now.
 
         Raises:
-            ValueError: The action is not "waypoint".
+            ValueError: The action is no choice.
         """
         if not self._batch.chooses:
-            raise ValueError('only action="waypoint" has masks; the others are continuous')
+            raise ValueError("only actions that are choices have masks; this one is continuous")
         return self._batch.action_masks().reshape(self.num_envs, -1)
+
+    def actions_of(
+        self, commands: Sequence[Mapping[str, Command]], *, clip: bool = False
+    ) -> NDArray[Any]:
+        """The actions that fly planners' commands, see `CoverageSwarmEnv.actions_of`.
+
+        Args:
+            commands: Of each mission; empty where it has ended.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            Of `action_space`.
+
+        Raises:
+            ValueError: No action of this kind flies a command, or one that flies has none.
+        """
+        return self._batch.actions_of(commands, clip=clip).reshape(self.num_envs, -1)
 
     def render(self) -> Any:
         """A tuple of pictures, one of each mission, or one picture of many, see `render_mode`.
@@ -251,7 +268,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         if name in _OF_EACH_MISSION:
             answer = {
                 "action_masks": lambda: tuple(self.action_masks()),
-                "brief": lambda: tuple(map(MissionBrief.of, self.call("scenario"))),
+                "brief": lambda: tuple(map(self._batch.brief_of, range(self.num_envs))),
                 "scenario": lambda: tuple(map(self._batch.scenario_of, range(self.num_envs))),
                 "swarm_state": lambda: tuple(map(self._batch.swarm_state, range(self.num_envs))),
             }[name]
@@ -313,7 +330,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         if self._batch.filters:
             infos["filtered"] = report[:, :, FILTERED] > 0.0
         if self._batch.chooses:
-            masks = masks_of(candidates).reshape(self.num_envs, -1)
+            masks = self._batch.actions.kind.masks(candidates).reshape(self.num_envs, -1)
             infos["action_mask"] = (masks & mask[:, None]).astype(np.int8)
         infos.update({f"_{name}": mask for name in infos})
         return infos

@@ -1,6 +1,7 @@
 """What is kept of a flight: planners by name, the rollout, its record, measures and directory."""
 
 from uas_coverage_env.flight.directory import check_directory
+from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.metrics import (
     accomplished,
     coverage,
@@ -20,7 +21,7 @@ from uas_coverage_env.flight.planner import (
     PlannerError,
     PlannerOptions,
 )
-from uas_coverage_env.flight.record import MODES, DecisionRecord, Flight, Violation
+from uas_coverage_env.flight.record import MODES, DecisionRecord, FlightRecord, Violation
 from uas_coverage_env.flight.registry import (
     OptionDescription,
     PlannerDescription,
@@ -37,6 +38,7 @@ __all__ = [
     "Decision",
     "DecisionRecord",
     "Flight",
+    "FlightRecord",
     "OptionDescription",
     "Planner",
     "PlannerDescription",

@@ -14,7 +14,7 @@ from typing import Any
 from uas_coverage_env.files.folder import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.metrics import summary
-from uas_coverage_env.flight.record import MODES, Flight
+from uas_coverage_env.flight.record import MODES, FlightRecord
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.vehicle import vehicle_names
@@ -42,7 +42,7 @@ def check_directory(directory: Path, *, overwrite: bool) -> None:
         raise InputError(f"{directory}: is not empty; give another folder or ask to overwrite")
 
 
-def write_flight(flight: Flight, directory: Path, *, overwrite: bool = False) -> Path:
+def write_flight(flight: FlightRecord, directory: Path, *, overwrite: bool = False) -> Path:
     """Write all files of a flight; foreign files in the folder are left alone.
 
     Raises:
@@ -79,7 +79,7 @@ def _scenario_files(scenario: Scenario) -> dict[str, str]:
     return {**texts, "scenario.json": _json(data)}
 
 
-def _flight_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
+def _flight_rows(flight: FlightRecord, times: Sequence[str]) -> Iterator[list[Any]]:
     """One row per UAS and sample, up to the sample in which it has landed or is lost."""
     states, inputs = flight.x.tolist(), flight.u.tolist()
     soc, voltage_V, current_A = (
@@ -95,24 +95,27 @@ def _flight_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
                 ]
 
 
-def _moving_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
+def _moving_rows(flight: FlightRecord, times: Sequence[str]) -> Iterator[list[Any]]:
     names = [obstacle.name for obstacle in flight.scenario.moving_obstacles]
     for time, positions_m in zip(times, flight.moving_position_m.tolist(), strict=True):
         for name, position_m in zip(names, positions_m, strict=True):
             yield [time, name, *position_m]
 
 
-def _plan_rows(flight: Flight, times: Sequence[str]) -> Iterator[list[Any]]:
+def _plan_rows(flight: FlightRecord, times: Sequence[str]) -> Iterator[list[Any]]:
     for step, i, n, position_m in flight.plan.tolist():
         yield [times[step], flight.names[i], n, *position_m.tolist()]
 
 
-def _run(flight: Flight) -> dict[str, Any]:
+def _run(flight: FlightRecord) -> dict[str, Any]:
     """How the flight came about: what no other file says, decision by decision."""
+    # in still air the file is as it was before there were disturbances
+    disturbed = {"disturbances": list(flight.disturbances)} if flight.disturbances else {}
     return {
         "dynamics": flight.dynamics,
         "return_mode": flight.return_mode,
         "safety_filter": flight.safety_filter,
+        **disturbed,
         "ended": flight.ended,
         "decisions": [dataclasses.asdict(decision) for decision in flight.decisions],
     }

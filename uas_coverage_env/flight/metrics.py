@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, Flight, Violation
+from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, FlightRecord, Violation
 
 _J_PER_WH = 3600.0
 
 
-def coverage(flight: Flight) -> float:
+def coverage(flight: FlightRecord) -> float:
     """Fraction of the waypoints that the swarm has covered, 0..1."""
     return float(flight.covered[-1] / len(flight.scenario.waypoints))
 
 
-def covered_at(flight: Flight) -> NDArray[np.int64]:
+def covered_at(flight: FlightRecord) -> NDArray[np.int64]:
     """(W,) the sample in which each waypoint was covered; T (one past the last) where never."""
     positions_m = flight.x[:, :, 0:3]
     alive = flight.mode < LOST
@@ -29,24 +29,24 @@ def covered_at(flight: Flight) -> NDArray[np.int64]:
     return result
 
 
-def energy_Wh(flight: Flight) -> NDArray[np.float64]:
+def energy_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     """(U,) [Wh] sum over samples of voltage times current times dt."""
     power_W = flight.voltage_V * flight.current_A
     return power_W.sum(axis=0) * flight.scenario.dt_s / _J_PER_WH
 
 
-def home(flight: Flight) -> NDArray[np.bool_]:
+def home(flight: FlightRecord) -> NDArray[np.bool_]:
     """(U,) whether each UAS has landed."""
     return flight.mode[-1] == LANDED
 
 
-def accomplished(flight: Flight) -> bool:
+def accomplished(flight: FlightRecord) -> bool:
     """Whether the mission succeeded: everything covered, everyone home, no violation."""
     everything = flight.covered[-1] == len(flight.scenario.waypoints)
     return bool(everything and home(flight).all() and not flight.violations)
 
 
-def decision_time_s(flight: Flight) -> dict[str, float | None]:
+def decision_time_s(flight: FlightRecord) -> dict[str, float | None]:
     """Percentiles of the planner's time per decision [s]; None where there was no decision."""
     names = ("p50", "p95", "p99", "max")
     durations_s = [decision.duration_s for decision in flight.decisions]
@@ -55,19 +55,19 @@ def decision_time_s(flight: Flight) -> dict[str, float | None]:
     return dict(zip(names, np.percentile(durations_s, (50, 95, 99, 100)).tolist(), strict=True))
 
 
-def mip_gap_p50(flight: Flight) -> float | None:
+def mip_gap_p50(flight: FlightRecord) -> float | None:
     """Median gap of the optimising planner, relative to what a plan can influence; None: none."""
     gaps = [decision.mip_gap for decision in flight.decisions if decision.mip_gap is not None]
     return float(np.median(gaps)) if gaps else None
 
 
-def filtered_share(flight: Flight) -> float:
+def filtered_share(flight: FlightRecord) -> float:
     """Share of the commands that the safety filter replaced, 0..1; 0 where there was none."""
     commands = int(flight.last_sample.sum())
     return sum(decision.filtered for decision in flight.decisions) / max(commands, 1)
 
 
-def fallback_reasons(flight: Flight) -> dict[str, int]:
+def fallback_reasons(flight: FlightRecord) -> dict[str, int]:
     """Why there were fallbacks, and how many: the most frequent reason first."""
     reasons = Counter(
         decision.reason or "no reason given" for decision in flight.decisions if decision.fallback
@@ -75,7 +75,7 @@ def fallback_reasons(flight: Flight) -> dict[str, int]:
     return dict(reasons.most_common())
 
 
-def summary(flight: Flight) -> dict[str, Any]:
+def summary(flight: FlightRecord) -> dict[str, Any]:
     """The fields of `summary.json`, in their order."""
     return {
         "coverage": coverage(flight),

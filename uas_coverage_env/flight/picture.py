@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import Picture
+from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.metrics import covered_at
-from uas_coverage_env.flight.record import LANDED, LOST, Flight
+from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.world import FLYING, SwarmState
 from uas_coverage_env.world import LANDED as HAS_LANDED
 from uas_coverage_env.world import LOST as IS_LOST

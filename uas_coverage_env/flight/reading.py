@@ -84,6 +84,7 @@ class _Run(StrictModel):
     dynamics: Dynamics
     return_mode: bool
     safety_filter: bool
+    disturbances: tuple[str, ...] = ()
     ended: Literal["complete", "steps", "stopped"]
     decisions: tuple[_Decision, ...]
 

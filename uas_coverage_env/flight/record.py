@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -84,7 +83,7 @@ class DecisionRecord:
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
+class FlightRecord:
     """One mission as it was flown, sample by sample, with all that is needed to repeat it.
 
     Samples run from t = 0 to the end of the flight (T = steps + 1). Inputs and current of a sample
@@ -94,10 +93,11 @@ class Flight:
         scenario: The scenario flown.
         planner: Name of the planner.
         planner_options: Its options as plain data.
-        seed: The seed of the planner.
+        seed: The seed of the planner, and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
         return_mode: Whether the world brought UAS home in time.
         safety_filter: Whether the world kept commands clear of harm.
+        disturbances: Names of what pushed back.
         ended: `complete` (nobody flies any more), `steps` (limit of steps) or `stopped` (by hand).
         x: (T, U, 14) states, see `uas_coverage_env.vehicle.layout`.
         u: (T, U, 5) inputs, zero once landed or lost.
@@ -123,6 +123,7 @@ class Flight:
     dynamics: str
     return_mode: bool
     safety_filter: bool
+    disturbances: tuple[str, ...]
     ended: str
     x: NDArray[np.float64]
     u: NDArray[np.float64]
@@ -142,7 +143,7 @@ class Flight:
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""
-        if not isinstance(other, Flight):
+        if not isinstance(other, FlightRecord):
             return NotImplemented
         return all(
             _equal(getattr(self, field.name), getattr(other, field.name))
@@ -175,27 +176,6 @@ class Flight:
     def last_sample(self) -> NDArray[np.int64]:
         """(U,) the sample in which each UAS has landed or is lost, else the last of the flight."""
         return last_samples(self.mode)
-
-    def save(self, directory: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the flight as a flight directory, see `uas_coverage_env.flight.directory`.
-
-        Raises:
-            InputError: The directory cannot be written, or is not empty and `overwrite` not set.
-        """
-        from uas_coverage_env.flight.directory import write_flight  # it imports Flight
-
-        return write_flight(self, Path(directory), overwrite=overwrite)
-
-    @classmethod
-    def load(cls, directory: str | Path) -> Self:
-        """Read a flight directory back; equal to the flight that was saved.
-
-        Raises:
-            InputError: A file is missing or was damaged.
-        """
-        from uas_coverage_env.flight.reading import read_flight  # it imports Flight
-
-        return cls(**read_flight(Path(directory)))
 
 
 def last_samples(mode: NDArray[np.int8]) -> NDArray[np.int64]:

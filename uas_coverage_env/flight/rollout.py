@@ -3,7 +3,7 @@
 import contextlib
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.disturbances import Disturbance
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.planner import Assistants, Planner, PlannerError
-from uas_coverage_env.flight.record import Flight
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario
@@ -44,6 +45,7 @@ def rollout(
     return_mode: bool | None = None,
     safety_filter: bool | None = None,
     max_steps: int | None = None,
+    disturbances: Sequence[Disturbance] | None = None,
     on_step: Callable[[Progress], object] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Flight:
@@ -54,11 +56,13 @@ def rollout(
     Args:
         scenario: A scenario, the name of a shipped one, or the path of a scenario file.
         planner: A planner, or the name of an installed one (flown with its default options).
-        seed: The seed of the planner.
+        seed: The seed of the planner and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
         return_mode: Let the world bring UAS home in time; None: as the planner asks.
         safety_filter: Let the world keep commands clear of harm; None: as the planner asks.
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
+        disturbances: What pushes back; None: what the scenario says. Others than those of the
+            scenario are named in the record, but no flight directory holds what they do.
         on_step: Called with a `Progress` once all is compiled and after every step.
         should_stop: Asked before every decision.
 
@@ -78,7 +82,14 @@ def rollout(
         return_mode = assistants.return_mode
     if safety_filter is None:
         safety_filter = assistants.safety_filter
-    world = World(scenario, dynamics=dynamics, return_mode=return_mode, safety_filter=safety_filter)
+    world = World(
+        scenario,
+        dynamics=dynamics,
+        return_mode=return_mode,
+        safety_filter=safety_filter,
+        disturbances=disturbances,
+        seed=seed,
+    )
     _make_ready(world, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
@@ -95,6 +106,7 @@ def rollout(
         dynamics=dynamics,
         return_mode=return_mode,
         safety_filter=safety_filter,
+        disturbances=tuple(disturbance.name for disturbance in world.disturbances),
         ended=ended,
         wall_time_s=time.perf_counter() - started,
         versions=_versions(),

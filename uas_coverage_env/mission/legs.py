@@ -15,7 +15,14 @@ from scipy.spatial import KDTree
 
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import VehicleParams
+from uas_coverage_env.vehicle.range import (
+    ROUTED,
+    Speeds,
+    flight_seconds,
+    level_seconds,
+    speeds_of,
+    vertical_seconds,
+)
 from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +55,7 @@ class Legs:
         self._arena = build_arena(brief.as_scenario())
         kinds = list(dict.fromkeys(brief.vehicles))
         self.kind = np.array([kinds.index(vehicle) for vehicle in brief.vehicles])
-        self._speeds = np.array([_speeds(vehicle) for vehicle in kinds])
+        self._speeds = [speeds_of(vehicle) for vehicle in kinds]
         limits = [vehicle.limits for vehicle in brief.vehicles]
         gravity = [vehicle.airframe.gravity_mps2 for vehicle in brief.vehicles]
         self.speed_mps = np.array([limit.v_xy_max_mps for limit in limits])
@@ -92,7 +99,7 @@ class Legs:
         speeds = self._speeds[self.kind[uas]]
         return float(_legs_s(self._arena, target, here, start, np.zeros(1), speeds, _OCTAGON)[0])
 
-    def _between(self, speeds: FloatArray) -> FloatArray:
+    def _between(self, speeds: Speeds) -> FloatArray:
         n = len(self.waypoints_m)
         first, second = (axis.ravel() for axis in np.indices((n, n)))
         straight = _straight_s(
@@ -124,11 +131,6 @@ class Legs:
         )
 
 
-def _speeds(vehicle: VehicleParams) -> tuple[float, float, float]:
-    limits = vehicle.limits
-    return limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps
-
-
 def _without_self(found: NDArray[np.intp]) -> NDArray[np.intp]:
     """(W, K) the neighbours; a waypoint at the very same place may come before the waypoint."""
     rows = [row[row != w][: len(row) - 1] for w, row in enumerate(found)]
@@ -136,13 +138,13 @@ def _without_self(found: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _straight_s(
-    start_m: FloatArray, end_m: FloatArray, credit_m: FloatArray, speeds: FloatArray
+    start_m: FloatArray, end_m: FloatArray, credit_m: FloatArray, speeds: Speeds
 ) -> FloatArray:
     away = end_m - start_m
-    level = (away[:, :2] @ _OCTAGON.T).max(axis=1) / speeds[0]
-    up = np.maximum(-away[:, 2] - credit_m, 0.0) / speeds[1]
-    down = np.maximum(away[:, 2] - credit_m, 0.0) / speeds[2]
-    return np.maximum(level, np.maximum(up, down))
+    way_m = (away[:, :2] @ _OCTAGON.T).max(axis=1)
+    up_m = np.maximum(-away[:, 2] - credit_m, 0.0)
+    down_m = np.maximum(away[:, 2] - credit_m, 0.0)
+    return np.maximum(level_seconds(ROUTED, speeds, way_m), vertical_seconds(speeds, up_m, down_m))
 
 
 @allocating_kernel
@@ -170,5 +172,5 @@ def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, octagon):
                     top = min(top, -obstacle.roof_m)
             up = max(up, z0 - top)
             down = max(down, z1 - top - credit_m[i])
-        result[i] = max(length_m / speeds[0], up / speeds[1] + down / speeds[2])
+        result[i] = flight_seconds(ROUTED, speeds, 0.0, length_m, up, down)
     return result

@@ -1,24 +1,27 @@
 """What a mission is: scenarios from files, from code and from a seed, checked at the door."""
 
 from uas_coverage_env.scenario.checks import warnings
+from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios, draw_scenario
-from uas_coverage_env.scenario.generator import generate_scenario
-from uas_coverage_env.scenario.load import load_scenario, scenario_names
-from uas_coverage_env.scenario.model import (
+from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
     MovingObstacle,
     Obstacle,
-    Scenario,
     ScheduledVelocity,
     Uas,
     Waypoint,
+    Wind,
 )
+from uas_coverage_env.scenario.generator import generate_scenario
+from uas_coverage_env.scenario.load import load_scenario, scenario_names
+from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.source import MissionSource, Room, ScenarioGenerator, ScenarioLike
 
 __all__ = [
     "FAMILIES",
     "Decoration",
+    "DisturbanceTable",
     "GeneratedScenarios",
     "Geofence",
     "MissionSource",
@@ -31,6 +34,7 @@ __all__ = [
     "ScheduledVelocity",
     "Uas",
     "Waypoint",
+    "Wind",
     "draw_scenario",
     "generate_scenario",
     "load_scenario",

@@ -5,16 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.fields import Geofence, Obstacle, UncheckedScenario
 from uas_coverage_env.vehicle import load_vehicle, vehicle_names
-
-if TYPE_CHECKING:
-    from uas_coverage_env.scenario.model import Geofence, Obstacle, Scenario
 
 
 def first_of(found: Sequence[str]) -> str:
@@ -22,7 +19,7 @@ def first_of(found: Sequence[str]) -> str:
     return found[0] + (f" (+{len(found) - 1} more)" if len(found) > 1 else "")
 
 
-def problems(scenario: Scenario) -> list[str]:
+def problems(scenario: UncheckedScenario) -> list[str]:
     """Why nobody can fly this scenario; one line each, empty where it is sound.
 
     Each line names the field, the value and the fix.
@@ -43,12 +40,12 @@ def problems(scenario: Scenario) -> list[str]:
     ]
 
 
-def warnings(scenario: Scenario) -> list[str]:
+def warnings(scenario: UncheckedScenario) -> list[str]:
     """What is allowed but probably not meant; one line each."""
     return [*_waypoints_out_of_reach(scenario), *_mission_too_long(scenario)]
 
 
-def _names_used_twice(scenario: Scenario) -> Iterator[str]:
+def _names_used_twice(scenario: UncheckedScenario) -> Iterator[str]:
     for field in ("obstacles", "moving_obstacles", "uas", "decorations"):
         seen: set[str] = set()
         for index, entry in enumerate(getattr(scenario, field)):
@@ -57,7 +54,7 @@ def _names_used_twice(scenario: Scenario) -> Iterator[str]:
             seen.add(entry.name)
 
 
-def _bodies_without_volume(scenario: Scenario) -> Iterator[str]:
+def _bodies_without_volume(scenario: UncheckedScenario) -> Iterator[str]:
     bodies: list[tuple[str, Geofence | Obstacle]] = [("geofence", scenario.geofence)]
     bodies += [(f"obstacles[{index}]", body) for index, body in enumerate(scenario.obstacles)]
     for field, body in bodies:
@@ -67,7 +64,7 @@ def _bodies_without_volume(scenario: Scenario) -> Iterator[str]:
             yield f"{field}.vertices_m: {error}"
 
 
-def _vehicles(scenario: Scenario) -> Iterator[str]:
+def _vehicles(scenario: UncheckedScenario) -> Iterator[str]:
     seen = set(vehicle_names())
     for index, uas in enumerate(scenario.uas):
         if uas.vehicle not in seen:
@@ -78,7 +75,7 @@ def _vehicles(scenario: Scenario) -> Iterator[str]:
                 yield f"uas[{index}].vehicle: {error}"
 
 
-def _fence(scenario: Scenario) -> Iterator[str]:
+def _fence(scenario: UncheckedScenario) -> Iterator[str]:
     fence, margin_m = scenario.fence, scenario.geofence.margin_m
     width_m = float((-fence.face_distances(fence.vertices_m)).max(axis=0).min())
     if width_m <= 2.0 * margin_m:
@@ -88,7 +85,7 @@ def _fence(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _waypoints(scenario: Scenario) -> Iterator[str]:
+def _waypoints(scenario: UncheckedScenario) -> Iterator[str]:
     positions = np.array([waypoint.position_m for waypoint in scenario.waypoints])
     outside_m = scenario.fence.signed_distance(positions)
     for index in np.flatnonzero(outside_m > 0.0):
@@ -105,7 +102,7 @@ def _waypoints(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _starts_and_fixed_things(scenario: Scenario) -> Iterator[str]:
+def _starts_and_fixed_things(scenario: UncheckedScenario) -> Iterator[str]:
     margin_m = scenario.geofence.margin_m
     for index, uas in enumerate(scenario.uas):
         start = f"uas[{index}].start_m: {_point(uas.start_m)}"
@@ -123,7 +120,7 @@ def _starts_and_fixed_things(scenario: Scenario) -> Iterator[str]:
             yield from _too_close(start, distance_m, named, uas.radius_m, obstacle.safe_distance_m)
 
 
-def _starts_and_moving_obstacles(scenario: Scenario) -> Iterator[str]:
+def _starts_and_moving_obstacles(scenario: UncheckedScenario) -> Iterator[str]:
     for index, uas in enumerate(scenario.uas):
         start = f"uas[{index}].start_m: {_point(uas.start_m)}"
         for obstacle in scenario.moving_obstacles:
@@ -148,7 +145,7 @@ def _too_close(
         )
 
 
-def _starts_and_each_other(scenario: Scenario) -> Iterator[str]:
+def _starts_and_each_other(scenario: UncheckedScenario) -> Iterator[str]:
     for (i, one), (j, other) in itertools.combinations(enumerate(scenario.uas), 2):
         x, y, z = np.subtract(one.start_m, other.start_m)
         distance_m = max(math.hypot(x, y), abs(z))
@@ -161,7 +158,7 @@ def _starts_and_each_other(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _batteries(scenario: Scenario) -> Iterator[str]:
+def _batteries(scenario: UncheckedScenario) -> Iterator[str]:
     for index, uas in enumerate(scenario.uas):
         if 1.0 - uas.soc_0 >= uas.dod_max:
             yield (
@@ -170,7 +167,7 @@ def _batteries(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _waypoints_out_of_reach(scenario: Scenario) -> Iterator[str]:
+def _waypoints_out_of_reach(scenario: UncheckedScenario) -> Iterator[str]:
     radius_m = min(uas.radius_m for uas in scenario.uas)
     for index, waypoint in enumerate(scenario.waypoints):
         points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
@@ -185,7 +182,7 @@ def _waypoints_out_of_reach(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _mission_too_long(scenario: Scenario) -> Iterator[str]:
+def _mission_too_long(scenario: UncheckedScenario) -> Iterator[str]:
     plan = back_and_forth(scenario)
     if not plan.complete:
         yield (
@@ -201,7 +198,7 @@ def _mission_too_long(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _each(scenario: Scenario, seconds: NDArray[np.float64]) -> str:
+def _each(scenario: UncheckedScenario, seconds: NDArray[np.float64]) -> str:
     named = zip(scenario.uas[:4], seconds, strict=False)
     more = ", …" if len(seconds) > 4 else ""
     return ", ".join(f"{uas.name} {time_s:.0f} s" for uas, time_s in named) + more

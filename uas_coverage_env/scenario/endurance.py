@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.vehicle import VehicleParams, battery_current_A
+from uas_coverage_env.scenario.fields import UncheckedScenario
+from uas_coverage_env.vehicle.range import (
+    GENERATED,
+    Speeds,
+    level_seconds,
+    seconds_until,
+    speeds_of,
+    vertical_seconds,
+)
 
-if TYPE_CHECKING:
-    from uas_coverage_env.scenario.model import Scenario
-
-# Share of the top speed that is left on average by turns, starts and stops.
-_PACE = 0.85
 # Power on the way, relative to hovering: drag at speed, climbs and turns.
 _POWER = 1.11
-# Taking off and landing.
-_AT_HOME_S = 6.0
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class RoughPlan:
         return float(self.flight_s.max())
 
 
-def back_and_forth(scenario: Scenario, spare: float = 0.0) -> RoughPlan:
+def back_and_forth(scenario: UncheckedScenario, spare: float = 0.0) -> RoughPlan:
     """Visit the waypoints row by row, split into one run per UAS of about equal time.
 
     Args:
@@ -61,7 +61,7 @@ def back_and_forth(scenario: Scenario, spare: float = 0.0) -> RoughPlan:
     starts = np.array([uas.start_m for uas in scenario.uas])
     air_time_s = np.array(
         [
-            _air_time_s(vehicle, uas.soc_0, uas.dod_max)
+            seconds_until(vehicle, 1.0 - uas.soc_0, uas.dod_max, _POWER * vehicle.power.hover_W)
             for vehicle, uas in zip(scenario.vehicles, scenario.uas, strict=True)
         ]
     )
@@ -77,24 +77,12 @@ def back_and_forth(scenario: Scenario, spare: float = 0.0) -> RoughPlan:
     return RoughPlan(min(plans, key=lambda flight_s: flight_s.max()), air_time_s, complete)
 
 
-def _air_time_s(vehicle: VehicleParams, soc_0: float, dod_max: float) -> float:
-    """Seconds of flight at the usual pace until the depth of discharge is dod_max."""
-    battery = vehicle.battery
-    dod = np.linspace(1.0 - soc_0, dod_max, 33)
-    voltage_V = float(np.interp(dod, battery.ocv_dod, battery.ocv_V).mean())
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    current_A = battery_current_A(voltage_V, resistance_ohm, _POWER * vehicle.power.hover_W)
-    return (dod_max - (1.0 - soc_0)) * battery.capacity_Ah * 3600.0 / current_A
-
-
 class _Legs:
     """Flight times between points: straight where that is free, else over the obstacles."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        limits = [vehicle.limits for vehicle in scenario.vehicles]
-        self.ground_mps = _PACE * min(limit.v_xy_max_mps for limit in limits)
-        self.climb_mps = min(limit.v_up_max_mps for limit in limits)
-        self.sink_mps = min(limit.v_down_max_mps for limit in limits)
+    def __init__(self, scenario: UncheckedScenario) -> None:
+        slowest = np.min([speeds_of(vehicle) for vehicle in scenario.vehicles], axis=0)
+        self.speeds = Speeds(*slowest.tolist())
         radius_m = max(uas.radius_m for uas in scenario.uas)
         kept_m = [radius_m + obstacle.safe_distance_m for obstacle in scenario.obstacles]
         corners = [hull.vertices_m for hull in scenario.hulls]
@@ -111,7 +99,7 @@ class _Legs:
         for low, high in self.boxes:
             hit = _meets_box(start_m, way, low, high)
             top_m = np.where(hit, np.maximum(top_m, -low[2]), top_m)
-        ground_s = np.hypot(way[..., 0], way[..., 1]) / self.ground_mps
+        ground_s = level_seconds(GENERATED, self.speeds, np.hypot(way[..., 0], way[..., 1]))
         before_m, after_m = top_m + start_m[..., 2], top_m + end_m[..., 2]
         return _Times(
             there_s=np.maximum(
@@ -125,7 +113,7 @@ class _Legs:
         )
 
     def _vertical_s(self, climb_m: NDArray, sink_m: NDArray) -> NDArray:
-        return np.maximum(climb_m, 0.0) / self.climb_mps + np.maximum(sink_m, 0.0) / self.sink_mps
+        return vertical_seconds(self.speeds, np.maximum(climb_m, 0.0), np.maximum(sink_m, 0.0))
 
 
 @dataclass(frozen=True)
@@ -173,8 +161,8 @@ class _Runs:
     def __init__(self, legs: _Legs, route: NDArray[np.float64], outward: _Times) -> None:
         between_s = legs.between(route[:-1], route[1:]).there_s
         self.at_s = np.concatenate([[0.0], np.cumsum(between_s)])
-        self.out_s = outward.there_s + 0.5 * _AT_HOME_S
-        self.home_s = outward.back_s + 0.5 * _AT_HOME_S
+        self.out_s = outward.there_s + GENERATED.landing_s
+        self.home_s = outward.back_s + GENERATED.landing_s
 
     def balanced(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """(U,) flight times with the smallest largest one; None where the limits allow none."""

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.scenario.endurance import back_and_forth
-from uas_coverage_env.scenario.model import Geofence, Obstacle, Scenario, Uas, Waypoint
+from uas_coverage_env.scenario.fields import Geofence, Obstacle, Uas, Waypoint
+from uas_coverage_env.scenario.model import Scenario
 
 _VEHICLE = "s500_v2"
 _UAS_RADIUS_M = 0.36

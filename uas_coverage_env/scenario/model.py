@@ -1,235 +1,19 @@
-"""What a mission is: area, obstacles, waypoints and fleet (Gasche et al., Sec. IV), checked.
+"""A mission, complete: its fields together make sense."""
 
-Frame: NED in metres, x north, y east, z down (z < 0 above ground). The fields are those of the
-scenario files; see `village.toml`.
-"""
-
-import itertools
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    Strict,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import model_validator
 
-from uas_coverage_env.files.strict_toml import StrictModel
-from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario.checks import first_of, problems
+from uas_coverage_env.scenario.fields import UncheckedScenario
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
-
-_NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
-_LONGEST_NAME = 64
 
 
-def _checked_name(name: str) -> str:
-    # names are columns of CSV files, keys of dictionaries and parts of file names
-    if not 0 < len(name) <= _LONGEST_NAME or not _NAME_LETTERS.issuperset(name):
-        raise ValueError(
-            f"{name[:80]!r} is no valid name; use 1 to {_LONGEST_NAME} letters, digits, _ or -"
-        )
-    return name
-
-
-def _as_tuple(value: Any) -> Any:
-    """Lists and arrays of Python code as the tuples that a hashable record holds."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    return tuple(_as_tuple(item) for item in value) if isinstance(value, list | tuple) else value
-
-
-Name = Annotated[str, AfterValidator(_checked_name)]
-Label = Annotated[str, Field(min_length=1, max_length=100)]
-Coordinate_m = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
-Distance_m = Annotated[float, Field(ge=0.0, le=10_000.0)]
-Length_m = Annotated[float, Field(gt=0.0, le=10_000.0)]
-Speed_mps = Annotated[float, Field(ge=-1_000.0, le=1_000.0)]
-Position_m = Annotated[tuple[Coordinate_m, Coordinate_m, Coordinate_m], BeforeValidator(_as_tuple)]
-Velocity_mps = Annotated[tuple[Speed_mps, Speed_mps, Speed_mps], BeforeValidator(_as_tuple)]
-Points_m = Annotated[
-    tuple[tuple[Coordinate_m, Coordinate_m, Coordinate_m], ...],
-    BeforeValidator(_as_tuple),
-    Field(min_length=4),
-]
-Outline_m = Annotated[
-    tuple[tuple[Coordinate_m, Coordinate_m], ...],
-    BeforeValidator(_as_tuple),
-    Field(min_length=3),
-]
-
-
-class Geofence(StrictModel):
-    """The convex volume that no UAS may leave (Gasche et al., eq. OCP_5).
-
-    Attributes:
-        margin_m: Distance that a planner keeps from the inside of the fence [m].
-        vertices_m: Points whose convex hull is the fence, (V, 3) [m].
-    """
-
-    margin_m: Distance_m
-    vertices_m: Points_m
-
-    @cached_property
-    def hull(self) -> ConvexPolytope:
-        """The fence as plane inequalities."""
-        return ConvexPolytope.from_points(self.vertices_m)
-
-
-class Obstacle(StrictModel):
-    """A fixed convex obstacle (Gasche et al., eq. OCP_6).
-
-    Attributes:
-        name: Unique among the obstacles.
-        kind: Free label; it chooses a colour in pictures.
-        safe_distance_m: Kept from the hull in addition to the radius of the UAS [m].
-        vertices_m: Points whose convex hull is the obstacle, (V, 3) [m].
-    """
-
-    name: Name
-    kind: Label | None = None
-    safe_distance_m: Distance_m
-    vertices_m: Points_m
-
-    @cached_property
-    def hull(self) -> ConvexPolytope:
-        """The obstacle as plane inequalities."""
-        return ConvexPolytope.from_points(self.vertices_m)
-
-
-class ScheduledVelocity(StrictModel):
-    """A velocity that a moving obstacle has from a time on.
-
-    Attributes:
-        from_s: Start of the piece [s].
-        velocity_mps: North, east, down [m/s].
-    """
-
-    from_s: Annotated[float, Field(ge=0.0, le=1e6)]
-    velocity_mps: Velocity_mps
-
-
-class MovingObstacle(StrictModel):
-    """An upright cylinder that moves with piecewise constant velocity.
-
-    Attributes:
-        name: Unique among the moving obstacles.
-        kind: Free label; it chooses a colour in pictures.
-        radius_m: Radius [m].
-        height_m: Full height [m].
-        safe_distance_m: Kept from the cylinder in addition to the radius of the UAS [m].
-        start_m: Centre of the cylinder at t = 0 [m].
-        schedule: Velocities in order of time; the last one holds for ever. Players never see it.
-    """
-
-    name: Name
-    kind: Label | None = None
-    radius_m: Length_m
-    height_m: Length_m
-    safe_distance_m: Distance_m
-    start_m: Position_m
-    schedule: Annotated[tuple[ScheduledVelocity, ...], Strict(False), Field(min_length=1)]
-
-    @field_validator("schedule")
-    @classmethod
-    def _starts_at_zero_and_increases(
-        cls, schedule: tuple[ScheduledVelocity, ...]
-    ) -> tuple[ScheduledVelocity, ...]:
-        times = [piece.from_s for piece in schedule]
-        if times[0] != 0.0:
-            raise ValueError(f"starts at from_s = {times[0]:g}; add a first entry at from_s = 0")
-        for earlier, later in itertools.pairwise(times):
-            if later <= earlier:
-                raise ValueError(
-                    f"from_s = {later:g} follows {earlier:g}; list the entries in order of time"
-                )
-        return schedule
-
-
-class Waypoint(StrictModel):
-    """A point that is covered once a UAS has been near it (Gasche et al., eq. OCP_8).
-
-    Attributes:
-        kind: Free label; it chooses a colour in pictures.
-        position_m: Centre of the sphere [m].
-        radius_m: Radius of the sphere, δ_WP [m].
-        weight: How much earlier coverage is worth [-].
-    """
-
-    kind: Label | None = None
-    position_m: Position_m
-    radius_m: Length_m
-    weight: Annotated[float, Field(gt=0.0, le=1e6)]
-
-
-class Uas(StrictModel):
-    """One member of the fleet: a vehicle, where it starts, and what its battery may give.
-
-    Attributes:
-        name: Unique; the agent's name in the environments.
-        vehicle: A shipped vehicle (`s500_v2`, `hexacopter`) or the path of a vehicle file,
-            relative to the scenario file; held as an absolute path.
-        start_m: Where it takes off and lands [m].
-        soc_0: State of charge at t = 0 [-].
-        radius_m: Radius of the sphere that holds the machine, δ_UAV [m].
-        dod_max: Depth of discharge beyond which the UAS is lost [-].
-    """
-
-    name: Name
-    vehicle: Annotated[str, Field(min_length=1, max_length=4096)]
-    start_m: Position_m
-    soc_0: Annotated[float, Field(gt=0.0, le=1.0)]
-    radius_m: Annotated[float, Field(gt=0.0, le=100.0)]
-    dod_max: Annotated[float, Field(gt=0.0, lt=1.0)]
-
-    @field_validator("vehicle")
-    @classmethod
-    def _is_known(cls, vehicle: str, info: ValidationInfo) -> str:
-        if vehicle in vehicle_names():
-            return vehicle
-        path = Path(vehicle)
-        if path.suffix != ".toml":
-            shipped = ", ".join(vehicle_names())
-            raise ValueError(
-                f"unknown vehicle {vehicle[:80]!r}; take {shipped} or the path of a .toml file"
-            )
-        folder = Path((info.context or {}).get("folder", "."))
-        try:
-            path = (folder / path).resolve()
-            found = path.is_file()
-        except (OSError, RuntimeError) as error:  # too long, closed to us, a loop of links
-            reason = (getattr(error, "strerror", None) or str(error)).lower()
-            raise ValueError(
-                f"vehicle file {vehicle[:80]!r} cannot be read ({reason}); correct the path"
-            ) from None
-        if not found:
-            raise ValueError(f"no vehicle file at {path}; correct the path")
-        return str(path)
-
-
-class Decoration(StrictModel):
-    """Something drawn on the ground that no planner has to avoid.
-
-    Attributes:
-        name: Unique among the decorations.
-        kind: Free label; it chooses a colour in pictures.
-        polygon_m: Corners, north and east, (V, 2) [m].
-    """
-
-    name: Name
-    kind: Label | None = None
-    polygon_m: Outline_m
-
-
-class Scenario(StrictModel):
+class Scenario(UncheckedScenario):
     """A mission, complete and checked; immutable, hashable, the same for all players.
 
     Attributes:
@@ -246,21 +30,10 @@ class Scenario(StrictModel):
         uas: The fleet.
         waypoints: What is to be covered.
         decorations: Drawn only.
+        wind: Wind; without it, the air is still.
+        disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
+            are those of the package that installed NAME.
     """
-
-    schema_version: int = Field(alias="schema", ge=1, le=1)
-    name: Name
-    dt_s: Annotated[float, Field(ge=0.1, le=2.0)]
-    max_steps: Annotated[int, Field(ge=1, le=100_000)]
-    landing_distance_m: Length_m
-    landing_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)]
-    uas_safe_distance_m: Distance_m
-    geofence: Geofence
-    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = ()
-    moving_obstacles: Annotated[tuple[MovingObstacle, ...], Strict(False)] = ()
-    uas: Annotated[tuple[Uas, ...], Strict(False), Field(min_length=1)]
-    waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
-    decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
 
     def __getstate__(self) -> dict[Any, Any]:
         # unlike the rest of what is computed: where the copy goes their files may be others
@@ -274,22 +47,6 @@ class Scenario(StrictModel):
         if found:
             raise ValueError(first_of(found))
         return self
-
-    @cached_property
-    def fence(self) -> ConvexPolytope:
-        """The geofence as plane inequalities."""
-        return self.geofence.hull
-
-    @cached_property
-    def hulls(self) -> tuple[ConvexPolytope, ...]:
-        """One hull per fixed obstacle, in their order."""
-        return tuple(obstacle.hull for obstacle in self.obstacles)
-
-    @cached_property
-    def vehicles(self) -> tuple[VehicleParams, ...]:
-        """The vehicle of each UAS, in their order."""
-        loaded = {name: load_vehicle(name) for name in {uas.vehicle for uas in self.uas}}
-        return tuple(loaded[uas.vehicle] for uas in self.uas)
 
     def moving_positions(self, time_s: float) -> NDArray[np.float64]:
         """Centres of the moving obstacles at a time, integrated exactly.

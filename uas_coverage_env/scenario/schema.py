@@ -6,18 +6,19 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from uas_coverage_env.scenario.model import (
+from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
     MovingObstacle,
     Obstacle,
-    Scenario,
     ScheduledVelocity,
     Uas,
     Waypoint,
+    Wind,
 )
+from uas_coverage_env.scenario.model import Scenario
 
-_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration)
+_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration, Wind)
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 

@@ -68,6 +68,7 @@ class MissionSource:
         room: The most that a mission may have.
         names: (U,) of the largest fleet.
         example: A mission like those to come.
+        examples: What was drawn to find out, the example among them.
 
     Raises:
         ValueError: An argument is none of what is allowed, or the generator returns no scenario.
@@ -98,7 +99,8 @@ class MissionSource:
         self.names = tuple(
             first.uas[i].name if self.fixed else f"uas_{i + 1}" for i in range(self.room.n_uas)
         )
-        self.example = self.fitted(first)
+        self.examples = tuple(self.fitted(example) for example in examples)
+        self.example = self.examples[0]
 
     @classmethod
     def of(cls, missions: Any) -> "MissionSource":

@@ -8,6 +8,7 @@ import numpy as np
 
 from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import lane_view, pool_view
+from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import begin_mission
 from uas_coverage_env.simulation.world import initial_state
@@ -25,23 +26,34 @@ class WorldPool(NamedTuple):
     """Of `STATE`: at t = 0, what lies within reach of the starts covered."""
 
 
-def pool_worlds(scenarios: Sequence[Scenario], *, measured_m: float = math.inf) -> WorldPool:
+def pool_worlds(
+    scenarios: Sequence[Scenario],
+    *,
+    measured_m: float = math.inf,
+    slots: Sequence[Sequence[Disturbance | None]] | None = None,
+) -> WorldPool:
     """Arenas and starts of scenarios with any numbers of UAS, waypoints and obstacles.
 
     Args:
         scenarios: At least one.
         measured_m: See `build_arena`.
+        slots: The disturbances of each, see `in_slots`; None: for callers that fly in still air.
 
     Raises:
-        ValueError: There is no scenario.
+        ValueError: There is no scenario, or one has disturbances and `slots` is None.
     """
     if not scenarios:
         raise ValueError("there is no scenario to fly; give at least one")
     arenas = []
     starts = []
-    for scenario in scenarios:
-        arena = build_arena(scenario, measured_m=measured_m)
-        start = initial_state(scenario)
+    if slots is None:
+        disturbed = [scenario.name for scenario in scenarios if disturbances_of(scenario)]
+        if disturbed:
+            raise ValueError(f"scenario {disturbed[0]} has disturbances; here the air is still")
+        slots = [()] * len(scenarios)
+    for scenario, disturbances in zip(scenarios, slots, strict=True):
+        arena = build_arena(scenario, measured_m=measured_m, disturbances=disturbances)
+        start = initial_state(scenario, len(disturbances))
         begin_mission(arena, start, np.zeros(len(scenario.uas), dtype=OUTCOME_DTYPE))
         arenas.append(arena)
         starts.append(start)

@@ -4,9 +4,19 @@ import math
 
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.compiled.borrow import part
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.views import Layout
-from uas_coverage_env.vehicle import N_INPUTS, X, lpv_step, plant_step, reseed_reference
+from uas_coverage_env.disturbances.act import disturb
+from uas_coverage_env.vehicle import (
+    N_INPUTS,
+    X,
+    enter_air,
+    leave_air,
+    lpv_step,
+    plant_step,
+    reseed_reference,
+)
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
@@ -78,26 +88,37 @@ def begin_step(state, commands, outcome):
 
 
 @inlined_kernel
-def _fly(arena, state, nonlinear, outcome):
+def _fly(arena, state, nonlinear, disturbances, outcome):
     """Fly the commands for one step."""
     dt_h = arena.rules[0].dt_s / 3600.0
+    disturbed = arena.rules[0].disturbed
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING:
+            event = outcome[i]
+            command_wrench(
+                arena.vehicles[i], state.x[i], state.reference[i], event.applied_command, event.u[:]
+            )
+    if disturbed:
+        disturb(arena, state, disturbances, outcome)
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
             continue
         x = state.x[i]
         event = outcome[i]
         u = event.u[:]
-        command = event.applied_command
         vehicle = arena.vehicles[i]
-        command_wrench(vehicle, x, state.reference[i], command, u)
+        if disturbed:
+            enter_air(x, event.wind_mps)
         if nonlinear:
             voltage_V, current_A = plant_step(vehicle, x, u, x)
         else:
             voltage_V, current_A = lpv_step(vehicle, x, u, x)
+        if disturbed:
+            leave_air(vehicle, x, event.wind_mps, event.force_N)
         event.voltage_V = voltage_V
         event.current_A = current_A
         event.energy_Wh = voltage_V * current_A * dt_h
-        if command.kind == WRENCH:
+        if event.applied_command.kind == WRENCH:
             reseed_reference(vehicle, x, state.reference[i])
 
 
@@ -109,12 +130,13 @@ def _lose(state, outcome):
 
 
 @inlined_kernel
-def carry_out(arena, state, nonlinear, outcome):
+def carry_out(arena, state, nonlinear, disturbances, outcome):
     """Fly the commands in `outcome`, of any kind but GO_TO, and judge what happened.
 
     The second half of `advance`. It makes no arrays at all, so it runs on a GPU too.
+    There `disturbances` is None, see `disturb`.
     """
-    _fly(arena, state, nonlinear, outcome)
+    _fly(arena, state, nonlinear, disturbances, outcome)
     judge_obstacles(arena, state, outcome)
     judge_separation(arena, state, outcome)
     judge_fence_and_battery(arena, state, outcome)
@@ -127,7 +149,7 @@ def carry_out(arena, state, nonlinear, outcome):
 
 
 @kernel
-def advance(arena, state, commands, nonlinear, assistants, outcome):
+def advance(arena, state, commands, nonlinear, assistants, disturbances, outcome):
     """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
 
     All decide from the state at sample k; then all fly; then contacts are judged on the straight
@@ -139,12 +161,14 @@ def advance(arena, state, commands, nonlinear, assistants, outcome):
         commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
         nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
         assistants: Who helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
+        disturbances: `DisturbanceCode` of those in the arena; None, where there are none or they
+            are those of the package: no call of an address is compiled then.
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     begin_step(state, commands, outcome)
     for k in range(len(assistants)):
         assist(assistants[k], arena, state, nonlinear, outcome)
-    carry_out(arena, state, nonlinear, outcome)
+    carry_out(arena, state, nonlinear, disturbances, outcome)
 
 
 @kernel
@@ -155,6 +179,7 @@ def begin_mission(arena, state, outcome):
 
 MISSION = Layout(ARENA, STATE)
 _views = MISSION.views
+_N_NUMBERS = MISSION.size
 
 
 @kernel
@@ -162,7 +187,7 @@ def step_world(at, commands, nonlinear, assistants, outcome):
     """`advance` called from Python.
 
     Args:
-        at: Addresses of arena and state, see `MISSION`.
+        at: Addresses of arena and state, see `MISSION`, then of the disturbances.
         commands: See `advance`, also the next three.
         nonlinear: Whether.
         assistants: Who helps to fly.
@@ -174,5 +199,6 @@ def step_world(at, commands, nonlinear, assistants, outcome):
     arena, state = _views(at)
     invalid = first_invalid(arena, state, commands)
     if invalid == ACCEPTED:
-        advance(arena, state, commands, nonlinear, assistants, outcome)
+        disturbances = part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
+        advance(arena, state, commands, nonlinear, assistants, disturbances, outcome)
     return invalid

@@ -1,7 +1,7 @@
 """The world as an object: one mission, step by step."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
+from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.disturbances import Disturbance, disturbances_of
+from uas_coverage_env.disturbances.act import begin_random, disturbance_code
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world.arena import build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
+from uas_coverage_env.world.disturbance import checked_disturbances
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState
 
@@ -22,9 +26,10 @@ Dynamics = Literal["lpv", "nonlinear"]
 _OUTCOMES_IN_BLOCK = 256
 
 
-def initial_state(scenario: Scenario) -> WorldState:
+def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
     """All UAS at rest at their starts, batteries rested, nothing covered."""
-    state = STATE.zeros({"U": len(scenario.uas), "W": len(scenario.waypoints)})
+    sizes = {"U": len(scenario.uas), "W": len(scenario.waypoints), "D": n_disturbances}
+    state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
     state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
     state.status[:] = FLYING
@@ -41,9 +46,12 @@ class World:
         return_mode: Whether UAS are brought home in time.
         safety_filter: Whether commands are kept clear of harm.
         measured_m: Up to where distances are measured, see `build_arena`.
+        disturbances: What pushes back; None: what the scenario says.
+        seed: Of all that disturbances draw, until `reset` is given another; from 0 to 2⁶⁴ - 1.
 
     Attributes:
         scenario: As given; likewise dynamics, return_mode and safety_filter.
+        disturbances: What pushes back.
         names: Names of the UAS, in order.
         arena: The scenario as arrays; not to be changed.
     """
@@ -56,6 +64,8 @@ class World:
         return_mode: bool = False,
         safety_filter: bool = False,
         measured_m: float = math.inf,
+        disturbances: Sequence[Disturbance] | None = None,
+        seed: int = 0,
     ) -> None:
         if dynamics not in get_args(Dynamics):
             allowed = ", ".join(get_args(Dynamics))
@@ -65,19 +75,23 @@ class World:
         self.return_mode = bool(return_mode)
         self.safety_filter = bool(safety_filter)
         self.names = tuple(uas.name for uas in scenario.uas)
-        self.arena = build_arena(scenario, measured_m=measured_m)
-        self._start = initial_state(scenario)
+        given = disturbances_of(scenario) if disturbances is None else disturbances
+        self.disturbances = checked_disturbances(given)
+        self.arena = build_arena(scenario, measured_m=measured_m, disturbances=self.disturbances)
+        self._start = initial_state(scenario, len(self.disturbances))
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
         self._nonlinear = dynamics == "nonlinear"
         self._prepare()
+        self._seed = 0
+        self.reset(seed)
 
     def _prepare(self) -> None:
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
         self._step: Callable[..., int] | None = None
         self._assistants: AssistantCode = np.zeros(0, dtype=np.int64)
-        self._at = MISSION.addresses_of(self.arena, self._state)
+        self._at = np.zeros(0, dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses travel: they are made anew wherever the copy goes
@@ -93,10 +107,28 @@ class World:
         """The state; its arrays are written by `reset` and `step`."""
         return self._state
 
-    def reset(self) -> None:
-        """Go back to t = 0."""
+    def reset(self, seed: int | None = None, mission: int = 0) -> None:
+        """Go back to t = 0.
+
+        Args:
+            seed: Of all that disturbances draw; None: as before.
+            mission: Number of the mission with this seed: each draws other numbers.
+
+        Raises:
+            ValueError: The seed is no whole number from 0 to 2⁶⁴ - 1.
+        """
+        if seed is not None:
+            whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+            if not whole or not 0 <= seed < SEEDS:
+                raise ValueError(f"seed is {seed!r}; give a whole number from 0 to 2**64 - 1")
+            self._seed = int(seed)
         for array, start in zip(self.state, self._start, strict=True):
             array[:] = start
+        if self.disturbances:
+            begin_random(
+                self.arena.disturbances, self.state.disturbance_random, np.uint64(self._seed),
+                mission,
+            )  # fmt: skip
 
     def step(self, commands: NDArray[np.void] | Mapping[str, Command]) -> NDArray[np.void]:
         """Fly all UAS for one step.
@@ -123,6 +155,8 @@ class World:
         if self._step is None:
             # not before: environments have a world, too, and a step of their own
             self._assistants = assistants(self.return_mode, self.safety_filter)
+            code = disturbance_code(self.disturbances)
+            self._at = np.array([*MISSION.addresses_of(self.arena, self._state), *code])
         outcome = self._fresh_outcome()
         arguments = (self._at, commands, self._nonlinear, self._assistants, outcome)
         if self._step is None:

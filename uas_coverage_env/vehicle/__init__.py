@@ -1,5 +1,6 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
+from uas_coverage_env.vehicle.air import enter_air, leave_air
 from uas_coverage_env.vehicle.battery import (
     battery_current_A,
     battery_segments,
@@ -61,11 +62,7 @@ from uas_coverage_env.vehicle.params import (
     vehicle_names,
 )
 from uas_coverage_env.vehicle.plant import plant_step
-from uas_coverage_env.vehicle.range import (
-    dod_per_s,
-    margin_to_land,
-    seconds_to_land,
-)
+from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
 
@@ -108,10 +105,12 @@ __all__ = [
     "delta_thrust",
     "dod_per_s",
     "endurance",
+    "enter_air",
     "exact_delta_thrust",
     "fit_thrust_correction",
     "flight_time_s",
     "fly_kinematics",
+    "leave_air",
     "limit_names",
     "limits_exceeded",
     "linear_model",

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
-from uas_coverage_env.vehicle.layout import LIFT, VZ, Z
+from uas_coverage_env.vehicle.layout import LIFT, VX, VZ, X, Z
 from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
@@ -35,6 +35,8 @@ VEHICLE_DTYPE = np.dtype(
                 ("axis_B", _f8, (4,)),
                 ("vertical_A", _f8, (2, 2)),
                 ("vertical_B", _f8, (2,)),
+                # position and velocity under a horizontal force
+                ("horizontal_force_B", _f8, (2,)),
                 ("yaw_B", _f8, (2,)),
                 ("inertia_kgm2", _f8, (3,)),
                 ("mass_kg", _f8),
@@ -135,6 +137,7 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     record["axis_A"], record["axis_B"] = horizontal_axis(vehicle, dt_s)
     record["vertical_A"] = A[np.ix_([Z, VZ], [Z, VZ])]
     record["vertical_B"] = B[[Z, VZ], LIFT]
+    record["horizontal_force_B"] = horizontal_force(vehicle, dt_s)
     record["yaw_B"] = 0.5 * dt_s * dt_s, dt_s
     for name, value in vehicle.kernel_scalars().items():
         record[name] = value
@@ -179,6 +182,14 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     record["mixer"][0, : len(torques)] = _mixer(torques)
     record["hover_W"] = vehicle.power.hover_W
     return record.reshape(())
+
+
+def horizontal_force(vehicle: VehicleParams, dt_s: float) -> NDArray[np.float64]:
+    """(2,) what a horizontal force of 1 N, held over a step, adds to position and velocity."""
+    A, B = rigid_body(vehicle)
+    B = np.zeros_like(B[:, :1])
+    B[VX] = 1.0 / vehicle.airframe.mass_kg
+    return taylor(A, B, dt_s, ORDER)[1][[X, VX], 0]
 
 
 def _rotor_map(vehicle: VehicleParams) -> NDArray[np.float64]:

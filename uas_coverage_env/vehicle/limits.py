@@ -48,7 +48,10 @@ LIMIT_NAMES = tuple(limit.name for limit in LIMITS)
 """Names of the limits, by their bit."""
 
 N_LIMITS = len(LIMITS)
-_VOLTAGE = LIMIT_NAMES.index("voltage")
+_SPEED, _CLIMB, _DESCENT, _TILT, _TILT_RATE, _YAW_RATE, _CURRENT, _VOLTAGE = (
+    LIMIT_NAMES.index(name)
+    for name in ["speed", "climb", "descent", "tilt", "tilt_rate", "yaw_rate", "current", "voltage"]
+)
 
 LPV_TOLERANCE = 0.01
 """Share of a limit by which it may be exceeded in the LPV model. Plan and world are the same there,
@@ -57,6 +60,9 @@ and the inner loop keeps every limit to the last digits."""
 NONLINEAR_TOLERANCE = 0.15
 """The same in the nonlinear plant, where a step does not end where the linear model says: the inner
 loop overshoots the speed by up to 9 % at steps of 1 s and by up to 12 % at 2 s."""
+
+DISTURBED_TOLERANCE = 0.15
+"""The same in both models where disturbances act, of which the inner loop knows nothing."""
 
 
 def bounds_of(vehicle: VehicleParams) -> NDArray[np.float64]:
@@ -88,22 +94,22 @@ def write_limited(x, voltage_V, current_A, nonlinear, values):
             the body about its own axis.
         values: (N_LIMITS,) written.
     """
-    values[0] = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
-    values[1] = -x[VZ]
-    values[2] = x[VZ]
-    values[3] = math.sqrt(x[PHI] * x[PHI] + x[THETA] * x[THETA])
-    values[4] = math.sqrt(x[WX] * x[WX] + x[WY] * x[WY])
+    values[_SPEED] = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
+    values[_CLIMB] = -x[VZ]
+    values[_DESCENT] = x[VZ]
+    values[_TILT] = math.sqrt(x[PHI] * x[PHI] + x[THETA] * x[THETA])
+    values[_TILT_RATE] = math.sqrt(x[WX] * x[WX] + x[WY] * x[WY])
     yaw_rate = x[WZ]
     if nonlinear:
         yaw_rate = math.sin(x[PHI]) * x[WY] + math.cos(x[PHI]) * x[WZ]
         yaw_rate /= math.cos(x[THETA])
-    values[5] = abs(yaw_rate)
-    values[6] = current_A
-    values[7] = voltage_V
+    values[_YAW_RATE] = abs(yaw_rate)
+    values[_CURRENT] = current_A
+    values[_VOLTAGE] = voltage_V
 
 
 @kernel
-def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear):
+def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear, disturbed):
     """The limits exceeded by more than the tolerance, as a mask: bit k for LIMITS[k].
 
     Args:
@@ -111,11 +117,16 @@ def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear):
         x: See `write_limited`, also the next three.
         voltage_V: [V].
         current_A: [A].
-        nonlinear: Which tolerance holds.
+        nonlinear: See `write_limited`; it has a tolerance of its own.
+        disturbed: Whether disturbances act; likewise.
     """
     values = room(N_LIMITS)
     write_limited(x, voltage_V, current_A, nonlinear, values)
-    tolerance = NONLINEAR_TOLERANCE if nonlinear else LPV_TOLERANCE
+    tolerance = LPV_TOLERANCE
+    if nonlinear:
+        tolerance = NONLINEAR_TOLERANCE
+    if disturbed:
+        tolerance = max(tolerance, DISTURBED_TOLERANCE)
     more = 1.0 + tolerance
     mask = 0
     for k in range(_VOLTAGE):

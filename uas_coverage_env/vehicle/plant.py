@@ -48,6 +48,7 @@ _TILT_STOP_RAD = 1.3
 _RATE_STOP_RADPS = 50.0
 _UPRIGHT_MIN = 0.3
 _RIGID = DOD
+_ROLL, _PITCH, _YAW, _ROLL_RATE, _PITCH_RATE, _YAW_RATE = range(6)
 
 
 @kernel
@@ -152,16 +153,16 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     alpha_pitch = u[TAU_Y] / inertia[1]
     alpha_yaw = u[TAU_Z] / inertia[2]
     half = 0.5 * time_s
-    rate = first[4] + alpha_pitch * time_s
-    _asked(first[1] + (first[4] + rate) * half, rate, alpha_pitch, pitch)
+    rate = first[_PITCH_RATE] + alpha_pitch * time_s
+    _asked(first[_PITCH] + (first[_PITCH_RATE] + rate) * half, rate, alpha_pitch, pitch)
     # east, the acceleration over g is tan(phi) / cos(theta)
-    rate = first[3] + alpha_roll * time_s
-    linear = first[0] + (first[3] + rate) * half
+    rate = first[_ROLL_RATE] + alpha_roll * time_s
+    linear = first[_ROLL] + (first[_ROLL_RATE] + rate) * half
     ct = math.cos(pitch[0])
     turn = math.sin(pitch[0]) * pitch[1]
     _asked(linear * ct, rate * ct - linear * turn, alpha_roll * ct - 2.0 * rate * turn, roll)
-    yaw_rate = first[5] + alpha_yaw * time_s
-    yaw = first[2] + (first[5] + yaw_rate) * half
+    yaw_rate = first[_YAW_RATE] + alpha_yaw * time_s
+    yaw = first[_YAW] + (first[_YAW_RATE] + yaw_rate) * half
     # Euler rates wanted, then body rates by the inverse of W
     phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[PHI])
     theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[THETA])
@@ -235,8 +236,8 @@ def plant_step(vehicle, x, u, x_next):
     # the LPV model reads body rates as rates of the angles; of a body that spins, the part of the
     # spin in them changes no tilt and would be taken for more and more of it
     _euler_rates(x_next, roll)
-    first[3] += math.sin(x_next[THETA]) * roll[2]
-    first[4] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
+    first[_ROLL_RATE] += math.sin(x_next[THETA]) * roll[2]
+    first[_PITCH_RATE] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
     correction = 0.0
     charge = 0.0
     energy = 0.0

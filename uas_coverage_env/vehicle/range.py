@@ -1,16 +1,125 @@
-"""How long a flight home takes, and what it takes from the battery; calibrated (docs/range.md)."""
+"""How long a flight takes, and what it takes from the battery: one model for every estimate.
+
+What estimates differ in is declared here, as one `Pace` each. The calibrated one is `CALIBRATED`;
+why others remain: docs/range.md.
+"""
 
 import math
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.vehicle.battery import battery_current_A
 from uas_coverage_env.vehicle.derived import steady_current_A
 from uas_coverage_env.vehicle.params import VehicleParams
 
-LANDING_S = 7.0
-"""To slow down from full speed and come to rest at home, beyond the way at full speed."""
 
-DESCENT_S = 1.0
-"""To come to rest at the end of a descent that takes longer than the way."""
+class Speeds(NamedTuple):
+    """The speeds of a vehicle that a `Pace` refers to."""
+
+    level_mps: float
+    climb_mps: float
+    descent_mps: float
+
+
+class Pace(NamedTuple):
+    """What an estimate of flight time assumes."""
+
+    speed_share: float = 1.0
+    """Of the level speed, kept up on average."""
+    detour: float = 1.0
+    """The way flown over the length that is given."""
+    level_s: float = 0.0
+    """To slow down at the end of level flight."""
+    vertical_s: float = 0.0
+    """To slow down at the end of a climb or descent; negative: it ends before it is complete."""
+    in_turn: bool = False
+    """Level flight first, then climb or descent; else both at once, and the slower one decides."""
+    landing_s: float = 0.0
+    """Added in the end."""
+
+
+CALIBRATED = Pace(level_s=7.0, vertical_s=1.0)
+"""Fitted to flown returns; what `mission.Range` answers."""
+
+RETURN_MODE = Pace(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.0)
+"""Of the world's return mode: on the way home a UAS turns, climbs, and is held up by others."""
+
+OBSERVED = Pace(in_turn=True)
+"""Of the environments' observation."""
+
+LEARNED_LEG = Pace(speed_share=0.8, vertical_s=1.6)
+"""Of `learned-waypoint`: to a waypoint."""
+
+LEARNED_RETURN = Pace(speed_share=0.8, vertical_s=-1.6, landing_s=6.0)
+"""Of `learned-waypoint`: home."""
+
+GENERATED = Pace(speed_share=0.85, landing_s=3.0)
+"""Of generated scenarios, and of the warning of batteries too small; the landing's time is that of
+a take-off, too."""
+
+ROUTED = Pace()
+"""Of `mission.Legs`, which compares routes."""
+
+TOUR = Pace(landing_s=3.0)
+"""Of `tour`: `ROUTED`, and from full speed over the start to rest on it."""
+
+ORDER_GUIDE = Pace(landing_s=4.0)
+"""Of the order that `milp-mpc-guided` follows: `ROUTED`, and coming to rest above the start."""
+
+MILP_RESERVE = Pace(speed_share=0.9, detour=1.1, in_turn=True, landing_s=6.0)
+"""Of the reserve of `milp-mpc`: linear in the place, hence no look at what stands in the way."""
+
+LAWNMOWER = Pace(speed_share=0.8)
+"""Of `lawnmower`: the legs of its runs, straight, at a share of the cruise speed."""
+
+
+def level_seconds(pace: Pace, speeds: Speeds, way_m: Any) -> Any:
+    """Time of level flight, numbers or arrays [s]; also compiled, see `flight_seconds`.
+
+    Args:
+        pace: What is assumed.
+        speeds: Of the vehicle.
+        way_m: Horizontal length [m].
+    """
+    return pace.detour * way_m / (pace.speed_share * speeds.level_mps)
+
+
+def vertical_seconds(speeds: Speeds, up_m: Any, down_m: Any) -> Any:
+    """Time of a climb and a descent, numbers or arrays [s]; also compiled, see `flight_seconds`."""
+    return up_m / speeds.climb_mps + down_m / speeds.descent_mps
+
+
+_level_seconds = kernel(level_seconds)
+_vertical_seconds = kernel(vertical_seconds)
+
+
+@kernel
+def flight_seconds(pace, speeds, turn_s, way_m, up_m, down_m):
+    """Time of a flight with level and vertical part [s].
+
+    Args:
+        pace: `Pace`, what is assumed.
+        speeds: `Speeds` of the vehicle.
+        turn_s: To turn towards the way first [s].
+        way_m: Horizontal length [m].
+        up_m: To climb, not negative [m].
+        down_m: To descend, not negative [m].
+    """
+    level_s = _level_seconds(pace, speeds, way_m) + turn_s + pace.level_s
+    vertical_s = _vertical_seconds(speeds, up_m, down_m)
+    if up_m + down_m > 0.0:
+        vertical_s += pace.vertical_s
+    both_s = level_s + vertical_s if pace.in_turn else max(level_s, vertical_s)
+    return both_s + pace.landing_s
+
+
+def speeds_of(vehicle: VehicleParams) -> Speeds:
+    """The largest speeds of a vehicle."""
+    limits = vehicle.limits
+    return Speeds(limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps)
+
 
 _TURNS = 1.5
 """Of the time that the largest acceleration takes to turn a velocity into one towards home."""
@@ -36,9 +145,9 @@ def seconds_to_land(vehicle, way_m, towards_mps, height_m):
     """
     turn_mps = vehicle.v_xy_max_mps - towards_mps
     turn_s = _TURNS * turn_mps / (vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad))
-    level_s = way_m / vehicle.v_xy_max_mps + turn_s + LANDING_S
-    rate_mps = vehicle.v_down_max_mps if height_m >= 0.0 else vehicle.v_up_max_mps
-    return max(level_s, abs(height_m) / rate_mps + DESCENT_S)
+    speeds = Speeds(vehicle.v_xy_max_mps, vehicle.v_up_max_mps, vehicle.v_down_max_mps)
+    up_m, down_m = max(-height_m, 0.0), max(height_m, 0.0)
+    return flight_seconds(CALIBRATED, speeds, turn_s, way_m, up_m, down_m)
 
 
 @kernel
@@ -63,3 +172,20 @@ def dod_per_s(vehicle: VehicleParams, dod: float) -> float:
     power_W = vehicle.power.hover_W + vehicle.power.slope_W_per_N * drag_N
     current_A = steady_current_A(vehicle.battery, dod, power_W)
     return current_A / (3600.0 * vehicle.battery.capacity_Ah)
+
+
+def seconds_until(vehicle: VehicleParams, dod: float, dod_end: float, power_W: float) -> float:
+    """Time for which a battery gives a power, at its mean voltage between two depths [s].
+
+    Args:
+        vehicle: Parameters.
+        dod: Depth of discharge at the start.
+        dod_end: Depth of discharge at the end.
+        power_W: Drawn throughout [W].
+    """
+    battery = vehicle.battery
+    depths = np.linspace(dod, dod_end, 33)
+    voltage_V = float(np.interp(depths, battery.ocv_dod, battery.ocv_V).mean())
+    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
+    current_A = battery_current_A(voltage_V, resistance_ohm, power_W)
+    return (dod_end - dod) * battery.capacity_Ah * 3600.0 / current_A

@@ -1,6 +1,7 @@
 """A scenario as arrays, for the kernels: what never changes during a mission."""
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -14,6 +15,11 @@ from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
 from uas_coverage_env.world.boxes import N_COLUMNS, SURE_M, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
+from uas_coverage_env.world.disturbance import (
+    DISTURBANCE_DTYPE,
+    Disturbance,
+    disturbance_tables,
+)
 from uas_coverage_env.world.routes import node_distances
 
 NEAR_M = 20.0
@@ -114,6 +120,8 @@ RULES_DTYPE = _record(
         ("ceiling_m", "f8"),
         # how far guidance and safety filter look ahead: time to brake from any speed
         ("lookahead_steps", "i8"),
+        # whether any disturbance acts
+        ("disturbed", "?"),
         # of `waypoint_columns`
         ("unit_m", "f8"),
         # the command to stop and hold still
@@ -154,12 +162,21 @@ class Arena(NamedTuple):
     """[m] corners at which routes turn."""
     node_distance_m: Annotated[NDArray[np.float64], "W + U", "N"]
     """[m] way from a corner to a waypoint or a start; inf where there is none."""
+    disturbances: Annotated[NDArray[np.void], DISTURBANCE_DTYPE, "blocks"]
+    """As many as `WorldState` has room for; that is the same in all missions of a pool."""
+    disturbance_parameters: Annotated[NDArray[np.float64], "parameters"]
+    """Of all disturbances."""
 
 
 ARENA = Memory(Arena)
 
 
-def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:
+def build_arena(
+    scenario: Scenario,
+    *,
+    measured_m: float = math.inf,
+    disturbances: Sequence[Disturbance | None] = (),
+) -> Arena:
     """The scenario as arrays.
 
     Obstacles that can be flown over without climbing far above the usual waypoint are low, the
@@ -170,6 +187,8 @@ def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:
         measured_m: Clearances from obstacles and separations of UAS that are larger are taken as
             infinite [m]. What a contact or a breach depends on is measured in any case: with 0,
             only that, which takes a tenth less time.
+        disturbances: What acts besides the scenario's own rules. What the scenario says of
+            disturbances is left to the caller: planners build arenas, too.
     """
     uas = _uas(scenario)
     radius_m = max(entry.radius_m for entry in scenario.uas)
@@ -186,6 +205,8 @@ def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:
     planes.append((fence.normals, fence.offsets_m))
     normals = np.concatenate([rows[0] for rows in planes])
     offsets_m = np.concatenate([rows[1] for rows in planes])
+    blocks, parameters = disturbance_tables(disturbances)
+    rules["disturbed"] = blocks["acts"].any()
     nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
@@ -208,6 +229,8 @@ def build_arena(scenario: Scenario, *, measured_m: float = math.inf) -> Arena:
         node_distance_m=node_distances(
             obstacles, normals, offsets_m, nodes_m, np.ascontiguousarray(targets_m[:, :2])
         ),
+        disturbances=blocks,
+        disturbance_parameters=parameters,
     )
 
 

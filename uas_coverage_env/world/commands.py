@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 Mode = Literal["covering", "transit", "return"]
 
 VELOCITY, ACCELERATION, WRENCH, GO_TO, CLIMB = range(5)
-"""Kinds of command. CLIMB (north, east and down velocity) is the safety filter's own: it brakes
-without an altitude to hold, so that braking on is the same flight in every step. Players cannot
-give it."""
+"""Kinds of command. CLIMB (north, east and down velocity) is what the safety filter brakes with,
+without an altitude to hold, so that braking on is the same flight in every step. Planners cannot
+give it; a kind of action can."""
 
 KIND_NAMES = ("velocity", "acceleration", "wrench", "goto", "climb")
 

@@ -312,5 +312,6 @@ def check_limits(arena, state, nonlinear, outcome):
         event = outcome[i]
         if event.flew:
             event.limits_exceeded = limits_exceeded(
-                arena.vehicles[i], state.x[i], event.voltage_V, event.current_A, nonlinear
-            )
+                arena.vehicles[i], state.x[i], event.voltage_V, event.current_A, nonlinear,
+                arena.rules[0].disturbed,
+            )  # fmt: skip

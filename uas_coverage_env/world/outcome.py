@@ -20,6 +20,9 @@ OUTCOME_DTYPE = np.dtype(
                 ("before_m", "f8", (3,)),
                 # (lift, three torques, thrust correction) [N, N m, N] that acted over the step
                 ("u", "f8", (N_INPUTS,)),
+                # what disturbances did over the step: velocity of the air, and another force, NED
+                ("wind_mps", "f8", (3,)),
+                ("force_N", "f8", (3,)),
                 ("voltage_V", "f8"),
                 ("current_A", "f8"),
                 ("energy_Wh", "f8"),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES
+from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
 
 FLYING, LANDED, LOST = range(3)
 """Status of a UAS. Landed and lost are final."""
@@ -35,6 +36,10 @@ class WorldState(NamedTuple):
     """Waypoint still to be covered."""
     step: Annotated[NDArray[np.int64], 1, Values(0, "samples")]
     """Number of the sample, 0 at the start."""
+    disturbance_memory: Annotated[NDArray[np.float64], "U", "D", DISTURBANCE_MEMORY]
+    """What each of the D disturbances keeps for each UAS."""
+    disturbance_random: Annotated[NDArray[np.uint64], "U", "D", 1]
+    """The states of the generators that they draw from."""
 
     def copy(self) -> Self:
         """The same state in arrays of its own."""

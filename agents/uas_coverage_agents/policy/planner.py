@@ -1,12 +1,11 @@
 """A policy as a planner: `--planner policy:DIR`."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Protocol
 
 from uas_coverage_agents.policy.directory import Policy, load_policy
-from uas_coverage_agents.velocity.pilot import VelocityPilot
-from uas_coverage_agents.waypoint.pilot import WaypointPilot
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
 from uas_coverage_env.mission import MissionBrief
@@ -29,11 +28,22 @@ class Pilot(Protocol):
         ...
 
 
-PILOTS: dict[str, Callable[[Policy, Assistants], Pilot]] = {
-    "velocity": lambda policy, _: VelocityPilot(policy),
-    "waypoint": WaypointPilot,
+PILOTS = {
+    "velocity": "uas_coverage_agents.velocity.pilot:VelocityPilot",
+    "waypoint": "uas_coverage_agents.waypoint.pilot:WaypointPilot",
 }
-"""Interface of a policy -> who flies it; raises a ValueError that says why it cannot."""
+"""Interface of a policy -> entry point of its pilot, made as `Pilot(policy, assistants)`; loaded
+where it flies, since pilots are made of what is in this package."""
+
+
+def pilot_of(policy: Policy, assistants: Assistants) -> Pilot:
+    """The pilot that flies a policy.
+
+    Raises:
+        ValueError: The policy cannot be flown; says why.
+    """
+    interface = policy.description.interface
+    return EntryPoint(interface, PILOTS[interface], "").load()(policy, assistants)
 
 
 class PolicyPlanner:
@@ -61,7 +71,7 @@ class PolicyPlanner:
             raise InputError(f"{self.argument}: cannot be flown: {error}") from error
 
     def _piloted(self) -> Pilot:
-        return PILOTS[self.policy.description.interface](self.policy, self.assistants)
+        return pilot_of(self.policy, self.assistants)
 
     @property
     def fingerprint(self) -> str:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Interval, Policy, Score
-from uas_coverage_agents.policy.planner import PILOTS
+from uas_coverage_agents.policy.planner import pilot_of
 from uas_coverage_env.flight import (
     Assistants,
     Flight,
@@ -39,7 +39,7 @@ def fly(
         (missions, measures) in the order of MEASURES.
     """
     assistants = Assistants(return_mode=return_mode, safety_filter=safety_filter)
-    pilot = PILOTS[policy.description.interface](policy, assistants)
+    pilot = pilot_of(policy, assistants)
     return np.array(
         [
             measured(rollout(scenario, pilot, safety_filter=safety_filter, return_mode=return_mode))

@@ -252,7 +252,7 @@ class CoverageVecEnv(VecEnv):
 
     def _check_choices(self) -> None:
         if not self.batch.chooses:
-            raise AttributeError('only action="waypoint" has masks; the others are continuous')
+            raise AttributeError("only actions that are choices have masks; this one is continuous")
 
     def _get_indices(self, indices: VecEnvIndices) -> Iterable[int]:
         return super()._get_indices(indices)

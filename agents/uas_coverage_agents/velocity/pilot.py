@@ -11,6 +11,7 @@ from uas_coverage_agents.velocity.patience import Patience
 from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
+from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState, Velocity
 
@@ -40,11 +41,15 @@ def gaze(hidden: int, keys: int) -> Gaze:
 class VelocityPilot:
     """Every UAS on its own, with the same network: its observation in, its velocity out.
 
+    Args:
+        policy: Of the interface "velocity".
+        assistants: Those that fly along; they change nothing here.
+
     Raises:
         ValueError: The policy was trained on another observation, or gives other outputs.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy, assistants: Assistants) -> None:
         description = policy.description
         if not description.observation.has_the_numbers_of(observation()):
             raise ValueError("its observation is not that of this version; train it anew")
@@ -61,9 +66,8 @@ class VelocityPilot:
         self._observer = Observer(brief)
         self._patience = Patience(len(brief.uas), len(brief.waypoints), brief.dt_s)
         ranges = actions_of("velocity", brief.as_scenario()).ranges
-        self._middle = ranges["middle"][:, :OUTPUTS]
-        self._below = self._middle - ranges["lowest"][:, :OUTPUTS]
-        self._above = ranges["highest"][:, :OUTPUTS] - self._middle
+        lowest, self._middle, highest = np.moveaxis(ranges, 2, 0)
+        self._below, self._above = self._middle - lowest, highest - self._middle
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """The mean action of the policy, scaled to the vehicle as the environment does."""

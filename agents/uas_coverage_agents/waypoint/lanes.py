@@ -13,6 +13,7 @@ from uas_coverage_agents.waypoint.look import NO_TARGET
 from uas_coverage_agents.waypoint.team import (
     ACCOUNT_SIZE,
     NOBODY,
+    Choices,
     choose,
     fly_on,
 )
@@ -79,10 +80,11 @@ def _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants):
     n_waypoints = arena.waypoints.shape[0]
     state = state_of(states, lane, worlds.arenas, s)
     legs = legs_at(all_legs, s)
+    choices = Choices(lanes.candidates[lane], lanes.legal[lane], lanes.observation[lane])
     lanes.decider[lane] = fly_on(
-        arena, legs, state, False, return_mode, assistants, lanes.blocked[lane, :n_waypoints],
+        arena, legs, state, return_mode, assistants, lanes.blocked[lane, :n_waypoints],
         lanes.targets[lane, :n_uas], lanes.commands[lane, :n_uas], lanes.outcome[lane, :n_uas],
-        lanes.candidates[lane], lanes.legal[lane], lanes.observation[lane], lanes.account[lane],
+        choices, lanes.account[lane],
     )  # fmt: skip
 
 

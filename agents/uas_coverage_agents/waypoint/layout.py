@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.observation import Feature, Group
+from uas_coverage_env.vehicle.range import LEARNED_LEG
 
 LAYOUT = "waypoint_v1"
 
@@ -20,7 +21,7 @@ K = 10
 
 HOME_CHOICE = K
 
-CRUISE_SHARE = 0.8
+CRUISE_SHARE = LEARNED_LEG.speed_share
 """Of the top speed: what legs of some tens of metres are flown at."""
 
 

@@ -11,17 +11,14 @@ from uas_coverage_env.autopilot import seconds_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.vehicle import N_STATES, X, Y, Z
+from uas_coverage_env.vehicle.range import LEARNED_LEG, LEARNED_RETURN, Speeds, flight_seconds
 from uas_coverage_env.world import Arena, route
 from uas_coverage_env.world.arena import ARENA
 
 ROUTED_UNITS = 6.0
 """Longer legs than this are rarely flown: they are taken straight."""
 
-LANDING_S = 6.0
-"""To slow down and touch down."""
-
 _LONE_UNIT_M = 60.0
-_LEAD_S = 1.6
 
 
 class Legs(NamedTuple):
@@ -50,19 +47,17 @@ def leg_s(uas, way_m, rise_m, radius_m):
         rise_m: Altitude gained [m].
         radius_m: Of the waypoint at its end [m].
     """
-    flying_s = way_m / (CRUISE_SHARE * uas.speed_mps)
-    missing_m = abs(rise_m) - 0.6 * radius_m
-    if missing_m <= 0.0:
-        return flying_s
-    rate_mps = uas.climb_mps if rise_m > 0.0 else uas.descent_mps
-    return max(flying_s, missing_m / rate_mps + _LEAD_S)
+    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    credit_m = 0.6 * radius_m
+    up_m, down_m = max(rise_m - credit_m, 0.0), max(-rise_m - credit_m, 0.0)
+    return flight_seconds(LEARNED_LEG, speeds, 0.0, way_m, up_m, down_m)
 
 
 @allocating_kernel
 def home_leg_s(uas, way_m, altitude_m):
     """Time [s] to fly home over way_m, from altitude_m above the start, and land."""
-    flying_s = way_m / (CRUISE_SHARE * uas.speed_mps)
-    return max(flying_s, altitude_m / uas.descent_mps - _LEAD_S) + LANDING_S
+    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    return flight_seconds(LEARNED_RETURN, speeds, 0.0, way_m, 0.0, altitude_m)
 
 
 @allocating_kernel

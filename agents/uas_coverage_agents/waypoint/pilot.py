@@ -21,8 +21,8 @@ from uas_coverage_agents.waypoint.layout import (
 from uas_coverage_agents.waypoint.legs import legs_of
 from uas_coverage_agents.waypoint.look import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
-from uas_coverage_agents.waypoint.search import Desk, improve, no_plan, planned
-from uas_coverage_agents.waypoint.team import NOBODY, choose, next_to_decide
+from uas_coverage_agents.waypoint.search import Desk, Moment, improve, no_plan, planned
+from uas_coverage_agents.waypoint.team import NOBODY, Choices, choose, next_to_decide
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
@@ -103,12 +103,14 @@ class WaypointPilot:
         self._returning = np.zeros(n_uas, dtype=np.bool_)
         self._blocked = np.zeros(n_waypoints, dtype=np.bool_)
         self._desk = Desk(
-            state=STATE.zeros({"U": n_uas, "W": n_waypoints}),
+            state=STATE.zeros({"U": n_uas, "W": n_waypoints, "D": 0}),
             commands=np.zeros(n_uas, dtype=COMMAND_DTYPE),
             outcome=np.zeros(n_uas, dtype=OUTCOME_DTYPE),
-            candidates=np.full(K, -1),
-            legal=np.zeros(K + 1, dtype=np.bool_),
-            observation=np.zeros(OBSERVATION_SIZE, dtype=np.float32),
+            choices=Choices(
+                candidates=np.full(K, -1),
+                legal=np.zeros(K + 1, dtype=np.bool_),
+                observation=np.zeros(OBSERVATION_SIZE, dtype=np.float32),
+            ),
             scores=np.zeros(K + 1),
         )
         self._plan, self._trial, self._best = (no_plan(n_uas, n_waypoints) for _ in range(3))
@@ -130,33 +132,37 @@ class WaypointPilot:
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
         state.returning[:] |= self._returning
-        desk = self._desk
+        choices = self._desk.choices
         looked_ahead = self._simulations == 0
         while True:
             i = next_to_decide(
                 arena, self._legs, state, self._assistants.return_mode, self._blocked,
-                self._targets, desk.candidates, desk.legal, desk.observation,
+                self._targets, choices,
             )  # fmt: skip
             if i == NOBODY:
                 break
-            choice = best_choice(self._weights, desk.observation, desk.legal, desk.scores)
+            choice = best_choice(
+                self._weights, choices.observation, choices.legal, self._desk.scores
+            )
             if not looked_ahead:
                 self._look_ahead(state)
                 looked_ahead = True
             follow = planned(
-                state.uncovered, self._plan, self._plan.following, i, desk.candidates, desk.legal
-            )
-            choose(self._targets, desk.candidates, i, choice if follow < 0 else follow)
+                state.uncovered, self._plan, self._plan.following, i, choices.candidates,
+                choices.legal,
+            )  # fmt: skip
+            choose(self._targets, choices.candidates, i, choice if follow < 0 else follow)
         self._returning[:] = state.returning
 
     def _look_ahead(self, state: WorldState) -> None:
         """Make the plan better; the observation on the desk is lost."""
-        kept = (self._desk.candidates.copy(), self._desk.legal.copy())
+        choices = self._desk.choices
+        kept = choices.candidates.copy(), choices.legal.copy()
         return_mode = self._assistants.return_mode
         improve(
-            self._still, self._legs, self._weights, state, self._targets, self._blocked,
+            self._still, self._legs, self._weights, Moment(state, self._targets, self._blocked),
             return_mode, assistants(return_mode, self._assistants.safety_filter), self._plan,
             self._simulations, self._desk, self._rng, self._trial, self._best,
         )  # fmt: skip
         self._plan, self._best = self._best, self._plan
-        self._desk.candidates[:], self._desk.legal[:] = kept
+        choices.candidates[:], choices.legal[:] = kept

@@ -22,6 +22,7 @@ from uas_coverage_agents.waypoint.team import (
     NOBODY,
     NOT_HOME,
     TIME,
+    Choices,
     choose,
     fly_on,
 )
@@ -58,15 +59,23 @@ def no_plan(n_uas: int, n_waypoints: int) -> Plan:
     )
 
 
+class Moment(NamedTuple):
+    """From where missions are simulated."""
+
+    state: WorldState
+    targets: NDArray[np.int64]
+    """(U,) where each flies to then."""
+    blocked: NDArray[np.bool_]
+    """(W,) what comes last."""
+
+
 class Desk(NamedTuple):
     """Room for one simulated mission: its state, an observation and what follows from it."""
 
     state: WorldState
     commands: NDArray[np.void]
     outcome: NDArray[np.void]
-    candidates: NDArray[np.int64]
-    legal: NDArray[np.bool_]
-    observation: NDArray[np.float32]
+    choices: Choices
     scores: NDArray[np.float64]
 
 
@@ -107,18 +116,15 @@ def planned(uncovered, plan, at, i, candidates, legal):
 
 @allocating_kernel
 def simulate(
-    arena, legs, weights, start, start_targets, start_blocked, return_mode, assistants,
-    plan, change_at, keep_on, desk, rng, new,
-):  # fmt: skip
+    arena, legs, weights, start, return_mode, assistants, plan, change_at, keep_on, desk, rng, new
+):
     """Fly one mission to its end.
 
     Args:
         arena: Without moving obstacles.
         legs: `Legs`.
         weights: `Weights`.
-        start: The state from which it goes on.
-        start_targets: (U,) where each flies to then.
-        start_blocked: (W,) what comes last.
+        start: `Moment` from which it goes on.
         return_mode: Whether the world brings UAS home in time.
         assistants: See `world.advance`.
         plan: What is followed.
@@ -133,9 +139,10 @@ def simulate(
         (cost [Wh], number of decisions).
     """
     state = desk.state
-    copy_arrays(start, state)
-    targets = start_targets.copy()
-    blocked = start_blocked.copy()
+    copy_arrays(start.state, state)
+    targets = start.targets.copy()
+    blocked = start.blocked.copy()
+    candidates, legal, observation = desk.choices
     account = np.zeros(_PRICES_WH.shape[0])
     at = plan.following.copy()
     new.length[:] = 0
@@ -143,23 +150,23 @@ def simulate(
     n = 0
     while True:
         i = fly_on(
-            arena, legs, state, False, return_mode, assistants, blocked, targets,
-            desk.commands, desk.outcome, desk.candidates, desk.legal, desk.observation, account,
+            arena, legs, state, return_mode, assistants, blocked, targets,
+            desk.commands, desk.outcome, desk.choices, account,
         )  # fmt: skip
         if i == NOBODY:
             break
         choice = -1
         if n <= change_at or keep_on:
-            choice = planned(state.uncovered, plan, at, i, desk.candidates, desk.legal)
+            choice = planned(state.uncovered, plan, at, i, candidates, legal)
         if n == change_at:
-            score(weights, desk.observation, desk.scores)
-            other = _draw(desk.scores, desk.legal, choice, rng)
+            score(weights, observation, desk.scores)
+            other = _draw(desk.scores, legal, choice, rng)
             if other >= 0:
                 choice = other
                 at[i] = max(at[i] - 1, 0)  # what was to be next may come after it
         if choice < 0:
-            choice = best_choice(weights, desk.observation, desk.legal, desk.scores)
-        choose(targets, desk.candidates, i, choice)
+            choice = best_choice(weights, observation, legal, desk.scores)
+        choose(targets, candidates, i, choice)
         if new.length[i] < new.targets.shape[1]:
             new.targets[i, new.length[i]] = targets[i]
             new.length[i] += 1
@@ -169,18 +176,15 @@ def simulate(
 
 @allocating_kernel
 def improve(
-    arena, legs, weights, state, targets, blocked, return_mode, assistants, plan, n_simulations,
-    desk, rng, trial, best,
-):  # fmt: skip
+    arena, legs, weights, now, return_mode, assistants, plan, n_simulations, desk, rng, trial, best
+):
     """The cheapest plan that some simulations find.
 
     Args:
         arena: See `simulate`.
         legs: See `simulate`.
         weights: See `simulate`.
-        state: The state now, before the choice that is asked for.
-        targets: (U,) where each flies to.
-        blocked: See `simulate`.
+        now: `Moment` before the choice that is asked for.
         return_mode: See `simulate`.
         assistants: See `simulate`.
         plan: The plan so far; may be empty.
@@ -194,16 +198,15 @@ def improve(
         Cost of the best plan [Wh].
     """
     best_Wh, n_decisions = simulate(
-        arena, legs, weights, state, targets, blocked, return_mode, assistants,
-        plan, NEVER, True, desk, rng, best,
-    )  # fmt: skip
+        arena, legs, weights, now, return_mode, assistants, plan, NEVER, True, desk, rng, best
+    )
     for n in range(n_simulations - 1):
         # first the policy alone: no plan is worse than that
         change_at = NEVER if n == 0 else rng.integers(0, max(n_decisions, 1))
         keep_on = n > 0 and rng.random() < 0.5
         cost_Wh, n_new = simulate(
-            arena, legs, weights, state, targets, blocked, return_mode, assistants,
-            best, change_at, keep_on, desk, rng, trial,
+            arena, legs, weights, now, return_mode, assistants, best, change_at, keep_on, desk, rng,
+            trial,
         )  # fmt: skip
         if cost_Wh < best_Wh:
             best_Wh = cost_Wh

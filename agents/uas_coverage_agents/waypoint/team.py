@@ -1,6 +1,9 @@
 """A team from decision to decision: who needs a target, and the flight until somebody does."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE
 from uas_coverage_agents.waypoint.look import (
@@ -26,6 +29,17 @@ which the filter changed the command; at the end: UAS lost, UAS in the air, wayp
 ACCOUNT_SIZE = LEFT + 1
 
 
+class Choices(NamedTuple):
+    """What the UAS that decides may choose, and what it sees; see `look`."""
+
+    candidates: NDArray[np.int64]
+    """(K,)."""
+    legal: NDArray[np.bool_]
+    """(K+1,)."""
+    observation: NDArray[np.float32]
+    """(OBSERVATION_SIZE,)."""
+
+
 @allocating_kernel
 def _needs_target(state, blocked, claimed, may, targets, i):
     """Whether a covering UAS has none, or waits for a moving obstacle while there is other work."""
@@ -46,9 +60,7 @@ def choose(targets, candidates, i, choice):
 
 
 @allocating_kernel
-def next_to_decide(
-    arena, legs, state, return_mode, blocked, targets, candidates, legal, observation
-):
+def next_to_decide(arena, legs, state, return_mode, blocked, targets, choices):
     """The first UAS that has a choice to make now; the others keep or get their targets.
 
     Args:
@@ -58,9 +70,7 @@ def next_to_decide(
         return_mode: Whether the world brings UAS home in time.
         blocked: (W,) see `find_blocked`; written.
         targets: (U,) where each flies to; written.
-        candidates: (K,) see `look`; written.
-        legal: (K+1,) see `look`; written.
-        observation: (OBSERVATION_SIZE,) see `look`; written.
+        choices: `Choices`; written.
 
     Returns:
         Index of the UAS, or NOBODY.
@@ -81,8 +91,8 @@ def next_to_decide(
             targets[i] = HOME
         elif _needs_target(state, blocked, claimed, may, targets, i):
             targets[i] = NO_TARGET
-            n_legal = look(arena, legs, state, blocked, targets, i, candidates, legal, observation)
-            if n_legal > 1:
+            candidates, legal, row = choices
+            if look(arena, legs, state, blocked, targets, i, candidates, legal, row) > 1:
                 return i
             choose(targets, candidates, i, legal.argmax())
     return NOBODY
@@ -111,38 +121,33 @@ def is_over(arena, state):
 
 @allocating_kernel
 def fly_on(
-    arena, legs, state, nonlinear, return_mode, assistants, blocked, targets, commands,
-    outcome, candidates, legal, observation, account,
+    arena, legs, state, return_mode, assistants, blocked, targets, commands, outcome, choices,
+    account,
 ):  # fmt: skip
-    """Fly until somebody has a choice to make, or the mission is over.
+    """Fly by the LPV model until somebody has a choice to make, or the mission is over.
 
     Args:
         arena: See `next_to_decide`.
         legs: See `next_to_decide`.
         state: Written.
-        nonlinear: See `world.advance`.
         return_mode: Whether the world brings UAS home in time.
         assistants: See `world.advance`.
         blocked: See `next_to_decide`.
         targets: See `next_to_decide`.
         commands: (U,) of COMMAND_DTYPE; written.
         outcome: (U,) of OUTCOME_DTYPE; written.
-        candidates: See `next_to_decide`.
-        legal: See `next_to_decide`.
-        observation: See `next_to_decide`.
+        choices: See `next_to_decide`.
         account: (ACCOUNT_SIZE,) what the flight took is added.
 
     Returns:
         Index of the UAS that decides, or NOBODY where the mission is over.
     """
     while not is_over(arena, state):
-        i = next_to_decide(
-            arena, legs, state, return_mode, blocked, targets, candidates, legal, observation
-        )
+        i = next_to_decide(arena, legs, state, return_mode, blocked, targets, choices)
         if i != NOBODY:
             return i
         write_commands(state, targets, commands)
-        advance(arena, state, commands, nonlinear, assistants, outcome)
+        advance(arena, state, commands, False, assistants, None, outcome)
         account[TIME] += arena.rules[0].dt_s
         for j in range(targets.shape[0]):
             account[ENERGY] += outcome[j].energy_Wh

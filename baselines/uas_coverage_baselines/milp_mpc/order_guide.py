@@ -19,11 +19,11 @@ from uas_coverage_baselines.order import (
     no_order,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle.range import ORDER_GUIDE
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
-_LANDING_S = 4.0  # coming to rest above the start
 _MOVES_PER_WAYPOINT = 40_000  # of the first search, before take-off
 _MOVES_AT_MOST = 4_000_000
 _MOVES_AFTERWARDS = 60_000  # of each decision's, at most
@@ -165,10 +165,10 @@ class OrderGuide:
             first_s=first_s,
             between_s=self._legs.between_s,
             kind=self._legs.kind,
-            home_s=self._legs.home_s + _LANDING_S,
+            home_s=self._legs.home_s + ORDER_GUIDE.landing_s,
             idle_s=np.where(active, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
-            velocity_mps=np.ascontiguousarray(x[:, 3:5]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
             speed_mps=self._legs.speed_mps,
             acceleration_mps2=self._legs.acceleration_mps2,
             start_m=np.ascontiguousarray(self._legs.starts_m[:, :2]),

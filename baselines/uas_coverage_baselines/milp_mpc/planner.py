@@ -20,7 +20,7 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX, VZ
 from uas_coverage_env.world import Mode, SwarmState
 
 
@@ -91,7 +91,7 @@ class MilpMpc(MovingHorizon[Options]):
         covering = self.plan is None or name not in self.plan.names
         return Situation(
             position_m=x[0:3],
-            velocity_mps=x[3:6],
+            velocity_mps=x[VX : VZ + 1],
             dod=float(x[DOD]),
             dod_return=self._builder.dod_return(name, self.options.return_detour),
             uncovered=swarm.uncovered,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
-from uas_coverage_baselines.milp_mpc.model.energy import seconds_home
+from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import seconds_home
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.model.problem import (
     MovingHull,
@@ -67,7 +67,7 @@ class ProblemBuilder:
         return (dod_max - dod) / dod_per_s(self._vehicles[name], dod_max)
 
     def seconds_home(self, name: str, position_m: FloatArray) -> float:
-        """Flight time home, with a detour and the landing, see `energy`."""
+        """Flight time home, with a detour and the landing, see `BatteryReserve`."""
         return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
 
     @property

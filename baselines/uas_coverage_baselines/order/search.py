@@ -9,6 +9,7 @@ reversed, the rests of two routes exchanged.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,24 +122,45 @@ def improved(task: Task, order: Order, effort: Effort, seed: int) -> Order:
     )
 
 
-def _arrays(task: Task):
+class _Arrays(NamedTuple):
+    """What the search reads of a task, for compiled code."""
+
+    first: FloatArray
+    between: FloatArray
+    kind: NDArray[np.int64]
+    home: FloatArray
+    idle: FloatArray
+    place: FloatArray
+    """(W+2U, 2) of waypoints, UAS and starts, north and east."""
+    velocity: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    turn: FloatArray
+    opens: FloatArray
+    budget: FloatArray
+    weight: FloatArray
+    neighbours: NDArray[np.int64]
+    turn_of_cosine: FloatArray
+
+
+def _arrays(task: Task) -> _Arrays:
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
-    return (
-        task.first_s,
-        task.between_s,
-        task.kind,
-        task.home_s,
-        task.idle_s,
-        np.ascontiguousarray(place),
-        task.velocity_mps,
-        task.speed_mps,
-        task.acceleration_mps2,
-        task.turn_s,
-        task.not_before_s,
-        task.budget_s,
-        task.weight,
-        task.neighbours,
-        _TURN_OF_COSINE,
+    return _Arrays(
+        first=task.first_s,
+        between=task.between_s,
+        kind=task.kind,
+        home=task.home_s,
+        idle=task.idle_s,
+        place=np.ascontiguousarray(place),
+        velocity=task.velocity_mps,
+        speed=task.speed_mps,
+        acceleration=task.acceleration_mps2,
+        turn=task.turn_s,
+        opens=task.not_before_s,
+        budget=task.budget_s,
+        weight=task.weight,
+        neighbours=task.neighbours,
+        turn_of_cosine=_TURN_OF_COSINE,
     )
 
 
@@ -166,29 +188,30 @@ def _setting_off_s(place, velocity, speed_mps, acceleration_mps2, here, to):
 @allocating_kernel
 def _route_s(task, u, route, length):
     """Flight time of one UAS along a route and home."""
-    (first, between, kind, home, idle, place, velocity, speed, acceleration, radius_s) = task[:10]
-    opens, table = task[10], task[14]
     if length == 0:
-        return idle[u]
-    n_waypoints, n_uas = len(opens), len(kind)
+        return task.idle[u]
+    place, kind, opens = task.place, task.kind[u], task.opens
+    n_waypoints, n_uas = len(opens), len(task.kind)
     before, here = n_waypoints + u, route[0]
-    time = first[u, here]
-    time += _setting_off_s(place, velocity[u], speed[u], acceleration[u], before, here)
+    time = task.first[u, here]
+    time += _setting_off_s(
+        place, task.velocity[u], task.speed[u], task.acceleration[u], before, here
+    )
     time = max(time, opens[here])
     for k in range(1, length + 1):
         following = route[k] if k < length else n_waypoints + n_uas + u
-        time += radius_s[u, here] * _turn(table, place, before, here, following)
+        time += task.turn[u, here] * _turn(task.turn_of_cosine, place, before, here, following)
         if k == length:
             break
-        time += between[kind[u], here, following]
+        time += task.between[kind, here, following]
         time = max(time, opens[following])
         before, here = here, following
-    return time + home[u, here]
+    return time + task.home[u, here]
 
 
 @allocating_kernel
 def _cost_s(task, seconds, left_out, n_left_out, total_weight):
-    budget, weight = task[11], task[12]
+    budget, weight = task.budget, task.weight
     longest, cost = 0.0, 0.0
     for u in range(len(seconds)):
         longest = max(longest, seconds[u])
@@ -247,7 +270,7 @@ def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window,
     """Anneal `routes` in place (its last row: left out); the cost of the best, which is returned.
 
     Args:
-        task: arrays of the task.
+        task: `_Arrays` of the task.
         routes: (U+1, W+1).
         lengths: (U+1,).
         seconds: (U,) written: flight times of the best order.
@@ -258,7 +281,7 @@ def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window,
         total_weight: see `Effort`.
         rng: source of random numbers.
     """
-    neighbours = task[13]
+    neighbours = task.neighbours
     n_rows, width = routes.shape
     n_uas = n_rows - 1
     row_of, place_in = np.full(width - 1, -1, np.int64), np.zeros(width - 1, np.int64)

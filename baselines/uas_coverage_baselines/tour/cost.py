@@ -14,6 +14,7 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake, mov
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.range import ROUTED, Speeds, flight_seconds
 from uas_coverage_env.world.routes import box_apart, route
 
 FloatArray = NDArray[np.float64]
@@ -109,7 +110,8 @@ def _seconds_to(arena, i, task, x, covered):
     near_m = task.near_m[covered]
     left_m = max(way_m - near_m, 0.0)
     up_m, down_m = max(x[Z] - z1 - near_m, 0.0), max(z1 - x[Z] - near_m, 0.0)
-    seconds = max(left_m / uas.speed_mps, up_m / uas.climb_mps + down_m / uas.descent_mps)
+    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    seconds = flight_seconds(ROUTED, speeds, 0.0, left_m, up_m, down_m)
     # what is left for later takes longer than straight flight: no gain in putting it off
     seconds = SLOWER * seconds + task.rest_s[covered]
     # what is lost until the velocity is the wanted one

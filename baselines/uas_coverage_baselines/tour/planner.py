@@ -16,6 +16,7 @@ from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.vehicle import VX, VY, VZ
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
@@ -139,8 +140,8 @@ class Tour:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
         expected = plan.x[1]
-        as_planned = self._is_flown[i] and np.abs(expected[3:6] - x[3:6]).max() < _SURPRISE_MPS
-        self._reference_mps[i] = plan.reference[1] if as_planned else x[3:5]
+        as_planned = self._is_flown[i] and np.abs((expected - x)[VX : VZ + 1]).max() < _SURPRISE_MPS
+        self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
         plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
         plan.push[-1], plan.share[-1] = 0.0, 1.0
         if not as_planned:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle.range import TOUR
 from uas_coverage_env.world import Arena
 
 FloatArray = NDArray[np.float64]
 
-LANDING_S = 3.0  # from full speed over the start to rest on it
 _RESERVE_S = 30.0  # what the return rule asks for beyond the way home at full speed
 _SPARE_S = 10.0  # left beside it in a new order, so that not every delay upsets the order
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
@@ -186,10 +186,10 @@ class Schedule:
             first_s=first_s,
             between_s=legs.between_s,
             kind=legs.kind,
-            home_s=legs.home_s + LANDING_S,
+            home_s=legs.home_s + TOUR.landing_s,
             idle_s=np.where(view.may_work, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, 0:2]),
-            velocity_mps=np.ascontiguousarray(x[:, 3:5]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
             speed_mps=self.legs.speed_mps,
             acceleration_mps2=self.legs.acceleration_mps2,
             start_m=np.ascontiguousarray(legs.starts_m[:, :2]),

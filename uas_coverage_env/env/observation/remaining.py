@@ -9,7 +9,7 @@ from uas_coverage_env.vehicle import X, Y
 from uas_coverage_env.world.arena import ALL_SHARES
 
 _N_SECTORS = 8
-_N_SUMS = _N_SECTORS + 2
+_NORTH, _EAST, _N_SUMS = _N_SECTORS, _N_SECTORS + 1, _N_SECTORS + 2
 
 _FEATURES = (
     Feature("sectors", 8, 0, 1, "share of the open weight in 45° from north over east"),
@@ -62,8 +62,8 @@ def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, 
     sums[6] = eighth - half_eighth - quarter_eighth + all_three
     sums[7] = every - half - quarter - eighth
     sums[7] += half_quarter + half_eighth + quarter_eighth - all_three
-    sums[8] = north
-    sums[9] = east
+    sums[_NORTH] = north
+    sums[_EAST] = east
 
 
 @inlined_kernel
@@ -101,8 +101,8 @@ def write_remaining(arena, state, i, row):
         row[_AT.sectors + s] = within(sums[s] * per_share, 0.0, 1.0)
     there = 1.0 if left > 0.0 else 0.0
     to_m = per_share * arena.rules[0].unit_m
-    north_m = sums[8] * to_m - there * state.x[i, X]
-    east_m = sums[9] * to_m - there * state.x[i, Y]
+    north_m = sums[_NORTH] * to_m - there * state.x[i, X]
+    east_m = sums[_EAST] * to_m - there * state.x[i, Y]
     row[_AT.centre] = within(north_m * (1.0 / FAR_M), -1.0, 1.0)
     row[_AT.centre + 1] = within(east_m * (1.0 / FAR_M), -1.0, 1.0)
     return left * (1.0 / ALL_SHARES)

@@ -110,9 +110,7 @@ def _rays_to_fence(normals, offsets_m, first, last, x, y, z, free_m):
 
 
 @kernel
-def _obstruct(
-    normals, offsets_m, first, last, x, y, z, along_m, half_m, dx, dy, dz, free_m, ahead, behind
-):
+def _obstruct(normals, offsets_m, first, last, x, y, z, along_m, half_m, direction, free_m, rays):
     """Shorten two opposite rays at a hull.
 
     Args:
@@ -125,13 +123,12 @@ def _obstruct(
         z: Down of it [m].
         along_m: How far ahead the middle of the box around the hull is [m].
         half_m: How far the box reaches from there, ahead and back [m].
-        dx: The direction ahead, north.
-        dy: East.
-        dz: Down.
+        direction: Ahead: north, east, down.
         free_m: (N_RAYS,) [m] written.
-        ahead: Index of the ray in this direction.
-        behind: Index of the other.
+        rays: Indices of the ray in this direction, and of the other.
     """
+    dx, dy, dz = direction
+    ahead, behind = rays
     if along_m + half_m >= 0.0 and along_m - half_m < free_m[ahead]:
         free_m[ahead] = _ray_to_hull(
             normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m[ahead]
@@ -235,27 +232,27 @@ def _rays_to_obstacle(obstacle, normals, offsets_m, x, y, z, free_m):
     if level & along_north:
         _obstruct(
             normals, offsets_m, first, last, x, y, z,
-            north_m, half_north_m, 1.0, 0.0, 0.0, free_m, _N, _S,
+            north_m, half_north_m, (1.0, 0.0, 0.0), free_m, (_N, _S),
         )  # fmt: skip
     if level & along_east:
         _obstruct(
             normals, offsets_m, first, last, x, y, z,
-            east_m, half_east_m, 0.0, 1.0, 0.0, free_m, _E, _W,
+            east_m, half_east_m, (0.0, 1.0, 0.0), free_m, (_E, _W),
         )  # fmt: skip
     if level & (abs(north_m - east_m) <= half_both_m):
         _obstruct(
             normals, offsets_m, first, last, x, y, z, (north_m + east_m) * _DIAGONAL,
-            half_both_m * _DIAGONAL, _DIAGONAL, _DIAGONAL, 0.0, free_m, _NE, _SW,
+            half_both_m * _DIAGONAL, (_DIAGONAL, _DIAGONAL, 0.0), free_m, (_NE, _SW),
         )  # fmt: skip
     if level & (abs(north_m + east_m) <= half_both_m):
         _obstruct(
             normals, offsets_m, first, last, x, y, z, (east_m - north_m) * _DIAGONAL,
-            half_both_m * _DIAGONAL, -_DIAGONAL, _DIAGONAL, 0.0, free_m, _SE, _NW,
+            half_both_m * _DIAGONAL, (-_DIAGONAL, _DIAGONAL, 0.0), free_m, (_SE, _NW),
         )  # fmt: skip
     if along_north & along_east:
         _obstruct(
             normals, offsets_m, first, last, x, y, z,
-            down_m, obstacle.hull_half_m[2], 0.0, 0.0, 1.0, free_m, _DOWN, _UP,
+            down_m, obstacle.hull_half_m[2], (0.0, 0.0, 1.0), free_m, (_DOWN, _UP),
         )  # fmt: skip
 
 

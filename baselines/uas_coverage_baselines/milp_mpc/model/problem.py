@@ -17,7 +17,7 @@ from uas_coverage_baselines.milp_mpc.model.milp import Columns
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NormBounds, norm_bounds
 from uas_coverage_baselines.milp_mpc.model.reachability import Reach
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.vehicle import LinearModel, VehicleParams
+from uas_coverage_env.vehicle import VX, VZ, LinearModel, VehicleParams
 
 FloatArray = NDArray[np.float64]
 NEVER = 10_000
@@ -294,7 +294,7 @@ class Variables:
     @property
     def velocity(self) -> Columns:
         """(U, N+1, 3)."""
-        return self.x[..., 3:6]
+        return self.x[..., VX : VZ + 1]
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,13 @@ from numpy.typing import NDArray
 from uas_coverage_env.geometry import ConvexPolytope, cylinder_faces
 from uas_coverage_env.vehicle import (
     LIFT,
+    PHI,
     TAU_Y,
     THETA,
     VX,
+    VY,
     VZ,
+    WX,
     WY,
     LinearModel,
     VehicleParams,
@@ -193,8 +196,8 @@ class _Chain:
     def displacement(self, x: FloatArray, unit: FloatArray) -> FloatArray:
         """(N+1, F) largest unit · (north, east) of what n steps can move, from any sample."""
         c1, c2, c3, epsilon = self._telescoped()
-        fastest = np.maximum(np.max(unit @ self.speed_vertices.T, axis=1), unit @ x[3:5])
-        tilted = unit @ np.array([-x[7], x[6]])
+        fastest = np.maximum(np.max(unit @ self.speed_vertices.T, axis=1), unit @ x[VX : VY + 1])
+        tilted = unit @ np.array([-x[THETA], x[PHI]])
         ahead = np.maximum(np.max(unit @ self.tilt_vertices.T, axis=1), tilted)
         behind = np.maximum(np.max(-unit @ self.tilt_vertices.T, axis=1), -tilted)
         alpha = np.abs(unit) @ self.alpha_max
@@ -218,8 +221,8 @@ class _Chain:
 
     def support(self, x: FloatArray, unit: FloatArray) -> FloatArray:
         """(N+1, F) largest unit · (north, east) of the position."""
-        position, velocity = unit @ x[0:2], unit @ x[3:5]
-        tilt, rate = unit @ np.array([-x[7], x[6]]), unit @ np.array([-x[10], x[9]])
+        position, velocity = unit @ x[0:2], unit @ x[VX : VY + 1]
+        tilt, rate = unit @ np.array([-x[THETA], x[PHI]]), unit @ np.array([-x[WY], x[WX]])
         fastest = np.max(unit @ self.speed_vertices.T, axis=1)
         steepest = np.max(unit @ self.tilt_vertices.T, axis=1)
         quickest = np.max(unit @ self.rate_vertices.T, axis=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ def construct(
     appraisal = Appraisal(problem, blocks)
     sequences = _sequences(problem, uas)
     vehicle = compile_vehicle(problem.vehicles[uas], dt_s)[()]
-    normals, offsets, first, last, clearance = _stacked_hulls(problem, uas)
+    keep_out = _keep_out(problem, uas)
     target = problem.targets[uas]
     aim = np.full(3, np.nan) if target is None else target.position_m
     if problem.tours and (tour := problem.tours[uas]) is not None:
@@ -72,11 +73,7 @@ def construct(
             problem.waypoints_m,
             problem.waypoint_reach_m,
             sphere_faces(problem.waypoint_sides),
-            normals,
-            offsets,
-            first,
-            last,
-            clearance,
+            keep_out,
             aim,
             lead_s,
             problem.horizon,
@@ -121,7 +118,7 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
     if problem.tours:
         return _along(problem.tours[uas])
     waypoints = problem.waypoints_m
-    ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, 3:6]
+    ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, VX : VZ + 1]
     near = np.argsort(_travel_m(waypoints - ahead), kind="stable")[: _BRANCHES[0]]
     between = _travel_m(waypoints[:, None] - waypoints[None])
     neighbours = np.argsort(between, axis=1, kind="stable")
@@ -161,8 +158,22 @@ def _travel_m(away: FloatArray) -> FloatArray:
     return np.maximum(np.hypot(away[..., 0], away[..., 1]), 4.0 * np.abs(away[..., 2]))
 
 
-def _stacked_hulls(problem: PlanningProblem, uas: int):
-    """Faces of the fence and of all obstacles in one array, the fence's turned outward last."""
+class _KeepOut(NamedTuple):
+    """Fixed obstacles, and as the last hull the fence, which is kept to from inside."""
+
+    normals: FloatArray
+    """(F, 3)."""
+    offsets: FloatArray
+    """(F,)."""
+    first: NDArray[np.int64]
+    """(O+1,) first face of each hull."""
+    last: NDArray[np.int64]
+    """(O+1,) the one after its last."""
+    clearance: FloatArray
+    """(O+1,) [m]."""
+
+
+def _keep_out(problem: PlanningProblem, uas: int) -> _KeepOut:
     hulls = [hull for _, hull in problem.obstacles]
     counts = np.array([hull.n_faces for hull in hulls], np.int64)
     last = np.cumsum(counts)
@@ -171,7 +182,7 @@ def _stacked_hulls(problem: PlanningProblem, uas: int):
     first = np.concatenate([last - counts, [last[-1] if len(last) else 0]]).astype(np.int64)
     last = np.concatenate([last, [len(offsets)]]).astype(np.int64)
     clearance = np.concatenate([problem.obstacle_clearance_m[uas], [problem.fence_margin_m]])
-    return normals, offsets, first, last, clearance
+    return _KeepOut(normals, offsets, first, last, clearance)
 
 
 @allocating_kernel
@@ -201,8 +212,9 @@ def _aim_at(center, reach_m, faces, x, following):
 
 
 @allocating_kernel
-def _over_roofs(vehicle, x, down_mps, normals, offsets, first, last, clearance):
+def _over_roofs(vehicle, x, down_mps, keep_out):
     """Climb instead where the way ahead leads into an obstacle."""
+    normals, offsets, first, last, clearance = keep_out
     for step in range(1, _ROOF_LOOKAHEAD + 1):
         north, east = x[X] + step * x[VX], x[Y] + step * x[VY]
         for o in range(len(first) - 1):
@@ -214,8 +226,9 @@ def _over_roofs(vehicle, x, down_mps, normals, offsets, first, last, clearance):
 
 
 @allocating_kernel
-def _depth_inside(x, normals, offsets, first, last, clearance):
+def _depth_inside(x, keep_out):
     """How far the position is inside keep-out zones or outside the fence [m]."""
+    normals, offsets, first, last, clearance = keep_out
     depth = 0.0
     fence = len(first) - 1
     for o in range(fence):
@@ -233,11 +246,7 @@ def _fly_all(
     waypoints,
     reach_m,
     faces,
-    normals,
-    offsets,
-    first,
-    last,
-    clearance,
+    keep_out,
     target,
     lead_s,
     horizon,
@@ -286,11 +295,11 @@ def _fly_all(
                 speed = min(speed, 0.3 * away)
             down = 0.6 * (aim[2] - x[Z]) - 0.2 * x[VZ]
             down = min(max(down, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
-            down = _over_roofs(vehicle, x, down, normals, offsets, first, last, clearance)
+            down = _over_roofs(vehicle, x, down, keep_out)
             velocity_climb_wrench(
                 vehicle, x, reference, speed * ex / length, speed * ey / length, down, u
             )
             fly_kinematics(vehicle, x, u)
             positions[s, n + 1] = x[:3]
-            depths[s] += _depth_inside(x, normals, offsets, first, last, clearance)
+            depths[s] += _depth_inside(x, keep_out)
     return positions, visits, depths

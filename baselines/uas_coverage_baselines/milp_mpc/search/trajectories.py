@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal, gains, visits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem, Trajectories
+from uas_coverage_env.vehicle import VX, VZ
 
 FloatArray = NDArray[np.float64]
 _PER_METRE = 1e-4  # of two that gain the same the shorter one; a waypoint's step is worth 1
@@ -60,7 +61,7 @@ def left_over(
         visit = np.full(problem.n_waypoints, NEVER, np.int64)
         if name in left.names:
             old = left.of(name)
-            path, velocity = left.x[old, : problem.horizon + 1, 0:3], left.x[old, -1, 3:6]
+            path, velocity = left.x[old, : problem.horizon + 1, 0:3], left.x[old, -1, VX : VZ + 1]
             covers = left.covers[old][:, problem.waypoint_index]
             visit = np.where(covers.any(axis=0), covers.argmax(axis=0), NEVER)
         beyond = np.arange(1, problem.horizon + 2 - len(path))[:, None]

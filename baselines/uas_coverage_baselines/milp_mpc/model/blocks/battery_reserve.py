@@ -5,11 +5,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.model.energy import DETOUR, LANDING_S, SPEED_SHARE
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.vehicle import DELTA_THRUST, DOD, U_TH, LinearModel, dod_per_s
+from uas_coverage_env.vehicle import (
+    DELTA_THRUST,
+    DOD,
+    U_TH,
+    LinearModel,
+    VehicleParams,
+    dod_per_s,
+)
+from uas_coverage_env.vehicle.range import (
+    MILP_RESERVE,
+    flight_seconds,
+    level_seconds,
+    speeds_of,
+    vertical_seconds,
+)
 
 FloatArray = NDArray[np.float64]
 _BATTERY = [DOD, U_TH]
@@ -22,8 +35,8 @@ class BatteryReserve:
     The paper bounds DoD by the cutoff and leaves coming home to the return mode's threshold
     (Sec. III-C.6); this is the terminal set that makes DoD_max a constraint. The flight home is
     timed at nearly full speed with a detour, the descent and the landing one after the other
-    (`energy`), the horizontal norm from above by H_P faces (eq. (const_Vec_ub)): a row per face and
-    sense of the climb,
+    (`MILP_RESERVE`), the horizontal norm from above by H_P faces (eq. (const_Vec_ub)): a row per
+    face and sense of the climb,
 
         DoD(N) / rate + f · (p(N) - p_home) <= DoD_max / rate - landing - allowance + short,
 
@@ -92,6 +105,17 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
     return result if allowance else result - _ALLOWANCE_S
 
 
+def seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
+    """Flight time home as the reserve takes it [s]; how far on the safe side: docs/range.md.
+
+    Args:
+        vehicle: that flies.
+        away_m: (3,) from its home to where it is, or back.
+    """
+    way_m, height_m = float(np.hypot(away_m[0], away_m[1])), abs(float(away_m[2]))
+    return flight_seconds(MILP_RESERVE, speeds_of(vehicle), 0.0, way_m, 0.0, height_m)
+
+
 def _rate(problem: PlanningProblem, uas: int) -> float:
     """Depth of discharge that a second of flight takes, at the end of the way home [1/s]."""
     return dod_per_s(problem.vehicles[uas], float(problem.dod_max[uas]))
@@ -100,16 +124,16 @@ def _rate(problem: PlanningProblem, uas: int) -> float:
 def _room_s(problem: PlanningProblem, uas: int) -> float:
     """Seconds of cruising in a battery that is full, less landing and allowance."""
     full_s = float(problem.dod_max[uas]) / _rate(problem, uas)
-    return full_s - LANDING_S - _ALLOWANCE_S
+    return full_s - MILP_RESERVE.landing_s - _ALLOWANCE_S
 
 
 def _time_faces(problem: PlanningProblem, uas: int) -> FloatArray:
     """(2 H_P, 3) rows whose largest value along the way from home is the time it takes [s/m]."""
-    limits = problem.vehicles[uas].limits
+    speeds = speeds_of(problem.vehicles[uas])
     # the faces measure the norm from below by at most this factor
     level = cylinder_faces(problem.physical_sides) / np.cos(np.pi / problem.physical_sides)
-    level = level * DETOUR / (SPEED_SHARE * limits.v_xy_max_mps)
-    down = np.array([0.0, 0.0, 1.0 / limits.v_down_max_mps])
+    level = level_seconds(MILP_RESERVE, speeds, level)
+    down = np.array([0.0, 0.0, vertical_seconds(speeds, 0.0, 1.0)])
     return np.vstack([level + down, level - down])
 
 

@@ -1,0 +1,16 @@
+"""How the world pushes back: disturbances as blocks, those of the package and those of others."""
+
+from uas_coverage_env.compiled.random import normal, uniform
+from uas_coverage_env.disturbances.of_scenario import disturbances_of
+from uas_coverage_env.disturbances.wind import constant_wind, wind_velocity_mps
+from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY, Disturbance
+
+__all__ = [
+    "DISTURBANCE_MEMORY",
+    "Disturbance",
+    "constant_wind",
+    "disturbances_of",
+    "normal",
+    "uniform",
+    "wind_velocity_mps",
+]

@@ -1,0 +1,67 @@
+"""The tables `[disturbances.NAME]` of a scenario, each read by the package that installed NAME."""
+
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from typing import Annotated, Any
+
+from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
+
+from uas_coverage_env.files.strict_toml import StrictModel, parse
+
+GROUP = "uas_coverage.disturbances"
+
+
+class DisturbanceTable(StrictModel):
+    """The fields of a disturbance in scenario files; to be derived from.
+
+    A package announces its table in the entry-point group `uas_coverage.disturbances`, under the
+    name that scenario files use.
+    """
+
+    def disturbance(self) -> Any:
+        """The disturbance that the table describes, a `uas_coverage_env.disturbances.Disturbance`.
+
+        Raises:
+            NotImplementedError: The derived class does not say.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no method disturbance()")
+
+
+def _read(value: Any) -> tuple[tuple[str, DisturbanceTable], ...]:
+    try:
+        given = dict(value)
+    except (TypeError, ValueError):
+        raise ValueError("should be tables [disturbances.NAME]") from None
+    return tuple((name, _table(str(name), given[name])) for name in sorted(given, key=str))
+
+
+def _table(name: str, value: Any) -> DisturbanceTable:
+    if isinstance(value, DisturbanceTable):
+        return value
+    installed = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if name not in installed:
+        known = ", ".join(sorted(installed)) or "none"
+        raise ValueError(f"no disturbance {name[:80]!r} is installed; there are: {known}")
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} should be a table [disturbances.{name}]")
+    try:
+        model = installed[name].load()
+    except (ImportError, AttributeError) as error:
+        reason = " ".join(str(error).split())
+        raise ValueError(f"disturbance {name!r} cannot be loaded: {reason}") from error
+    if not isinstance(model, type) or not issubclass(model, DisturbanceTable):
+        raise ValueError(f"disturbance {name!r} is installed as {model!r}, no DisturbanceTable")
+    return parse(value, model, name)
+
+
+def _plain(tables: tuple[tuple[str, DisturbanceTable], ...]) -> dict[str, Any]:
+    return {name: table.model_dump(mode="json", by_alias=True) for name, table in tables}
+
+
+DisturbanceTables = Annotated[
+    tuple[tuple[str, DisturbanceTable], ...],
+    PlainValidator(_read),
+    PlainSerializer(_plain),
+    WithJsonSchema({"type": "object", "additionalProperties": {"type": "object"}}),
+]
+"""Name -> table, as pairs in the order of the names: a scenario can be hashed."""

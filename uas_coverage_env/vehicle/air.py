@@ -1,0 +1,41 @@
+"""A step in moving air, and under a force that is no drag, with the models of still air.
+
+In air that moves at a constant velocity a UAS flies as it does in still air, seen from the air:
+drag, trim tilt and the power of both models follow from the velocity relative to it. So a step is
+flown with that velocity, and the way of the air is added. For the drag, which is linear, this is
+the force drag · wind of the still air's model, to the last term of its series.
+
+A force that is held over the step adds to position and velocity what the discrete model says; both
+models' translation is linear in it. Of the power, it has no part in this step.
+"""
+
+from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.vehicle.layout import VX, VZ, X, Z
+
+
+@inlined_kernel
+def enter_air(x, wind_mps):
+    """Make the velocity of a state one relative to the air; wind_mps (3,) NED [m/s]."""
+    for axis in range(3):
+        x[VX + axis] -= wind_mps[axis]
+
+
+@inlined_kernel
+def leave_air(vehicle, x, wind_mps, force_N):
+    """Make the velocity one over ground again, after a step, and add what a force has done.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state at the end of the step; written.
+        wind_mps: (3,) NED [m/s].
+        force_N: (3,) NED [N], held over the step.
+    """
+    for axis in range(3):
+        x[VX + axis] += wind_mps[axis]
+        x[X + axis] += vehicle.dt_s * wind_mps[axis]
+    for axis in range(2):
+        x[X + axis] += vehicle.horizontal_force_B[0] * force_N[axis]
+        x[VX + axis] += vehicle.horizontal_force_B[1] * force_N[axis]
+    # lift is a force, too, but it acts upward
+    x[Z] -= vehicle.vertical_B[0] * force_N[2]
+    x[VZ] -= vehicle.vertical_B[1] * force_N[2]
