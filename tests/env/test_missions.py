@@ -410,7 +410,8 @@ def windy(rng):
 
 
 def test_a_wind_that_is_drawn_blows_in_single_and_batched_missions():
-    single, many = CoverageSwarmEnv(windy), make_vec(2, windy)
+    single: Any = CoverageSwarmEnv(windy)
+    many = make_vec(2, windy)
     seen, rows = single.reset(seed=3)[0], many.reset(seed=2)[0]
     np.testing.assert_array_equal(seen, rows[1])
     assert single.scenario.wind == many.call("scenario")[1].wind
