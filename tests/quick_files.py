@@ -23,6 +23,7 @@ QUICK = {
     "compiled/test_memory.py": "",
     "conformance/test_gymnasium.py": "but test_stable_baselines_finds_nothing_wrong",
     "conformance/test_pettingzoo.py": "",
+    "disturbances/test_disturbances_in_the_world.py": "",
     "docs/test_rules.py": "",
     "docs/test_tables.py": "",
     "draw/test_labels.py": "",
