@@ -79,7 +79,7 @@ def save_gif(pictures: list[Image.Image], path: Path) -> None:
 
 def main() -> None:
     """Record what the command line names."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description="Record a replay page as a GIF.")
     parser.add_argument("flight", type=Path, help="flight directory that holds a replay.html")
     parser.add_argument("gif", type=Path, help="file to write")
     parser.add_argument("--stride", type=int, default=2, help="steps of flight per picture")
