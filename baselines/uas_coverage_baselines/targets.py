@@ -47,7 +47,7 @@ class Targets:
         return int(np.where(candidates, distances_m, np.inf).argmin())
 
     def _candidates(self, swarm: SwarmState, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(W,) open waypoints that are free and nobody's target, else the next best.
+        """(W,) open waypoints that are free and no UAS's target, else the next best.
 
         The last waypoints are shared: a UAS that is called home may never reach its target.
         """

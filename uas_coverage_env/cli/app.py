@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refuse(str(error), FAILED)
     except OSError as error:
         # a folder that is closed to us, a name that is too long, a full disk: a hundred places
-        # may meet them, and nobody needs to hear which of ours it was
+        # may raise them, and which call it was is of no use to the user
         return _refuse(_of_a_file(error), 2)
     if code == _CTRL_C:
         return _refuse("stopped by hand before there was anything to keep", FAILED)

@@ -76,7 +76,7 @@ def compare(
         ),
     ] = None,
     safety_filter: Annotated[
-        bool, typer.Option("--filter", help="Keep everybody's commands clear of harm.")
+        bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
     ] = False,
     dynamics: Annotated[
         Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
@@ -242,7 +242,7 @@ def _warn(sweep: Sweep) -> None:
 
 def _report(screen: Console, comparison: Comparison, out: Path, names: Sequence[str]) -> None:
     rows, scores, reference = comparison.rows, comparison.scores, comparison.reference
-    # a table that is cut helps nobody; in a log it is as wide as it needs to be
+    # a truncated table is useless; in a log it is as wide as necessary
     wide = Console(width=max(screen.width, _NARROWEST_TABLE), highlight=False)
     for line in comparison.circumstances():
         screen.print(line, markup=False)

@@ -70,7 +70,7 @@ def run(
     """Fly one mission and write a flight directory.
 
     Ctrl-C ends the flight early and keeps what was flown. Exits 0 where everything is covered,
-    everybody home, nothing touched and no limit exceeded (also where --steps ended the run), 1
+    all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
     otherwise.
     """
     mission = loaded(scenario)

@@ -35,7 +35,7 @@ class Comparison:
     Attributes:
         rows: Its flights.
         planned: How many flights the whole sweep has.
-        reference: Label of the player with whom the others are compared.
+        reference: Label of the planner that the others are compared with.
         command: The command line that made it.
         jobs: How it was flown, for people.
         scores: Of each player, best first.

@@ -47,7 +47,7 @@ class Sweep:
         players: By label.
         seeds: Of the planners.
         dynamics: `lpv` or `nonlinear`.
-        safety_filter: Whether the filter is on for everybody.
+        safety_filter: Whether the filter is on for all UAS.
     """
 
     scenarios: Mapping[str, Scenario]

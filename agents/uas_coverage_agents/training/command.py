@@ -46,7 +46,7 @@ def train(
     out: Annotated[
         Path | None, typer.Option(help="Directory; default: trainings/ALGORITHM-SEED.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of network, lots and scenarios.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of network, random numbers and scenarios.")] = 0,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps of lanes to learn from; repeats exactly.")
     ] = None,
@@ -88,7 +88,7 @@ def train(
     if zip_file is not None and not trust_pickle:
         raise InputError(
             f"{zip_file}: a Stable-Baselines3 zip holds pickles, which can execute anything; "
-            f"add --trust-pickle if you trust who made it"
+            f"add --trust-pickle if you trust its author"
         )
     loop, filelock = _learn_extra()
     name = Path(algorithm).stem
