@@ -62,7 +62,7 @@ class Comparison:
         some = "" if len(self.rows) == self.planned else f" of {self.planned} (not finished)"
         lines = [
             f"{self.command}",
-            f"{len(self.rows)} flights{some}: {len(self.scores)} players, {scenarios} scenarios, "
+            f"{len(self.rows)} flights{some}: {len(self.scores)} planners, {scenarios} scenarios, "
             f"{seeds} {'seed' if seeds == 1 else 'seeds'}",
             f"{machine()}; {self.jobs}",
             versions(),
