@@ -1,4 +1,4 @@
-"""Who flies to which waypoint: the memory that the simple planners share."""
+"""Assignment of waypoints to UAS: the state that the simple planners share."""
 
 from collections.abc import Callable, Mapping
 
