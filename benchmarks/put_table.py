@@ -44,7 +44,7 @@ def filled(text: str, content: str, mark: str) -> str:
 def short_table(data: dict[str, Any]) -> str:
     """Who, how often it worked, what it took, against whom."""
     reference = data["reference"]
-    headings = ["player", "accomplished", "violations", "decision p50, ms"]
+    headings = ["planner", "accomplished", "violations", "decision p50, ms"]
     headings += [f"Δ energy to {reference}, %", "Δ steps, %"]
     lines = ["| " + " | ".join(headings) + " |", "|---|" + "---:|" * (len(headings) - 1)]
     for one in data["scores"]:

@@ -14,14 +14,15 @@ import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from gymnasium import spaces
 
 from uas_coverage_env import load_scenario, uas_coverage_v0
-from uas_coverage_env.env import CoverageParallelEnv
-from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE, actions_of
+from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv
+from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.settings import MissionSettings
@@ -95,6 +96,54 @@ def _shown(space: spaces.Space[Any]) -> str:
     if isinstance(space, spaces.Box):
         return f"Box({space.low.min():g}, {space.high.max():g}, {space.shape}, {space.dtype})"
     return str(space)
+
+
+def environments() -> str:
+    """Every environment with the shapes of its observation and actions, for the village."""
+    doors: dict[str, tuple[str, str, Callable[..., Any]]] = {
+        f'uas_coverage_v0.parallel_env("{SCENARIO}")': (
+            "PettingZoo, parallel",
+            "one per UAS",
+            uas_coverage_v0.parallel_env,
+        ),
+        f'uas_coverage_v0.env("{SCENARIO}")': (
+            "PettingZoo, AEC",
+            "one per UAS",
+            uas_coverage_v0.env,
+        ),
+        f'gymnasium.make("UASCoverage-v0", scenario="{SCENARIO}")': (
+            "Gymnasium",
+            "one for the swarm",
+            CoverageSwarmEnv,
+        ),
+        f'gymnasium.make_vec("UASCoverage-v0", num_envs=64, scenario="{SCENARIO}")': (
+            "Gymnasium, vectorised",
+            "one for the swarm, 64 missions",
+            partial(CoverageVectorEnv, 64),
+        ),
+    }
+    rows = []
+    for call, (api, agents, door) in doors.items():
+        spaces_of = [_spaces(door(scenario=SCENARIO, action=name)) for name in ACTION_NAMES]
+        shapes = [f"`{_shape(acted)}`" for _, acted in spaces_of]
+        rows.append((f"`{call}`", api, agents, f"`{_shape(spaces_of[0][0])}`", *shapes))
+    kinds = (f"`{name}`" for name in ACTION_NAMES)
+    return table(("environment", "API", "agents", "observation", *kinds), rows)
+
+
+def _spaces(env: Any) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    """The observation and the action space, of the first agent where there are several."""
+    if not hasattr(env, "possible_agents"):
+        return env.observation_space, env.action_space
+    agent = env.possible_agents[0]
+    return env.observation_space(agent), env.action_space(agent)
+
+
+def _shape(space: spaces.Space[Any]) -> str:
+    """The shape of a box, the number of choices of a discrete space."""
+    if isinstance(space, spaces.Discrete):
+        return f"Discrete({space.n})"
+    return str(space.shape)
 
 
 def docstring_section(title: str) -> Callable[[], str]:
@@ -199,6 +248,7 @@ def planners() -> str:
 
 
 PARTS: dict[str, Callable[[], str]] = {
+    "environments": environments,
     "environment_summary": environment_summary,
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
     "actions": action_tables,

@@ -29,3 +29,30 @@ def test_changes_of_a_release_are_short_and_grouped():
     entries = re.findall(r"^- (.*)$", release, re.MULTILINE)
     assert len(entries) > 30
     assert {entry[:40]: len(entry) for entry in entries if len(entry) > 400} == {}
+
+
+def test_the_readme_cites_paper_and_package_as_the_citation_file_does():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    paper, package = re.findall(r"^@\w+\{\w+,\n(.*?)^\}$", readme, re.MULTILINE | re.DOTALL)
+
+    title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)[1]
+    version = re.search(r"^version: (.*)$", citation, re.MULTILINE)[1]
+    released = re.search(r'^date-released: "(.*)"$', citation, re.MULTILINE)[1]
+    (authors,) = re.findall(r"^  - name: (.*)$", citation, re.MULTILINE)
+    assert _bibtex(package) == {
+        "title": title,
+        "author": f"{{{authors}}}",
+        "version": version,
+        "date": released,
+    }
+
+    (article,) = re.findall(r"^    title: (.*)$", citation, re.MULTILINE)
+    people = re.findall(r"given-names: (.*)\n +family-names: (.*)", citation)
+    fields = _bibtex(paper)
+    assert fields["title"] == article
+    assert fields["author"] == " and ".join(f"{last}, {first}" for first, last in people)
+
+
+def _bibtex(entry: str) -> dict[str, str]:
+    return dict(re.findall(r"^  (\w+) *= \{(.*)\},?$", entry, re.MULTILINE))

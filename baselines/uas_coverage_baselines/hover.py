@@ -27,7 +27,7 @@ class Hover:
         """Nothing to prepare."""
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
-        """The same for everybody, always."""
+        """The same command for every UAS, always."""
         altitudes_m = self.options.climb_m - swarm.home_m[:, 2]
         hold = {
             name: Velocity(0.0, 0.0, altitude_m)

@@ -32,7 +32,7 @@ class Lawnmower:
         self._runs = plan_runs(brief, back_and_forth(waypoints_m))
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
-        """Fly the own run in order; who has finished helps with what is nearest."""
+        """Fly each run in order; a UAS that has finished helps with the nearest waypoints."""
         return self._targets.commands(swarm, self._next)
 
     def _next(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:

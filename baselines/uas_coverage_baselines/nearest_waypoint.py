@@ -9,7 +9,7 @@ from uas_coverage_env.world import Command, SwarmState
 
 
 class NearestWaypoint:
-    """Flies each UAS to the nearest waypoint that is open and nobody else's; home in the end."""
+    """Flies each UAS to the nearest open waypoint that no other UAS flies to; home in the end."""
 
     Options = AssistedOptions
 

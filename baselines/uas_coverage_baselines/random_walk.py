@@ -27,7 +27,7 @@ class RandomWalk:
         self.assistants = self.options.assistants
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Seed the lots; note the speeds of the vehicles and the heights inside the fence."""
+        """Seed the generator; note the speeds of the vehicles and the heights inside the fence."""
         self._random = np.random.default_rng(seed)
         self._hold_steps = max(1, round(self.options.hold_s / brief.dt_s))
         limits_mps = np.array([vehicle.limits.v_xy_max_mps for vehicle in brief.vehicles])
@@ -46,7 +46,7 @@ class RandomWalk:
         return {name: self._held[name] for name in swarm.active}
 
     def _draw(self, swarm: SwarmState) -> dict[str, Command]:
-        # for everybody, flying or not: the lots of one UAS do not hang on the fate of another
+        # for all UAS, flying or not: the numbers of one do not depend on the fate of another
         headings_rad = self._random.uniform(0.0, 2.0 * np.pi, len(swarm.names))
         altitudes_m = self._random.uniform(*self._altitudes_m, len(swarm.names))
         return {

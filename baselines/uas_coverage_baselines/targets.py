@@ -1,4 +1,4 @@
-"""Who flies to which waypoint: the memory that the simple planners share."""
+"""Assignment of waypoints to UAS: the state that the simple planners share."""
 
 from collections.abc import Callable, Mapping
 
@@ -47,7 +47,7 @@ class Targets:
         return int(np.where(candidates, distances_m, np.inf).argmin())
 
     def _candidates(self, swarm: SwarmState, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(W,) open waypoints that are free and nobody's target, else the next best.
+        """(W,) open waypoints that are free and no UAS's target, else the next best.
 
         The last waypoints are shared: a UAS that is called home may never reach its target.
         """

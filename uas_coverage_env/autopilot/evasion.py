@@ -29,7 +29,7 @@ _TURNS = 12
 _HELD_S = (8.0, 3.0)
 _ENOUGH_M = 3.0  # more room than this is not looked for
 LINGERING = 0.05
-"""Weight of the mean shortfall of room beside the largest: who is inside leaves early."""
+"""Weight of the mean shortfall of clearance beside the largest: a UAS inside leaves early."""
 
 
 @kernel

@@ -172,7 +172,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
 
 @allocating_kernel
 def steer(arena, state, nonlinear, outcome):
-    """Resolve commands that name a place into velocities; who is called home gets such a command.
+    """Resolve commands that name a place into velocities; a UAS called home gets such a command.
 
     Args:
         arena: The arena.

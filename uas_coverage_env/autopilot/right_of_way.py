@@ -1,11 +1,11 @@
-"""Right of way: those whom return mode brings home go first, and the others leave their way.
+"""Right of way: UAS in return mode go first, and the others keep their paths clear.
 
 A UAS that only waits until the others let it pass may wait until its battery is empty. So the UAS
 decide in a fixed order, those on their way home first, by index; and each of these claims the way
 that it would fly if no other UAS were there: its command held for some seconds, then braking. Those
 who decide later keep out of the claimed ways as well as they safely can (`safety`); those who are
-on their way home themselves only out of that of one who is held up. A claim is a wish and not a
-wall: nobody gives up the room to brake for it.
+on their way home themselves only out of that of one who is held up. A claim is no
+obstacle: no UAS gives up its room for braking because of it.
 """
 
 from uas_coverage_env.autopilot.evasion import LINGERING
@@ -27,7 +27,7 @@ def decision_order(state, order):
 
     Args:
         state: The state.
-        order: (U,) written: the indices of the flying UAS, those whom return mode brings home
+        order: (U,) written: the indices of the flying UAS, those in return mode
             first.
 
     Returns:

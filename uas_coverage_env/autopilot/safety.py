@@ -38,7 +38,7 @@ _NOTICEABLE_M = 1e-3
 def _deflections() -> np.ndarray:
     """(D, 3) turn [rad], share of the speed, and one of the four heights: nearest first.
 
-    Instead of braking, last, come level flight, straight up or down, and creeping: who is wedged in
+    Instead of braking, last, come level flight, straight up or down, and creeping: a UAS wedged in
     between others may have room for no more.
     """
     turns_deg = (0, 25, -25, 50, -50, 80, -80, 110, -110, 150, -150, 180)
@@ -240,5 +240,5 @@ def filter_commands(arena, state, nonlinear, outcome):
             arena, state, i, command, nonlinear, path_m, committed_m, claimants, n_claims, claims_m
         ):
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)
-        # nobody but the filter gives this kind of command
+        # only the filter gives this kind of command
         outcome[i].filtered = command.kind == CLIMB

@@ -35,7 +35,7 @@ def describe(
         bool, typer.Option("--version", help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Fly a swarm of multicopters that covers an area, and see how well it went.
+    """Plan, fly and evaluate coverage missions of a swarm of multicopters.
 
     Exits 0 on success, 1 where a mission failed, 2 where the input is bad.
     """
@@ -58,7 +58,7 @@ add_outside_commands(app)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; the exit code is returned, every mistake of a person is one line."""
+    """Run one command and return the exit code; invalid input is reported in one line."""
     command = typer.main.get_command(app)
     _never_stop_at_a_letter()
     try:
@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refuse(str(error), FAILED)
     except OSError as error:
         # a folder that is closed to us, a name that is too long, a full disk: a hundred places
-        # may meet them, and nobody needs to hear which of ours it was
+        # may raise them, and which call it was is of no use to the user
         return _refuse(_of_a_file(error), 2)
     if code == _CTRL_C:
         return _refuse("stopped by hand before there was anything to keep", FAILED)

@@ -59,11 +59,13 @@ def compare(
         list[str],
         typer.Option(
             metavar="NAME,...",
-            help="Who flies, see `planners`; LABEL=NAME flies one again with other options.",
+            help="Names, see `planners`; LABEL=NAME adds one with other options.",
         ),
     ],
-    out: Annotated[Path, typer.Option(help="Keeps every flight; the same sweep goes on there.")],
-    seeds: Annotated[str, typer.Option(metavar="FIRST:END", help="Of the planners.")] = "0:20",
+    out: Annotated[Path, typer.Option(help="Directory of the sweep; resumed if it exists.")],
+    seeds: Annotated[
+        str, typer.Option(metavar="FIRST:END", help="Seeds of the planners.")
+    ] = "0:20",
     option: Annotated[
         list[str] | None,
         typer.Option(metavar="PLANNER:KEY=VALUE", help="Option of a planner; may be repeated."),
@@ -76,7 +78,7 @@ def compare(
         ),
     ] = None,
     safety_filter: Annotated[
-        bool, typer.Option("--filter", help="Keep everybody's commands clear of harm.")
+        bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
     ] = False,
     dynamics: Annotated[
         Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
@@ -86,16 +88,14 @@ def compare(
     ] = "process",
     jobs: Annotated[
         int | None,
-        typer.Option(
-            min=1, help="Flights side by side; as many as there are cores.", show_default=False
-        ),
+        typer.Option(min=1, help="Flights in parallel; default: one per core.", show_default=False),
     ] = None,
     reuse: Annotated[
         list[Path] | None,
-        typer.Option(metavar="DIR", help="Take the flights that another sweep has in common."),
+        typer.Option(metavar="DIR", help="Reuse the flights that another sweep has in common."),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Forget the flights that --out holds.")
+        bool, typer.Option("--overwrite", help="Delete the flights in --out.")
     ] = False,
 ) -> None:
     """Fly every planner on every scenario with every seed, and compare them.
@@ -242,7 +242,7 @@ def _warn(sweep: Sweep) -> None:
 
 def _report(screen: Console, comparison: Comparison, out: Path, names: Sequence[str]) -> None:
     rows, scores, reference = comparison.rows, comparison.scores, comparison.reference
-    # a table that is cut helps nobody; in a log it is as wide as it needs to be
+    # a truncated table is useless; in a log it is as wide as necessary
     wide = Console(width=max(screen.width, _NARROWEST_TABLE), highlight=False)
     for line in comparison.circumstances():
         screen.print(line, markup=False)

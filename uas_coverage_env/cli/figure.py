@@ -30,7 +30,7 @@ def figure(
     ],
     kind: Annotated[
         Literal["map", "battery", "modes", "decision-time", "leaderboard", "training"],
-        typer.Option(help="What is drawn; map and battery are the paper's Fig. 1 to 3."),
+        typer.Option(help="Figure to draw; map and battery are the paper's Fig. 1 to 3."),
     ],
     step: Annotated[
         int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")

@@ -30,7 +30,7 @@ def shown(
     Args:
         out: Where to write.
         scenario: The scenario flown.
-        watch: Who flies, where a person wants to watch: in a window, or on a map of letters where
+        watch: The planner, if the flight is to be watched: in a window, or as an ASCII map where
             there is no display.
     """
     window = None if watch is None else _window(out, scenario, watch)

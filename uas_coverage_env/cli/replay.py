@@ -26,7 +26,7 @@ def replay(
         int, typer.Option(min=1, max=50, help="Pictures per second; one picture per step.")
     ] = 10,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the film where it exists.")
+        bool, typer.Option("--overwrite", help="Replace an existing film.")
     ] = False,
 ) -> None:
     """Write DIR/replay.html, a page that opens from disk and needs no network.

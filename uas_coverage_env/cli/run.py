@@ -36,20 +36,20 @@ def run(
             metavar="SCENARIO", help="Name of a shipped scenario (`scenarios`), or a scenario file."
         ),
     ],
-    planner: Annotated[str, typer.Option(help="Who flies, see `planners`.")] = "milp-mpc",
+    planner: Annotated[str, typer.Option(help="Name of the planner, see `planners`.")] = "milp-mpc",
     option: Annotated[
         list[str] | None,
         typer.Option(metavar="KEY=VALUE", help="Option of the planner; may be repeated."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the planner.")] = 0,
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Stop after so many steps; that is a success.")
+        int | None, typer.Option(min=1, help="Stop after this many steps (exit code 0).")
     ] = None,
     dynamics: Annotated[
         Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
     ] = "lpv",
     safety_filter: Annotated[
-        bool, typer.Option("--filter", help="Keep the planner's commands clear of harm.")
+        bool, typer.Option("--filter", help="Switch the safety filter on.")
     ] = False,
     watch: Annotated[
         bool,
@@ -64,13 +64,13 @@ def run(
         typer.Option(help="Flight directory; default: flights/SCENARIO-PLANNER-SEED, numbered."),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the flight that --out holds.")
+        bool, typer.Option("--overwrite", help="Replace the flight in --out.")
     ] = False,
 ) -> None:
     """Fly one mission and write a flight directory.
 
     Ctrl-C ends the flight early and keeps what was flown. Exits 0 where everything is covered,
-    everybody home, nothing touched and no limit exceeded (also where --steps ended the run), 1
+    all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
     otherwise.
     """
     mission = loaded(scenario)

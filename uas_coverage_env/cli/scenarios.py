@@ -44,7 +44,7 @@ def check(
     ] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace the PNG where it exists.")] = False,
 ) -> None:
-    """Validate a scenario, say what is in it, and draw it."""
+    """Validate, summarise and draw a scenario."""
     scenario = loaded(file)
     path = picture_file or Path(f"{scenario.name}.png")
     if path.exists() and not overwrite:

@@ -55,7 +55,7 @@ class TextMap:
     def _put(self, cells: NDArray[np.str_], position_m: NDArray[np.float64], sign: str) -> None:
         parts = (position_m[:2] - self._low_m) / self._span_m
         row, column = (np.array([1.0 - parts[0], parts[1]]) * self._shape).astype(int)
-        if 0 <= row < self._shape[0] and 0 <= column < self._shape[1]:  # who leaves is not drawn
+        if 0 <= row < self._shape[0] and 0 <= column < self._shape[1]:  # none outside is drawn
             cells[row, column] = sign
 
     def _centres_m(self) -> NDArray[np.float64]:

@@ -60,7 +60,7 @@ def check(
         str, typer.Argument(metavar="FILE", help="Vehicle file, or the name of a shipped one.")
     ],
 ) -> None:
-    """Validate a vehicle, and say what follows from its parts."""
+    """Validate a vehicle and print the quantities derived from its parts."""
     params = load_vehicle(file)
     out = console()
     out.print(f"{params.name} is valid", style="bold", markup=False)
@@ -108,7 +108,7 @@ def new(
         bool, typer.Option("--overwrite", help="Replace the file where it exists.")
     ] = False,
 ) -> None:
-    """Make a vehicle file from what is known of a vehicle, and say what was assumed."""
+    """Make a vehicle file from data-sheet figures and print the assumptions."""
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:

@@ -16,7 +16,7 @@ class FlightWindow:
 
     Args:
         scenario: The scenario flown.
-        planner: Who flies; its `last_decision` is drawn, where it has one.
+        planner: Its `last_decision` is drawn, where it has one.
 
     Raises:
         ImportError: pygame-ce is not installed.

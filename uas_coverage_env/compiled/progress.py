@@ -1,6 +1,6 @@
 """Tells that kernels are being compiled, and how far that is: a user waits for it, once.
 
-Whoever has set up logging gets an INFO record of the logger `uas_coverage_env`, everybody else a
+Where logging is set up, it is an INFO record of the logger `uas_coverage_env`, otherwise a
 line on stderr; a level above INFO on that logger silences both. `listening` takes their place.
 """
 

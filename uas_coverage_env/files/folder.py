@@ -1,4 +1,4 @@
-"""The folder that somebody names for results: tried before the work, written all or nothing."""
+"""The output directory of a command: checked before the work, written all or nothing."""
 
 import os
 import tempfile

@@ -34,7 +34,7 @@ class Violation:
         time_s: When; of a limit, the first time [s].
         uas: Which UAS.
         kind: A contact's name, or `limit`.
-        partner: With what or whom the contact was (None: nobody); the name of the limit.
+        partner: What the contact was with (None: nothing named); the name of the limit.
         value: Of a limit, the worst value, in the limit's unit; else None.
         limit: Of a limit, its bound.
         samples: Of a limit, at how many samples it was exceeded.
@@ -98,7 +98,7 @@ class FlightRecord:
         return_mode: Whether the world brought UAS home in time.
         safety_filter: Whether the world kept commands clear of harm.
         disturbances: Names of what pushed back.
-        ended: `complete` (nobody flies any more), `steps` (limit of steps) or `stopped` (by hand).
+        ended: `complete` (no UAS is flying), `steps` (limit of steps) or `stopped` (by hand).
         x: (T, U, 14) states, see `uas_coverage_env.vehicle.layout`.
         u: (T, U, 5) inputs, zero once landed or lost.
         voltage_V: (T, U) [V] battery voltage under the current.

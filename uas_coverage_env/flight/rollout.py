@@ -1,4 +1,4 @@
-"""Fly one mission: planner and world in turn, sample by sample, until nobody flies any more."""
+"""Fly one mission: planner and world in turn, sample by sample, until no UAS is flying."""
 
 import contextlib
 import platform

@@ -26,7 +26,7 @@ def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference:
     Args:
         scores: Of each player, best first.
         rows: The flights.
-        reference: Label of the player with whom the others are compared.
+        reference: Label of the planner that the others are compared with.
 
     Raises:
         ImportError: matplotlib (extra `view`) is not installed.

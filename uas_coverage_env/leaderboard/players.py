@@ -1,4 +1,4 @@
-"""Who is compared: planners and policies by name, each with all its options."""
+"""What is compared: planners and policies by name, each with all its options."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -42,7 +42,7 @@ class Player:
 
 
 def players_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, Player]:
-    """The players that a person asks for, by label, in their order.
+    """The planners that the command line names, by label, in their order.
 
     Args:
         texts: Each one or several (comma between them) of PLANNER or LABEL=PLANNER.

@@ -35,7 +35,7 @@ class Comparison:
     Attributes:
         rows: Its flights.
         planned: How many flights the whole sweep has.
-        reference: Label of the player with whom the others are compared.
+        reference: Label of the planner that the others are compared with.
         command: The command line that made it.
         jobs: How it was flown, for people.
         scores: Of each player, best first.
@@ -62,7 +62,7 @@ class Comparison:
         some = "" if len(self.rows) == self.planned else f" of {self.planned} (not finished)"
         lines = [
             f"{self.command}",
-            f"{len(self.rows)} flights{some}: {len(self.scores)} players, {scenarios} scenarios, "
+            f"{len(self.rows)} flights{some}: {len(self.scores)} planners, {scenarios} scenarios, "
             f"{seeds} {'seed' if seeds == 1 else 'seeds'}",
             f"{machine()}; {self.jobs}",
             versions(),

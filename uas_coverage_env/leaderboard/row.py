@@ -30,12 +30,12 @@ class Row:
         options: Its options, as JSON.
         seed: The seed of the planner.
         dynamics: `lpv` or `nonlinear`.
-        safety_filter: Whether the filter was on for everybody.
+        safety_filter: Whether the filter was on for all UAS.
         status: `flown`, or `failed` where there is no flight.
         reason: Why it failed.
-        accomplished: Everything covered, everybody home, nothing touched, no limit exceeded.
+        accomplished: All waypoints covered, all UAS home, no contact, no limit exceeded.
         coverage: Fraction of the waypoints; 0 where the flight failed.
-        all_home: Whether everybody has landed.
+        all_home: Whether all UAS have landed.
         violations: Contacts, and limits exceeded by UAS.
         breaches: Samples closer than the safe distances.
         steps: Steps until the last UAS was home, lost, or the flight ended.

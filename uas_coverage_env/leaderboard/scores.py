@@ -30,8 +30,8 @@ class Scores:
         player: Label.
         flights: How many rows, failed ones included.
         failed: Flights that there are none of: refused, or crashed.
-        accomplished: Flights in which everything was covered, everybody home, nothing touched.
-        all_home: Flights after which everybody was home.
+        accomplished: Flights in which everything was covered, all UAS home, nothing touched.
+        all_home: Flights after which all UAS were home.
         violating: Flights with a violation.
         violations: Contacts and limits exceeded, in all flights.
         breaches: Samples closer than the safe distances, in all flights.
@@ -104,7 +104,7 @@ def scores_of(rows: Sequence[Row], reference: str) -> list[Scores]:
 
     Args:
         rows: At least one; whatever part of the sweep has been flown.
-        reference: Label of the player with whom the others are compared.
+        reference: Label of the planner that the others are compared with.
     """
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
     over = drawn_anew(rows)

@@ -23,7 +23,7 @@ class Entry:
         key: Hash of all that decides how the flight goes.
         scenario_sha256: Hash of the scenario.
         scenario: On what it is flown.
-        player: Who flies.
+        player: The planner with its options.
         seed: The seed of the planner.
         dynamics: `lpv` or `nonlinear`.
         safety_filter: Whether the filter is on, whatever the planner asks for.
@@ -47,7 +47,7 @@ class Sweep:
         players: By label.
         seeds: Of the planners.
         dynamics: `lpv` or `nonlinear`.
-        safety_filter: Whether the filter is on for everybody.
+        safety_filter: Whether the filter is on for all UAS.
     """
 
     scenarios: Mapping[str, Scenario]

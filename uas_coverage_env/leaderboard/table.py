@@ -16,7 +16,7 @@ Cells = tuple[list[str], list[list[str]]]
 def outcome_cells(scores: Sequence[Scores]) -> Cells:
     """Headings and rows: what was achieved, and what went wrong."""
     headings = [
-        *("player", "flights", "accomplished", "covered, %", "worst", "all home"),
+        *("planner", "flights", "accomplished", "covered, %", "worst", "all home"),
         *("violations", "breaches", "fallbacks", "filtered, %"),
     ]
     return headings, [
@@ -39,7 +39,7 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
 def effort_cells(scores: Sequence[Scores]) -> Cells:
     """Headings and rows: what it took."""
     headings = [
-        *("player", "energy, Wh", "Wh per % covered", "steps"),
+        *("planner", "energy, Wh", "Wh per % covered", "steps"),
         *("decision p50, ms", "p95, ms"),
     ]
     return headings, [
@@ -58,7 +58,7 @@ def effort_cells(scores: Sequence[Scores]) -> Cells:
 def reference_cells(scores: Sequence[Scores], reference: str) -> Cells:
     """Headings and rows of the comparison with the reference; it has no row of its own."""
     headings = [
-        *("player", "pairs", "Δ energy, %", "Δ steps, %"),
+        *("planner", "pairs", "Δ energy, %", "Δ steps, %"),
         *("P(less energy)", "P(fewer steps)", "energy, % of the reference's"),
     ]
     return headings, [

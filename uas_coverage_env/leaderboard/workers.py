@@ -121,7 +121,7 @@ def _join_ray(jobs: int) -> None:
 
     class Returning(RayBackend):
         # its pool does hand over each result as it comes; joblib declares this off for all pools,
-        # because one that nobody reads to the end would wait for ever: ours is read to the end
+        # because one that is not read to the end would block for ever: this one is read to the end
         supports_return_generator = True
 
     if not ray.is_initialized():

@@ -1,4 +1,4 @@
-"""Films of flights from the pictures of the draw room: MP4 (extra `view`) and GIF (Pillow)."""
+"""Films of flights from the pictures of `draw`: MP4 (extra `view`) and GIF (Pillow)."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Video codecs work on blocks of 16 pixels.
 _VIDEO_PX = 896
 _GIF_PX = 512
-# The picture after the last one is the first again: time to see how the flight ended.
+# A GIF starts again after its last picture: time to see how the flight ended.
 _LAST_PICTURE_S = 2.0
 _GIF_COLOURS = 96
 
@@ -27,7 +27,7 @@ def write_video(flights: Sequence[Flight], path: Path, *, fps: int) -> Path:
     """Write an MP4 (H.264), one picture per sample; two flights side by side.
 
     Args:
-        flights: The flights; the shorter one stands still in the end.
+        flights: The flights; the shorter one is held at its last picture.
         path: Where to write; replaced where it exists.
         fps: Pictures per second.
 

@@ -20,7 +20,7 @@ def first_of(found: Sequence[str]) -> str:
 
 
 def problems(scenario: UncheckedScenario) -> list[str]:
-    """Why nobody can fly this scenario; one line each, empty where it is sound.
+    """Why this scenario cannot be flown; one line each, empty where it is sound.
 
     Each line names the field, the value and the fix.
     """

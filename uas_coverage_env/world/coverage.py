@@ -1,4 +1,4 @@
-"""Which waypoints are covered at a sample, and who has come home."""
+"""Which waypoints are covered at a sample, and which UAS have come home."""
 
 import math
 

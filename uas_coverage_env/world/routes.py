@@ -211,7 +211,7 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
 
 @inlined_kernel
 def shortest_way(arena, target, x0, y0, z0, x1, y1, z1):
-    """The first three of `route`, for those who need not know what the next leg is like.
+    """The first three of `route`, for callers that do not need the next leg.
 
     The tall obstacles are asked first: they are few, and mostly none is in the way.
     """

@@ -74,7 +74,7 @@ def save_policy(
 
 
 def load_policy(directory: str | Path) -> Policy:
-    """Read a policy that somebody handed us: it is checked in full, and nothing of it is executed.
+    """Read a policy from an untrusted source: it is checked in full, and nothing in it is executed.
 
     Args:
         directory: Holds `policy.json` and `policy.safetensors`.

@@ -41,17 +41,17 @@ def train(
     ],
     scenario: Annotated[
         str | None,
-        typer.Option(help="`generated`, or a scenario; default: as the configuration says."),
+        typer.Option(help="`generated`, or a scenario; default: from the configuration."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory; default: trainings/ALGORITHM-SEED.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of network, lots and scenarios.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of network, sampling and scenarios.")] = 0,
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps of lanes to learn from; repeats exactly.")
+        int | None, typer.Option(min=1, help="Environment steps to train on; repeatable.")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="Stop by the clock instead of by the steps.")
+        float | None, typer.Option(min=0.01, help="Stop after this time instead of --steps.")
     ] = None,
     change: Annotated[
         list[str] | None,
@@ -64,17 +64,17 @@ def train(
         float, typer.Option(min=0.0, help="Seconds between two checkpoints.")
     ] = 60.0,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Throw away the training in --out, start anew.")
+        bool, typer.Option("--overwrite", help="Delete the training in --out and restart.")
     ] = False,
     zip_file: Annotated[
         Path | None,
         typer.Option("--from", help="Do not train: turn this Stable-Baselines3 zip into a policy."),
     ] = None,
     trust_pickle: Annotated[
-        bool, typer.Option("--trust-pickle", help="For --from: the zip is from someone you trust.")
+        bool, typer.Option("--trust-pickle", help="For --from: you trust the author of the zip.")
     ] = False,
 ) -> None:
-    """Train a policy; the same command again goes on where a killed one stopped.
+    """Train a policy; repeated after an interruption, the command resumes.
 
     Leaves checkpoints, tensorboard logs, a learning curve and, in the end, `policy/` in --out; fly
     it with `run SCENARIO --planner policy:OUT/policy`.
@@ -88,7 +88,7 @@ def train(
     if zip_file is not None and not trust_pickle:
         raise InputError(
             f"{zip_file}: a Stable-Baselines3 zip holds pickles, which can execute anything; "
-            f"add --trust-pickle if you trust who made it"
+            f"add --trust-pickle if you trust its author"
         )
     loop, filelock = _learn_extra()
     name = Path(algorithm).stem

@@ -66,7 +66,7 @@ def thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
 
 
 def _check(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
-    """Refuse what nobody else would notice: NumPy reads its keys wherever the place says."""
+    """Refuse what no later check finds: NumPy reads its keys at whatever position is stored."""
     seen = (lanes.num_envs, *cast(tuple[int, ...], model.observation_space.shape))
     expected = {
         "last/observation": (seen, "f"),

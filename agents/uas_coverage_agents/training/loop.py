@@ -168,7 +168,7 @@ class _Watch(BaseCallback):
         self._saved_at_s = time.monotonic()
 
     def _fly(self) -> None:
-        """Fly some validation missions for the learning curve; draws no lots of the training."""
+        """Fly validation missions for the learning curve; the training's generator is not used."""
         results = self._trainee.flights(self._scenarios)
         means = dict(zip(MEASURES, results.mean(axis=0).tolist(), strict=True))
         self._points.append(

@@ -42,7 +42,7 @@ class Order:
     Attributes:
         name: Of the configuration.
         config: The configuration.
-        seed: Of network, lots and scenarios.
+        seed: Of network, random numbers and scenarios.
         minutes: Ends after so many instead of after `config.steps`; None: after the steps.
         missions: On which the finished policy is scored.
         checkpoint_s: Seconds between two checkpoints.

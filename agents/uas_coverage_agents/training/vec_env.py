@@ -34,7 +34,7 @@ class CoverageVecEnv(VecEnv):
 
         A UAS that has ended before its mission waits: its reward is 0, its observation stays, its
         actions have no effect, and `alive` is False. A mission begins anew in the step in which it
-        ends; then `dones` is True for those who waited, too, so that nothing is carried over from
+        ends; then `dones` is True for the waiting ones, too, so that nothing is carried over from
         the mission before, but there is no `episode` to count. The same holds for UAS that the
         scenario of a mission does not have, where scenarios of different fleets are mixed; their
         observation is zero.
@@ -91,7 +91,7 @@ class CoverageVecEnv(VecEnv):
 
     @property
     def alive(self) -> NDArray[np.bool_]:
-        """(num_envs,) whose UAS flies now, and so acts in the coming step."""
+        """(num_envs,) where the UAS is flying, and so acts in the coming step."""
         return self.batch.flying.reshape(-1)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:

@@ -85,7 +85,7 @@ class VelocityLanes(VecEnvWrapper):
         self._seen(lanes.load_state_dict(state))
 
     def _seen(self, view: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Note who decides now and how near everybody is; the view without the others."""
+        """Note which UAS decide now and their distances; return the view without the others."""
         self._decides = (view[:, _FLYING] > 0.0) & (view[:, _RETURNING] == 0.0)
         closeness = np.maximum(view[:, _NEAREST_CLOSENESS], 1e-3)
         distance_m = np.where(view[:, _NEAREST_VALID] > 0.0, NEARBY_M * (1 / closeness - 1), 0.0)

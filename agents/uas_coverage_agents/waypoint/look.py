@@ -49,7 +49,7 @@ def claimed_by_mates(state, targets, i, claimed):
 
 @allocating_kernel
 def allowed(state, blocked, claimed, may):
-    """Mark in `may` (W,) what may be chosen: what is free and nobody's; else the next best.
+    """Mark in `may` (W,) what may be chosen: free and unassigned waypoints; else the next best.
 
     The last waypoints are shared, as in the planner `nearest-waypoint`: a UAS that is called home
     may never reach its target. What a moving obstacle covers comes last of all.
@@ -308,7 +308,7 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
         n_mates += 1
         mates_s = min(mates_s, budgets_s[j] - here_home_s[j])
         mate_m = min(mate_m, math.hypot(state.x[j, X] - x[X], state.x[j, Y] - x[Y]))
-    # nobody leaves work behind that the others are not reckoned to finish
+    # no UAS leaves waypoints behind that the others are not expected to finish
     legal[HOME_CHOICE] = n_legal == 0 or (n_mates > 0 and left[K] <= left[best])
     n_legal += legal[HOME_CHOICE]
     team[TEAM_AT.speed] = math.hypot(x[VX], x[VY]) / uas.speed_mps

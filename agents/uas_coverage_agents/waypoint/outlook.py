@@ -1,4 +1,4 @@
-"""How a mission would go on if everybody went on greedily: what a choice costs later.
+"""How a mission would continue if all UAS acted greedily: the cost-to-go of a choice.
 
 A UAS that becomes free takes the nearest waypoint that is left, or flies home where its battery
 and the clock leave no other. Reckoned with leg times alone, it takes microseconds, and it tells
@@ -31,7 +31,7 @@ def outlook(legs, from_s, here_home_s, budget_s, ready_s, place, todo, n_todo):
         n_todo: How many of them.
 
     Returns:
-        (flying time of all [s], longest flight [s], number of waypoints that nobody reaches).
+        (flying time of all [s], longest flight [s], number of waypoints that no UAS reaches).
     """
     total_s = 0.0
     longest_s = 0.0

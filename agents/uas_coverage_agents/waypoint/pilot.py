@@ -122,13 +122,13 @@ class WaypointPilot:
         return {name: self._command(swarm.names.index(name)) for name in swarm.active}
 
     def _command(self, i: int) -> Command:
-        # whom return mode has called is sent home by us too: the world may fly without it
+        # a UAS called by return mode is also sent home here: the world may fly without it
         if self._returning[i] or self._targets[i] == HOME:
             return GoTo(None)
         return GoTo(int(self._targets[i]), mode="covering")
 
     def _decide(self, swarm: SwarmState) -> None:
-        """Let everybody choose who needs a target now."""
+        """Choose a target for every UAS that needs one now."""
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
         state.returning[:] |= self._returning

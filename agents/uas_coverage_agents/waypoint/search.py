@@ -3,7 +3,7 @@
 A plan is the targets that each UAS takes, in order. From a plan others are made: it is followed up
 to some decision, there another choice is drawn from the policy, and from there on either the
 policy goes on alone, or the rest of the plan is kept as far as it fits. The cheapest is flown, and
-is where the next decision begins to look. Moving obstacles are not simulated, as nobody knows what
+is where the next decision begins to look. Moving obstacles are not simulated, as it is unknown what
 they will do; what they cover now comes last.
 """
 

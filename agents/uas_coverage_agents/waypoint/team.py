@@ -1,4 +1,4 @@
-"""A team from decision to decision: who needs a target, and the flight until somebody does."""
+"""A team between decisions: which UAS needs a target, and the flight until one does."""
 
 from typing import NamedTuple
 
@@ -115,7 +115,7 @@ def write_commands(state, targets, commands):
 
 @allocating_kernel
 def is_over(arena, state):
-    """Whether nobody flies any more, or the time is up."""
+    """Whether no UAS is flying, or the time is up."""
     return state.step[0] >= arena.rules[0].max_steps or not (state.status == FLYING).any()
 
 
@@ -124,7 +124,7 @@ def fly_on(
     arena, legs, state, return_mode, assistants, blocked, targets, commands, outcome, choices,
     account,
 ):  # fmt: skip
-    """Fly by the LPV model until somebody has a choice to make, or the mission is over.
+    """Fly by the LPV model until a UAS has a choice to make, or the mission is over.
 
     Args:
         arena: See `next_to_decide`.

@@ -1,4 +1,4 @@
-"""A global order of the open waypoints for the whole swarm: who visits what, and when."""
+"""A global order of the open waypoints for the whole swarm: which UAS visits which, and when."""
 
 from uas_coverage_baselines.order.beginning import Beginning
 from uas_coverage_baselines.order.search import Effort, Order, improved, no_order

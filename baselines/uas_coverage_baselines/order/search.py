@@ -1,4 +1,4 @@
-"""Order search: simulated annealing over who visits which waypoint when, in compiled code.
+"""Order search: simulated annealing over the routes of all UAS, in compiled code.
 
 A routing library's arc costs cannot hold what a turn costs, nor a waypoint that opens late, nor
 that the longest flight counts most; an evaluated route can, and evaluating one takes well below a
@@ -216,7 +216,7 @@ def _cost_s(task, seconds, left_out, n_left_out, total_weight):
     for u in range(len(seconds)):
         longest = max(longest, seconds[u])
         cost += total_weight * seconds[u]
-        if seconds[u] > max(budget[u], 0.0):  # who may not fly costs nothing where it stays
+        if seconds[u] > max(budget[u], 0.0):  # a UAS that may not fly costs nothing where it stays
             cost += _OVERTIME * (seconds[u] - budget[u])
     for k in range(n_left_out):
         cost += _LEFT_OUT_S * weight[left_out[k]]
@@ -253,7 +253,7 @@ def _insert_missing(task, routes, lengths, missing, total_weight):
                 seconds[u] = old_s
                 if cost < best:
                     best, best_u, best_at, best_s = cost, u, at, new_s
-        if best_u < 0:  # nobody may fly
+        if best_u < 0:  # no UAS may fly
             continue
         _put_in(routes[best_u], lengths[best_u], best_at, waypoint)
         lengths[best_u] += 1

@@ -1,4 +1,4 @@
-"""What the order search is about: who is where, what is open, how long everybody may fly."""
+"""The routing problem: positions of the UAS, open waypoints, and flight times left."""
 
 from __future__ import annotations
 

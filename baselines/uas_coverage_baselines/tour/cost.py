@@ -40,7 +40,7 @@ class Around(NamedTuple):
     Attributes:
         keep_m: (O,) distances from the obstacles.
         fence_m: (F,) distances from the faces of the fence.
-        others_m: (U, N+1, 3) where the others are going; NaN where nobody flies.
+        others_m: (U, N+1, 3) where the others are going; NaN where none is flying.
         path_m: (K, 3) room for a braking flight.
     """
 

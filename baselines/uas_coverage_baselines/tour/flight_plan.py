@@ -82,7 +82,7 @@ def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_chang
         task: What it has to do.
         x: (14,) its state.
         reference: (2,) [m/s] of its inner loop.
-        others_m: (U, N+1, 3) [m] where the others are going; NaN where nobody flies.
+        others_m: (U, N+1, 3) [m] where the others are going; NaN where none is flying.
         plan: What is left of the plan before is tried; written.
         trial: Another plan of the same size, written.
         n_kept: How many legs of the plan before are left; the others are aimed anew.

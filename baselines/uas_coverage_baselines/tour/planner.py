@@ -28,7 +28,7 @@ _FROM_WITHIN = 0.8  # share of the radius from within which a waypoint is covere
 _WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
 _PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putting one off
 _MOVING_MARGIN_M = 6.0
-_SURPRISE_MPS = 0.3  # a velocity off by this was flown by somebody else: the filter, return mode
+_SURPRISE_MPS = 0.3  # a larger deviation means that another flew: the filter, return mode
 
 
 class TourOptions(AssistedOptions):
@@ -163,7 +163,7 @@ class Tour:
         return n_same if same.all() else int(same.argmin())
 
     def _where_others_go(self, view: View) -> FloatArray:
-        """(U, N+1, 3) [m] as planned before, one step on; NaN where nobody flies."""
+        """(U, N+1, 3) [m] as planned before, one step on; NaN where none is flying."""
         paths_m = np.full((len(view.x), self._n_steps + 1, 3), np.nan)
         for i in np.flatnonzero(view.flies).tolist():
             path_m = self._plans[i].path_m

@@ -98,10 +98,10 @@ class Schedule:
         self._expected_s = view.time_s + self._legs_left_s
 
     def _has_changed(self, view: View) -> bool:
-        """Whether somebody came home or was lost, something opened or closed, or time is off.
+        """Whether a UAS came home or was lost, a waypoint opened or closed, or time is off.
 
-        Or a battery no longer lasts for its route, which somebody else has to be told of as long
-        as there is somebody else in the air; or it may last for more than was thought.
+        Or a battery no longer lasts for its route, which another UAS has to take over while one
+        is in the air; or it may last longer than expected.
         """
         before = self._taken_under
         late_s = (view.time_s + self._legs_left_s - self._expected_s)[view.may_work]
@@ -129,7 +129,7 @@ class Schedule:
     @property
     def pace(self) -> FloatArray:
         """(U,) how much longer flights take than their legs."""
-        legs_s = np.maximum(self._legs_flown_s, 1.0)  # who was driven away flew backwards
+        legs_s = np.maximum(self._legs_flown_s, 1.0)  # a UAS that was driven away flew backwards
         return np.clip(self._flown_s / legs_s, 1.0, _SLOWEST_PACE)
 
     def _budget_s(self, view: View) -> FloatArray:
@@ -177,7 +177,7 @@ class Schedule:
         n_uas = len(x)
         first_s = np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)])
         idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
-        # nobody knows when a blocked waypoint opens: late enough to do other work before, and soon
+        # it is unknown when a blocked waypoint opens: late enough to do other work before, and soon
         # enough to be thought of while there is other work near it
         work_s = self._legs_left(view)[view.may_work]
         opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0

@@ -1,4 +1,4 @@
-"""Coming home without a solver: what a UAS flies whose charge runs short while no plan comes.
+"""Return without a solver: flown by a UAS whose charge runs short while there is no plan.
 
 A backup trajectory ends in a hover, which uses up the battery. Where a UAS has had no new plan and
 could soon not come home any more, it takes the way home that the world's guidance would fly (`GoTo`
