@@ -114,7 +114,8 @@ class ScenarioPool:
             LEARNERS.pool([learners for learners, _ in first]),
             LOOK.pool([Look(observation) for _, observation in first]),
         )
-        self.sizes = {**ARENA.largest(worlds.arenas), **own_sizes}
+        largest = {**STATE.largest(worlds.starts), **ARENA.largest(worlds.arenas)}
+        self.sizes = {**largest, **own_sizes}
         self.n_uas = ARENA.size(worlds.arenas, "U")
         self.n_waypoints = ARENA.size(worlds.arenas, "W")
 
