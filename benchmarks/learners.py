@@ -30,7 +30,7 @@ from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.training.scenarios import VALIDATION, town
 from uas_coverage_agents.training.score import MEASURES, fly, interval, measured
-from uas_coverage_agents.training.trainee import Order, Trainee
+from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 
 from uas_coverage_env import Scenario, load_planner, rollout
 
@@ -110,7 +110,7 @@ def trained(study: Study, seed: int, folder: Path) -> Path:
 def untrained(study: Study) -> Policy:
     """What a study begins with; where it is trained does not matter."""
     config = load_config(study.config, changes=["scenarios.pool=1", "lanes=1"])
-    return Trainee.untrained(Order(study.config, config, seed=0)).policy()
+    return TrainingRun.untrained(TrainingJob(study.config, config, seed=0)).policy()
 
 
 def nearest_waypoint(towns: Sequence[Scenario]) -> NDArray[np.float64]:

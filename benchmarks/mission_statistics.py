@@ -111,8 +111,8 @@ def paired_interval(differences: Sequence[float]) -> tuple[float, float, float]:
         differences: One per pair, at least one.
     """
     values = np.array(differences, float)
-    lots = np.random.default_rng(0)
-    drawn = values[lots.integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=1)
+    rng = np.random.default_rng(0)
+    drawn = values[rng.integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=1)
     low, high = np.percentile(drawn, (2.5, 97.5))
     return float(values.mean()), float(low), float(high)
 

@@ -40,7 +40,7 @@ from uas_coverage_env.flight import Progress as FlightProgress
 from uas_coverage_env.flight import describe_planners
 from uas_coverage_env.flight.registry import options_of
 from uas_coverage_env.leaderboard import seed_range
-from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.scenario import sample_scenario
 
 PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"
 SEEDS = "1000:1020"
@@ -177,7 +177,7 @@ def _missions(
     village: bool, folder: Path,
 ) -> list[Mission]:  # fmt: skip
     scenarios = [(0, load_scenario("village"))] if village else []
-    scenarios += [(seed, draw_scenario(seed)) for seed in seeds]
+    scenarios += [(seed, sample_scenario(seed)) for seed in seeds]
     if not scenarios or not planners:
         raise InputError("nothing to fly: give --planners, and --village or some --seeds")
     return [

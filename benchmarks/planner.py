@@ -27,7 +27,7 @@ from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, Formulation
-from uas_coverage_baselines.milp_mpc.planner import Options
+from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.search.trajectories import teams
@@ -374,7 +374,7 @@ def _with_all_open(
 @app.command()
 def states() -> None:
     """Fly the village deterministically and store the decisions of some samples."""
-    planner = _Recording(Options(deterministic=True))
+    planner = _Recording(MilpMpcOptions(deterministic=True))
     rollout(load_scenario("village"), planner, max_steps=max(STORED) + 1)
     problems = [planner.kept[step] for step in STORED]
     write_problems(DECISIONS, "python benchmarks/planner.py states", problems, STORED)

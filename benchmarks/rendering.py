@@ -28,7 +28,7 @@ import uas_coverage_env  # noqa: F401  it registers the ids
 from uas_coverage_env.draw import picture
 from uas_coverage_env.flight import load_planner, rollout
 from uas_coverage_env.replay.figures import map_figure, png_of
-from uas_coverage_env.scenario import Scenario, draw_scenario, load_scenario
+from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
 
 GENERATED_SEED = 1000
 TURNS = 10
@@ -149,7 +149,7 @@ def main(
         sys.stderr.write(f"error: --envs {envs!r}: should be whole numbers, as in 4,16\n")
         raise typer.Exit(2)
     village = load_scenario("village")
-    town = draw_scenario(GENERATED_SEED)
+    town = sample_scenario(GENERATED_SEED)
     speeds = []
     for scenario in (village, town):
         env = gym.make(

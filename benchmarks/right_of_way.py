@@ -108,11 +108,11 @@ PLAYERS: Mapping[str, Player] = {
 def _mission(seed: int, n_uas: int) -> tuple[Scenario, int, Vector]:
     """The scenario, who shall not come home, and the corner it flies to."""
     scenario = generate_scenario(seed, n_uas=n_uas, n_waypoints=20, n_obstacles=6)
-    lots = np.random.default_rng([seed, 5])
-    chosen = int(lots.integers(n_uas))
+    rng = np.random.default_rng([seed, 5])
+    chosen = int(rng.integers(n_uas))
     corners_m = scenario.fence.vertices_m
-    corner_m = corners_m[lots.integers(len(corners_m))].copy()
-    corner_m[2] = -lots.choice(_ALTITUDES_M)
+    corner_m = corners_m[rng.integers(len(corners_m))].copy()
+    corner_m[2] = -rng.choice(_ALTITUDES_M)
     uas = tuple(
         entry.model_copy(update={"soc_0": 0.5 if i == chosen else 1.0})
         for i, entry in enumerate(scenario.uas)

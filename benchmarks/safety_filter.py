@@ -37,7 +37,7 @@ from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 
 from uas_coverage_env import MissionBrief, Scenario
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import CONTACT_NAMES, Command, SwarmState
 
@@ -74,17 +74,17 @@ PLAYERS = ("random-walk", "random-velocities", "nearest-waypoint")
 
 def with_movers(scenario: Scenario, seed: int) -> Scenario:
     """The scenario with one to three cylinders that fly through it."""
-    lots = np.random.default_rng([seed, 3])
+    rng = np.random.default_rng([seed, 3])
     corners_m = scenario.fence.vertices_m
     low_m = np.append(corners_m[:, :2].min(axis=0) + _AREA_INSET_M, -_ALTITUDE_M[1])
     high_m = np.append(corners_m[:, :2].max(axis=0) - _AREA_INSET_M, -_ALTITUDE_M[0])
     starts_m = np.array([uas.start_m for uas in scenario.uas])
     movers = []
-    for index in range(int(lots.integers(1, 4))):
-        radius_m, height_m, safe_m = lots.uniform((3.0, 4.0, 3.0), (8.0, 8.0, 10.0)).round(1)
-        place_m = lots.uniform(low_m, high_m).round(1)
+    for index in range(int(rng.integers(1, 4))):
+        radius_m, height_m, safe_m = rng.uniform((3.0, 4.0, 3.0), (8.0, 8.0, 10.0)).round(1)
+        place_m = rng.uniform(low_m, high_m).round(1)
         while np.linalg.norm(starts_m[:, :2] - place_m[:2], axis=1).min() < 60.0:
-            place_m = lots.uniform(low_m, high_m).round(1)
+            place_m = rng.uniform(low_m, high_m).round(1)
         movers.append(
             {
                 "name": f"mover_{index + 1}",
@@ -92,21 +92,21 @@ def with_movers(scenario: Scenario, seed: int) -> Scenario:
                 "height_m": height_m,
                 "safe_distance_m": safe_m,
                 "start_m": tuple(place_m.tolist()),
-                "schedule": _schedule(lots, place_m, low_m, high_m, scenario.max_steps),
+                "schedule": _schedule(rng, place_m, low_m, high_m, scenario.max_steps),
             }
         )
     data = scenario.model_dump(by_alias=True) | {"moving_obstacles": movers}
     return Scenario.model_validate(data)
 
 
-def _schedule(lots, place_m, low_m, high_m, until_s: float) -> list[dict]:
+def _schedule(rng, place_m, low_m, high_m, until_s: float) -> list[dict]:
     """Drawn velocities, each held as long as the cylinder stays in the area."""
     pieces, time_s = [], 0.0
     while time_s < until_s:
-        held_s = round(float(lots.uniform(*_HELD_S)))
-        heading_rad, speed_mps = lots.uniform(0.0, 2.0 * np.pi), lots.uniform(0.0, _FASTEST_MPS)
+        held_s = round(float(rng.uniform(*_HELD_S)))
+        heading_rad, speed_mps = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.0, _FASTEST_MPS)
         level_mps = speed_mps * np.array([np.cos(heading_rad), np.sin(heading_rad)])
-        velocity_mps = np.append(level_mps, lots.uniform(-_CLIMB_MPS, _CLIMB_MPS)).round(2)
+        velocity_mps = np.append(level_mps, rng.uniform(-_CLIMB_MPS, _CLIMB_MPS)).round(2)
         after_m = place_m + held_s * velocity_mps
         # turned back in the directions that would lead out
         velocity_mps = np.where((after_m < low_m) | (after_m > high_m), -velocity_mps, velocity_mps)
@@ -150,7 +150,7 @@ class Tally:
 
 def fly(case: Case, seed: int, steps: int) -> Tally:
     """One mission of a case."""
-    scenario = draw_scenario(seed)
+    scenario = sample_scenario(seed)
     if case.moving:
         scenario = with_movers(scenario, seed)
     world = World(scenario, safety_filter=case.safety_filter)

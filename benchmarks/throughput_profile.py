@@ -14,7 +14,7 @@ from numba import njit
 from rich.table import Table
 
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.borrow import borrow, part
+from uas_coverage_env.compiled.array_views import rows_view, slice_view
 from uas_coverage_env.compiled.views import lane_view
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.act import acting_of, write_commands
@@ -29,8 +29,8 @@ from uas_coverage_env.env.observation.others import write_others
 from uas_coverage_env.env.observation.surroundings import write_surroundings
 from uas_coverage_env.env.observation.waypoints import write_waypoints
 from uas_coverage_env.env.observe import observe_one, observing_of
-from uas_coverage_env.env.pay import pay, paying_of
 from uas_coverage_env.env.pool import learners_of, tables_at
+from uas_coverage_env.env.reward_kernel import compute_rewards, paying_of
 from uas_coverage_env.env.rewards import REWARD
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.pool import arena_of, state_of
@@ -38,11 +38,11 @@ from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (
+    check_fence_and_battery,
     check_limits,
+    check_obstacles,
+    check_separation,
     count_breaches,
-    judge_fence_and_battery,
-    judge_obstacles,
-    judge_separation,
 )
 from uas_coverage_env.world.coverage import cover, land
 
@@ -109,13 +109,13 @@ def _model(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _obstacles(arena, state, tables, view, rules, spare, row):
-    judge_obstacles(arena, state, view.scratch.outcome)
+    check_obstacles(arena, state, view.scratch.outcome)
 
 
 @compiled
 def _other_contacts(arena, state, tables, view, rules, spare, row):
-    judge_separation(arena, state, view.scratch.outcome)
-    judge_fence_and_battery(arena, state, view.scratch.outcome)
+    check_separation(arena, state, view.scratch.outcome)
+    check_fence_and_battery(arena, state, view.scratch.outcome)
     count_breaches(arena, state, view.scratch.outcome)
     check_limits(arena, state, False, view.scratch.outcome)
 
@@ -128,7 +128,7 @@ def _coverage(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _reward(arena, state, tables, view, rules, spare, row):
-    pay(arena, state, tables, view.learners, view.scratch, rules.paying, None)
+    compute_rewards(arena, state, tables, view.learners, view.scratch, rules.paying, None)
 
 
 @compiled
@@ -142,7 +142,7 @@ def _nearest(arena, state, tables, view, rules, spare, row):
 def _waypoints(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            columns = part(row[i], AT.waypoints, SIZE.waypoints)
+            columns = slice_view(row[i], AT.waypoints, SIZE.waypoints)
             write_waypoints(arena, state, tables, view.learners, i, columns)
 
 
@@ -150,7 +150,7 @@ def _waypoints(arena, state, tables, view, rules, spare, row):
 def _surroundings(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            columns = part(row[i], AT.surroundings, SIZE.surroundings)
+            columns = slice_view(row[i], AT.surroundings, SIZE.surroundings)
             write_surroundings(arena, state, i, columns)
 
 
@@ -158,9 +158,9 @@ def _surroundings(arena, state, tables, view, rules, spare, row):
 def _movers(arena, state, tables, view, rules, spare, row):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            columns = part(row[i], AT.others, SIZE.others)
+            columns = slice_view(row[i], AT.others, SIZE.others)
             write_others(arena, state, tables, i, columns)
-            columns = part(row[i], AT.moving_obstacles, SIZE.moving_obstacles)
+            columns = slice_view(row[i], AT.moving_obstacles, SIZE.moving_obstacles)
             write_moving_obstacles(arena, state, tables, i, columns)
 
 
@@ -199,7 +199,7 @@ def _over_lanes(timed: Any) -> Callable[..., None]:
                 learners_of(missions.learners, lane, pool.arenas, 0),
                 _scratch_of(scratch, lane, pool.arenas, 0),
             )
-            row = borrow(observation, lane, (n_uas, OBSERVATION_SIZE))
+            row = rows_view(observation, lane, (n_uas, OBSERVATION_SIZE))
             timed(arena, state, tables, view, rules, spare, row)
 
     return run

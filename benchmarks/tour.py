@@ -29,7 +29,13 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
+from uas_coverage_baselines.routing import (
+    Routes,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
@@ -37,17 +43,17 @@ from uas_coverage_env import MissionBrief, Scenario, load_scenario
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import energy_Wh, rollout
 from uas_coverage_env.leaderboard import seed_range
-from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import build_arena
 
 _MOVES_AT_ONCE = 250_000
 _PER_SECOND = 10  # OR-tools counts in whole numbers
-_SUM_TO_LONGEST = (2, 5)  # 0.4 of the sum for once the longest, as in `Effort`
+_SUM_TO_LONGEST = (2, 5)  # 0.4 of the sum for once the longest, as in `SearchEffort`
 _LEFT_OUT_S = 120  # for a waypoint of weight 1, as in our search
 
 
-def problem(scenario: Scenario) -> Task:
+def problem(scenario: Scenario) -> RoutingTask:
     """The routing problem before take-off, nothing blocked."""
     swarm = World(scenario).swarm_state()
     everybody = np.ones(len(swarm.names), np.bool_)
@@ -62,13 +68,13 @@ def problem(scenario: Scenario) -> Task:
     return Schedule(MissionBrief.of(scenario), build_arena(scenario), 0).task(view)
 
 
-def annealed(task: Task, seconds: float) -> Order:
+def annealed(task: RoutingTask, seconds: float) -> Routes:
     """Our search: as many anneals as the time allows, the best of them."""
-    moves, best, until = _MOVES_AT_ONCE, no_order(task.n_uas), time.perf_counter() + seconds
+    moves, best, until = _MOVES_AT_ONCE, empty_routes(task.n_uas), time.perf_counter() + seconds
     seed = 0
     while (left_s := until - time.perf_counter()) > 0.0:
         started = time.perf_counter()
-        order = improved(task, no_order(task.n_uas), Effort(moves), seed)
+        order = improve_routes(task, empty_routes(task.n_uas), SearchEffort(moves), seed)
         best = min(best, order, key=lambda o: o.cost_s)
         took_s = time.perf_counter() - started
         # one long anneal is worth more than many short ones
@@ -79,17 +85,17 @@ def annealed(task: Task, seconds: float) -> Order:
     return best
 
 
-def judged(task: Task, routes: Sequence[NDArray[np.int64]]) -> Order:
+def judged(task: RoutingTask, routes: Sequence[NDArray[np.int64]]) -> Routes:
     """Routes as an order, with what our search says that they take and cost.
 
     Open waypoints on no route are left out, at the cost that leaving them out has in the search.
     """
     left_out = np.setdiff1d(task.open_waypoints, np.concatenate(routes))
-    order = replace(no_order(task.n_uas), routes=tuple(routes), left_out=left_out)
-    return improved(task, order, Effort(0), 0)
+    order = replace(empty_routes(task.n_uas), routes=tuple(routes), left_out=left_out)
+    return improve_routes(task, order, SearchEffort(0), 0)
 
 
-def routed(task: Task, seconds: float) -> Order:
+def routed(task: RoutingTask, seconds: float) -> Routes:
     """OR-tools: one vehicle per UAS, from where it is, to its start."""
     from ortools.constraint_solver import pywrapcp, routing_enums_pb2  # pyright: ignore[reportMissingImports]
 
@@ -138,7 +144,7 @@ def routed(task: Task, seconds: float) -> Order:
 class _Ordered(Tour):
     """`tour` with an order that is given."""
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: Routes) -> None:
         super().__init__()
         self._given = order
 
@@ -160,7 +166,7 @@ def main(
     except ImportError:
         solvers = {"annealing": annealed}
     scenarios = [load_scenario("village")] if village else []
-    scenarios += [draw_scenario(seed) for seed in seed_range("--seeds", seeds)]
+    scenarios += [sample_scenario(seed) for seed in seed_range("--seeds", seeds)]
     table = Table(title=f"Orders found in {seconds:g} s each")
     for column in ("scenario", "search", "cost [s]", "longest [s]", "sum [s]", "steps", "Wh"):
         table.add_column(column)

@@ -22,8 +22,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from uas_coverage_agents.training.score import interval
-from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import CANDIDATE, HOME_CHOICE, N_TEAM, TEAM, K
+from uas_coverage_agents.waypoint.sub_environments import (
+    begin_lanes,
+    make_lanes,
+    pool_legs,
+    step_lanes,
+)
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NOBODY, NOT_HOME, TIME
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
@@ -31,7 +36,7 @@ from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.flight.metrics import decision_time_s
 from uas_coverage_env.leaderboard import seed_range
-from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 
 COLUMNS = ("coverage", "all home", "violations", "breaches", "Wh", "steps", "p95 s", "max s")
@@ -54,7 +59,7 @@ def flown(scenarios: Sequence[Scenario], name: str, options: dict[str, Any]) -> 
     return np.array(rows, dtype=np.float64)
 
 
-def by_outlook(scenarios: Sequence[Scenario]) -> NDArray:
+def by_greedy_rollout(scenarios: Sequence[Scenario]) -> NDArray:
     """(missions, columns) of who chooses what the greedy outlook says is cheapest."""
     worlds, legs = pool_worlds(scenarios), pool_legs(scenarios)
     n = len(scenarios)
@@ -113,13 +118,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--simulations", default="0,32", help="how many; default 0,32")
     parser.add_argument("--filter", default="true", help="false: fly without the safety filter")
     arguments = parser.parse_args(argv)
-    towns = [draw_scenario(seed) for seed in seed_range("--seeds", arguments.seeds)]
+    towns = [sample_scenario(seed) for seed in seed_range("--seeds", arguments.seeds)]
     console = Console(width=170)
     for title, scenarios in (("village", [load_scenario("village")]), ("generated", towns)):
         options = {"filter": arguments.filter}
         players = {"nearest-waypoint": flown(scenarios, "nearest-waypoint", options)}
         if arguments.filter == "true":
-            players["greedy outlook, not learned"] = by_outlook(scenarios)
+            players["greedy outlook, not learned"] = by_greedy_rollout(scenarios)
         for number in arguments.simulations.split(","):
             name = f"learned-waypoint, {number} simulations"
             choice = {**options, "simulations": number}

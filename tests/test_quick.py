@@ -27,7 +27,7 @@ def test_some_tests_of_a_file_can_be_chosen_or_left_out():
     assert not is_quick(tour, left_out)
     assert is_quick(tour, "test_another")
     assert is_quick("paper/test_battery_figure.py", "test_any")
-    assert not is_quick("agents/test_gaze.py", "test_any")
+    assert not is_quick("agents/test_attention.py", "test_any")
 
 
 def test_every_folder_of_tests_has_quick_ones():
@@ -73,7 +73,7 @@ def test_tests_of_a_folder_stay_together_but_for_long_ones_that_share_nothing():
 def test_the_longest_come_first_and_what_stays_together_in_one_piece():
     files = [f"{top}/test_x.py" for top in LONGEST_FIRST if not top.endswith(".py")]
     files += [top for top in LONGEST_FIRST if top.endswith(".py")]
-    nodes = [f"tests/{file}::test_y" for file in ("world/test_x.py", "order/test_x.py", *files)]
+    nodes = [f"tests/{file}::test_y" for file in ("world/test_x.py", "routing/test_x.py", *files)]
     ranked = [scope_of(node) for node in sorted(nodes, key=rank_of)]
     assert ranked == [*LONGEST_FIRST, "order", "world"]
     assert rank_of(f"tests/{APART[0]}::test_d")[0] == LONGEST_FIRST.index("docs")

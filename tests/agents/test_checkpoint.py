@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from uas_coverage_agents.training.checkpoint import (
     Checkpoint,
-    Standing,
+    TrainingState,
     newest_checkpoint,
     write_checkpoint,
 )
@@ -15,7 +15,7 @@ from uas_coverage_env.files.strict_toml import InputError
 
 
 def put_aside(directory, steps: int) -> Checkpoint:
-    standing = Standing(steps=steps, updates=1, process_s=0.5, wall_s=1, done=False, curve=())
+    standing = TrainingState(steps=steps, updates=1, process_s=0.5, wall_s=1, done=False, curve=())
     tensors = {
         "weights": np.full((2, 3), steps, np.float32),
         "a single number": np.array(float(steps)),

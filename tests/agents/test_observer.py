@@ -17,7 +17,7 @@ def test_a_player_sees_what_a_learner_sees(name, assisted):
     env = CoverageParallelEnv(scenario, return_mode=assisted, safety_filter=assisted)
     observations, _ = env.reset(seed=0)
     observer = Observer(MissionBrief.of(scenario))
-    lots = np.random.default_rng(4)
+    rng = np.random.default_rng(4)
     held = {}
     for k in range(120):
         swarm = env.swarm_state()
@@ -28,6 +28,6 @@ def test_a_player_sees_what_a_learner_sees(name, assisted):
         if not env.agents:
             break
         if k % 5 == 0:
-            held = {agent: lots.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents}
+            held = {agent: rng.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents}
         observations, *_ = env.step({agent: held[agent] for agent in env.agents})
     assert k > 10

@@ -17,8 +17,8 @@ from stable_baselines3 import PPO
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.training import command
 from uas_coverage_agents.training.config import load_config
-from uas_coverage_agents.training.freeze import frozen, thaw
-from uas_coverage_agents.training.trainee import Order, Trainee
+from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
+from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
@@ -180,18 +180,18 @@ SAC = [
 @pytest.mark.parametrize("name", [TINY, "sac"])
 def test_a_model_that_is_taken_up_again_learns_on_bit_for_bit(name):
     config = load_config(name, changes=["player.hidden=[8]", *(SAC if name == "sac" else ())])
-    order = Order("tiny", config, seed=0)
-    first, second = Trainee.untrained(order), Trainee.untrained(order)
+    job = TrainingJob("tiny", config, seed=0)
+    first, second = TrainingRun.untrained(job), TrainingRun.untrained(job)
     first.model.learn(256)
-    arrays = frozen(first.model, first.lanes)
-    thaw(arrays, second.model, second.lanes)
-    assert same(frozen(second.model, second.lanes), arrays)
+    arrays = to_arrays(first.model, first.lanes)
+    from_arrays(arrays, second.model, second.lanes)
+    assert same(to_arrays(second.model, second.lanes), arrays)
     first.model.learn(128, reset_num_timesteps=False)
     # both draw from the same global generators: back to where they were
-    undisturbed = frozen(first.model, first.lanes)
-    thaw(arrays, second.model, second.lanes)
+    undisturbed = to_arrays(first.model, first.lanes)
+    from_arrays(arrays, second.model, second.lanes)
     second.model.learn(128, reset_num_timesteps=False)
-    assert same(frozen(second.model, second.lanes), undisturbed)
+    assert same(to_arrays(second.model, second.lanes), undisturbed)
     assert not same(arrays, undisturbed)
 
 
@@ -200,12 +200,12 @@ def same(some: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> bool:
 
 
 def test_a_checkpoint_of_another_network_is_refused():
-    order = Order("tiny", load_config(TINY), seed=0)
-    other = Order("tiny", load_config(TINY, changes=["player.hidden=[4]"]), seed=0)
-    first, second = Trainee.untrained(order), Trainee.untrained(other)
+    job = TrainingJob("tiny", load_config(TINY), seed=0)
+    other = TrainingJob("tiny", load_config(TINY, changes=["player.hidden=[4]"]), seed=0)
+    first, second = TrainingRun.untrained(job), TrainingRun.untrained(other)
     first.model.learn(64)
     with pytest.raises(InputError, match="does not fit this version"):
-        thaw(frozen(first.model, first.lanes), second.model, second.lanes)
+        from_arrays(to_arrays(first.model, first.lanes), second.model, second.lanes)
 
 
 @pytest.mark.parametrize(
@@ -222,13 +222,13 @@ def test_a_checkpoint_of_another_network_is_refused():
     ],
 )
 def test_a_checkpoint_with_an_array_of_another_kind_is_refused(name, array):
-    order = Order("tiny", load_config(TINY), seed=0)
-    first, second = Trainee.untrained(order), Trainee.untrained(order)
+    job = TrainingJob("tiny", load_config(TINY), seed=0)
+    first, second = TrainingRun.untrained(job), TrainingRun.untrained(job)
     first.model.learn(64)
-    arrays = frozen(first.model, first.lanes)
+    arrays = to_arrays(first.model, first.lanes)
     assert name in arrays
     with pytest.raises(InputError, match=name):
-        thaw({**arrays, name: array}, second.model, second.lanes)
+        from_arrays({**arrays, name: array}, second.model, second.lanes)
 
 
 @pytest.mark.parametrize(
@@ -242,19 +242,19 @@ def test_a_checkpoint_with_an_array_of_another_kind_is_refused(name, array):
     ],
 )
 def test_a_memory_that_points_elsewhere_is_refused(remembering, name, change, words):
-    order, arrays = remembering
-    model = Trainee.untrained(order)
+    job, arrays = remembering
+    model = TrainingRun.untrained(job)
     with pytest.raises(InputError, match=words):
-        thaw({**arrays, name: change(arrays[name])}, model.model, model.lanes)
+        from_arrays({**arrays, name: change(arrays[name])}, model.model, model.lanes)
 
 
 @pytest.fixture(scope="module")
 def remembering():
     """A training off-policy, put aside."""
-    order = Order("tiny", load_config("sac", changes=["player.hidden=[8]", *SAC]), seed=0)
-    trainee = Trainee.untrained(order)
-    trainee.model.learn(64)
-    return order, frozen(trainee.model, trainee.lanes)
+    job = TrainingJob("tiny", load_config("sac", changes=["player.hidden=[8]", *SAC]), seed=0)
+    training_run = TrainingRun.untrained(job)
+    training_run.model.learn(64)
+    return job, to_arrays(training_run.model, training_run.lanes)
 
 
 class Payload:
@@ -267,8 +267,8 @@ class Payload:
 @pytest.fixture
 def zipped(tmp_path, trained):
     """A model as Stable-Baselines3 saves it."""
-    trainee = Trainee.untrained(Order("tiny", load_config(TINY), seed=5))
-    trainee.model.save(tmp_path / "model.zip")
+    training_run = TrainingRun.untrained(TrainingJob("tiny", load_config(TINY), seed=5))
+    training_run.model.save(tmp_path / "model.zip")
     return tmp_path / "model.zip"
 
 

@@ -10,7 +10,7 @@ from uas_coverage_agents.training.scenarios import (
 )
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.scenario import sample_scenario
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 
@@ -104,5 +104,5 @@ def test_training_and_validation_share_no_town():
 
 def test_towns_are_drawn_as_the_leaderboard_draws_them():
     assert [town(VALIDATION, n) for n in (0, 7)] == [
-        draw_scenario(VALIDATION.first_seed + n) for n in (0, 7)
+        sample_scenario(VALIDATION.first_seed + n) for n in (0, 7)
     ]

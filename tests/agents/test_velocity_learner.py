@@ -9,9 +9,9 @@ from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.training.config import SacSettings, load_config
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly
-from uas_coverage_agents.training.trainee import Order, Trainee
+from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
-from uas_coverage_agents.training.velocity import DecidingMemory, VelocityLanes
+from uas_coverage_agents.training.velocity import DecidingMemory, VelocityVecEnv
 
 from uas_coverage_env.env import observation_columns
 
@@ -25,16 +25,16 @@ def towns():
     return training_scenarios(load_config(TINY).scenarios, seed=0)
 
 
-def lanes(towns, nearing: float = 0.0, gamma: float = 0.9) -> tuple[VelocityLanes, CoverageVecEnv]:
+def lanes(towns, nearing: float = 0.0, gamma: float = 0.9) -> tuple[VelocityVecEnv, CoverageVecEnv]:
     bare = CoverageVecEnv(3, towns, return_mode=True, safety_filter=True)
     bare.seed(4)
-    return VelocityLanes(bare, nearing, gamma), bare
+    return VelocityVecEnv(bare, nearing, gamma), bare
 
 
 def actions_of(env, seed: int = 0):
-    lots = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     while True:
-        yield lots.uniform(-1, 1, (env.num_envs, 3)).astype(np.float32)
+        yield rng.uniform(-1, 1, (env.num_envs, 3)).astype(np.float32)
 
 
 def test_lanes_that_do_not_decide_show_zeros_and_pay_nothing(towns):
@@ -58,7 +58,7 @@ def test_lanes_that_do_not_decide_show_zeros_and_pay_nothing(towns):
 def test_an_episode_that_the_clock_ends_is_over(towns):
     bare = CoverageVecEnv(2, towns, max_cycles=5)
     bare.seed(0)
-    env = VelocityLanes(bare, 0.0, 0.9)
+    env = VelocityVecEnv(bare, 0.0, 0.9)
     env.reset()
     for _, actions in zip(range(5), actions_of(env), strict=False):
         _, _, ended, infos = env.step(actions)
@@ -100,10 +100,10 @@ def test_lanes_go_on_where_they_were_put_aside(towns):
 
 
 def test_only_decisions_are_learned_from():
-    trainee = Trainee.untrained(Order("tiny", load_config(TINY), seed=0))
-    assert isinstance(trainee.model, PPO)
-    trainee.model.learn(64)
-    buffer = trainee.model.rollout_buffer
+    training_run = TrainingRun.untrained(TrainingJob("tiny", load_config(TINY), seed=0))
+    assert isinstance(training_run.model, PPO)
+    training_run.model.learn(64)
+    buffer = training_run.model.rollout_buffer
     batches = list(buffer.get(batch_size=16))
     assert (torch.cat([batch.observations for batch in batches])[:, FLYING] == 1.0).all()
     decided = int((buffer.observations[:, FLYING] > 0).sum())
@@ -137,13 +137,13 @@ def test_sac_remembers_decisions_alone_and_what_came_of_them(towns):
 
 def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays():
     config = load_config("sac", changes=["scenarios.pool=4", "lanes=4"])
-    trainee = Trainee.untrained(Order("sac", config, seed=0))
-    assert isinstance(trainee.model, SAC)
+    training_run = TrainingRun.untrained(TrainingJob("sac", config, seed=0))
+    assert isinstance(training_run.model, SAC)
     assert isinstance(config.learning, SacSettings)
-    assert trainee.model.log_ent_coef is not None
-    weight = float(trainee.model.log_ent_coef.detach().exp())
+    assert training_run.model.log_ent_coef is not None
+    weight = float(training_run.model.log_ent_coef.detach().exp())
     assert weight == pytest.approx(config.learning.first_entropy)
-    env = trainee.lanes
+    env = training_run.lanes
     view: Any = env.reset()
     paid = []
     for _, actions in zip(range(100), actions_of(env), strict=False):
@@ -160,11 +160,13 @@ def test_what_is_exported_decides_as_the_model_does(algorithm):
         config = load_config("sac", changes=[*changes, "scenarios.pool=1", "lanes=1"])
     else:
         config = load_config(TINY, changes=changes)
-    trainee = Trainee.untrained(Order(algorithm, config, seed=0))
-    policy = trainee.policy()
+    training_run = TrainingRun.untrained(TrainingJob(algorithm, config, seed=0))
+    policy = training_run.policy()
     assert isinstance(policy, Policy)
-    views = np.random.default_rng(0).uniform(-1, 1, (6, trainee.model.observation_space.shape[0]))
-    expected, _ = trainee.model.predict(views.astype(np.float32), deterministic=True)
+    views = np.random.default_rng(0).uniform(
+        -1, 1, (6, training_run.model.observation_space.shape[0])
+    )
+    expected, _ = training_run.model.predict(views.astype(np.float32), deterministic=True)
     assert np.allclose(np.clip(policy.forward(views), -1, 1), expected, atol=1e-5)
 
 
@@ -180,11 +182,13 @@ def test_half_a_minute_of_training_covers_far_more_than_none():
         "scenarios.pool=16",
         "scenarios.family.towns.n_waypoints=[8, 12]",
     ]
-    trainee = Trainee.untrained(Order("tiny", load_config(TINY, changes=changes), seed=0))
+    training_run = TrainingRun.untrained(
+        TrainingJob("tiny", load_config(TINY, changes=changes), seed=0)
+    )
     unseen = training_scenarios(load_config(TINY).scenarios, seed=77)
-    before = trainee.flights(unseen)[:, MEASURES.index("coverage")].mean()
-    trainee.model.learn(300_000)
-    results = fly(trainee.policy(), unseen)
+    before = training_run.flights(unseen)[:, MEASURES.index("coverage")].mean()
+    training_run.model.learn(300_000)
+    results = fly(training_run.policy(), unseen)
     assert before < 0.3
     assert results[:, MEASURES.index("coverage")].mean() > 0.8
     assert results[:, MEASURES.index("all_home")].all()
@@ -204,11 +208,13 @@ def test_half_a_minute_of_sac_covers_most_of_what_it_has_never_seen():
         "learning.updates_per_step=2",
         "learning.batch_size=256",
     ]
-    trainee = Trainee.untrained(Order("sac", load_config("sac", changes=changes), seed=0))
+    training_run = TrainingRun.untrained(
+        TrainingJob("sac", load_config("sac", changes=changes), seed=0)
+    )
     unseen = training_scenarios(load_config(TINY).scenarios, seed=77)
-    before = trainee.flights(unseen)[:, MEASURES.index("coverage")].mean()
-    trainee.model.learn(30_000)
-    results = trainee.flights(unseen)
+    before = training_run.flights(unseen)[:, MEASURES.index("coverage")].mean()
+    training_run.model.learn(30_000)
+    results = training_run.flights(unseen)
     assert before < 0.3
     assert results[:, MEASURES.index("coverage")].mean() > 0.8
     assert results[:, MEASURES.index("all_home")].all()

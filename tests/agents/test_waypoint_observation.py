@@ -16,7 +16,7 @@ from uas_coverage_agents.waypoint.layout import (
     Number,
 )
 from uas_coverage_agents.waypoint.legs import legs_of
-from uas_coverage_agents.waypoint.look import NO_TARGET, look
+from uas_coverage_agents.waypoint.observation import NO_TARGET, observe
 from waypoint_missions import town
 from waypoint_oracle import Mission, observation
 
@@ -63,7 +63,7 @@ def seen(moment):
     """(row, candidates, legal) of the first UAS."""
     row = np.full(OBSERVATION_SIZE, np.nan, dtype=np.float32)
     candidates, legal = np.full(K, -1), np.zeros(K + 1, dtype=np.bool_)
-    n_legal = look(*moment, 0, candidates, legal, row)
+    n_legal = observe(*moment, 0, candidates, legal, row)
     assert n_legal == legal.sum() > 0
     return row, candidates, legal
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import (
     CANDIDATE_AT,
     CANDIDATE_TABLE,
@@ -17,6 +16,12 @@ from uas_coverage_agents.waypoint.layout import (
     K,
 )
 from uas_coverage_agents.waypoint.legs import legs_of
+from uas_coverage_agents.waypoint.sub_environments import (
+    begin_lanes,
+    make_lanes,
+    pool_legs,
+    step_lanes,
+)
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
     LEFT,
@@ -52,10 +57,10 @@ class Teams:
         n = len(scenarios)
         self.lanes, self.states = make_lanes(n, self.arenas)
         shape = self.states.uncovered.shape
-        lots = np.random.default_rng(seed)
+        rng = np.random.default_rng(seed)
         begin_lanes(
             self.arenas, self.legs, self.lanes, self.states, np.arange(n), np.arange(n),
-            lots.random(shape) < covered, np.zeros(self.states.status.shape),
+            rng.random(shape) < covered, np.zeros(self.states.status.shape),
             True, assistants(True, True),
         )  # fmt: skip
 
@@ -75,8 +80,8 @@ def nearest(lanes):
 
 
 def at_random(seed):
-    lots = np.random.default_rng(seed)
-    return lambda lanes: (lanes.legal * lots.random(lanes.legal.shape)).argmax(axis=1)
+    rng = np.random.default_rng(seed)
+    return lambda lanes: (lanes.legal * rng.random(lanes.legal.shape)).argmax(axis=1)
 
 
 @settings(max_examples=4, deadline=None, derandomize=True)

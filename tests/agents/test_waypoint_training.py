@@ -27,12 +27,12 @@ def config(*changes):
     )
 
 
-def fly(lanes, lots, n_steps):
+def fly(lanes, rng, n_steps):
     """Choose at random; everything that came back."""
     seen = []
     for _ in range(n_steps):
         masks = lanes.action_masks()
-        choices = (masks * lots.random(masks.shape)).argmax(axis=1)
+        choices = (masks * rng.random(masks.shape)).argmax(axis=1)
         observation, rewards, done, infos = lanes.step(choices)
         seen.append((observation, rewards, done))
         assert all(
@@ -44,11 +44,11 @@ def fly(lanes, lots, n_steps):
 def test_rewards_add_up_to_the_price_of_the_mission():
     lanes = environment(n_lanes=1)
     lanes.reset()
-    lots, total = np.random.default_rng(0), 0.0
+    rng, total = np.random.default_rng(0), 0.0
     first_Wh = lanes._lanes.account[0] @ prices_of(SETTINGS)
     while True:
         masks = lanes.action_masks()
-        _, rewards, done, infos = lanes.step((masks * lots.random(masks.shape)).argmax(axis=1))
+        _, rewards, done, infos = lanes.step((masks * rng.random(masks.shape)).argmax(axis=1))
         total += float(rewards[0])
         if done[0]:
             break

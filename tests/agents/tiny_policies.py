@@ -8,7 +8,7 @@ from uas_coverage_agents.policy import (
     Training,
     save_policy,
 )
-from uas_coverage_agents.velocity.pilot import observation
+from uas_coverage_agents.velocity.policy_runner import observation
 
 
 def describe(**changes) -> PolicyDescription:
@@ -30,9 +30,9 @@ def describe(**changes) -> PolicyDescription:
 
 def weights(description: PolicyDescription, seed: int = 0) -> dict[str, np.ndarray]:
     """Small weights drawn from a seed."""
-    lots = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     shapes = description.network.shapes()
-    return {name: lots.normal(size=shape).astype(np.float32) / 9 for name, shape in shapes.items()}
+    return {name: rng.normal(size=shape).astype(np.float32) / 9 for name, shape in shapes.items()}
 
 
 def write(directory, seed: int = 0) -> PolicyDescription:

@@ -2,7 +2,7 @@
 
 import numpy as np
 from uas_coverage_agents.policy.pointer import HOME_AT_FIRST
-from uas_coverage_agents.waypoint.pilot import network
+from uas_coverage_agents.waypoint.policy_runner import network
 
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.scenario import MovingObstacle, ScheduledVelocity
@@ -35,8 +35,8 @@ def with_something_parked(scenario, waypoint, leaves_s):
 def tensors(hidden=16, seed=None):
     """Weights of a network: as before training, or random with a seed."""
     shapes = network(hidden, PRIOR).shapes()
-    lots = np.random.default_rng(0 if seed is None else seed)
-    weights = {name: lots.normal(0.0, 0.3, shape) for name, shape in shapes.items()}
+    rng = np.random.default_rng(0 if seed is None else seed)
+    weights = {name: rng.normal(0.0, 0.3, shape) for name, shape in shapes.items()}
     if seed is None:
         weights["score.out.weight"][:] = 0.0
         weights["home.1.weight"][:] = 0.0

@@ -80,7 +80,7 @@ class Mission:
             to_s[w] = self.leg_s(j, math.hypot(ahead_m[0], ahead_m[1]), -ahead_m[2], w)
         return 0.0, to_s, self.home_s(j)
 
-    def outlook(self, free, done_s, todo):
+    def greedy_rollout(self, free, done_s, todo):
         """(sum, longest [s], left) where all go on to what is nearest as long as they may."""
         free, done_s, todo = dict(free), list(done_s), list(todo)
         while todo and free:
@@ -124,7 +124,9 @@ def observation(arena, legs, state, blocked, targets, i):
         around_s = np.sort([legs.between_s[w, v] for v in open_ if v != w])
         first_mate_s = min([ready_s + to_s[w] for ready_s, to_s, _ in free.values()], default=1e6)
         own = (arrives_s, legs.between_s[w], legs.home_s[i, w])
-        futures.append(mission.outlook({**free, i: own}, done_s, [v for v in todo if v != w]))
+        futures.append(
+            mission.greedy_rollout({**free, i: own}, done_s, [v for v in todo if v != w])
+        )
         rows.append(
             {
                 "there": 1.0,
@@ -145,7 +147,7 @@ def observation(arena, legs, state, blocked, targets, i):
                 "ahead": x[[VX, VY]] @ towards / max(speed_mps * np.linalg.norm(towards), 1e-6),
             }
         )
-    go_home = mission.outlook(free, [*done_s, mission.home_s(i)], todo)
+    go_home = mission.greedy_rollout(free, [*done_s, mission.home_s(i)], todo)
     costs_s = [total_s + longest_s + 120 * left for total_s, longest_s, left in futures]
     best = int(np.argmin(costs_s))
     for k, (row, future) in enumerate(zip(rows, futures, strict=True)):

@@ -112,10 +112,10 @@ PLAYERS = {p.__name__: p for p in (goalkeeper, press, siege, doorstep, cage)}
 
 def around_corner(n_uas, seed=0):
     """Places near a corner of the fence, the first in it, no two nearer than is allowed."""
-    lots = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     places_m = [CORNER_M]
     while len(places_m) < n_uas:
-        place_m = CORNER_M - (*lots.uniform(0.0, 20.0, 2), lots.uniform(-15.0, 15.0))
+        place_m = CORNER_M - (*rng.uniform(0.0, 20.0, 2), rng.uniform(-15.0, 15.0))
         away_m = np.abs(np.array(places_m) - place_m)
         if np.maximum(np.hypot(away_m[:, 0], away_m[:, 1]), away_m[:, 2]).min() > KEPT_M:
             places_m.append(place_m)

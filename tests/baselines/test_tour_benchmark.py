@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from uas_coverage_baselines.order import no_order
+from uas_coverage_baselines.routing import empty_routes
 
 from uas_coverage_env.scenario import generate_scenario
 
@@ -62,5 +62,5 @@ def test_the_judge_forbids_a_route_that_the_battery_does_not_last_for(task):
 
 
 def test_a_short_annealing_is_no_worse_than_putting_waypoints_in_where_they_cost_least(task):
-    inserted = tour.improved(task, no_order(task.n_uas), tour.Effort(0), 0)
+    inserted = tour.improve_routes(task, empty_routes(task.n_uas), tour.SearchEffort(0), 0)
     assert tour.annealed(task, 0.1).cost_s <= inserted.cost_s

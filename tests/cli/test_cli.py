@@ -14,8 +14,8 @@ import pytest
 from rich.console import Console
 
 from uas_coverage_env.cli import main
+from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.progress import shown
-from uas_coverage_env.cli.text_map import TextMap
 from uas_coverage_env.flight import Decision, Flight, load_planner, rollout
 from uas_coverage_env.scenario import load_scenario, scenario_names
 from uas_coverage_env.simulation import World
@@ -272,7 +272,7 @@ def test_a_log_gets_few_lines(elsewhere, capsys):
 def test_a_map_of_letters_shows_what_is_where():
     scenario = load_scenario("village")
     world = World(scenario)
-    lines = TextMap(scenario, 120, 60).drawn(world.swarm_state()).plain.splitlines()
+    lines = AsciiMap(scenario, 120, 60).drawn(world.swarm_state()).plain.splitlines()
     cells = np.array([list(line) for line in lines[1:-2]])
     assert {"1", "2", "o", "#", "@"} <= set(cells.ravel())
     row, column = np.argwhere(cells == "1")[0]
@@ -288,7 +288,7 @@ def test_a_map_of_letters_shows_what_is_where():
 def test_the_map_and_the_line_below_it_fit_into_the_terminal(name, columns, rows):
     scenario = load_scenario(name)
     *drawn, legend = (
-        TextMap(scenario, columns, rows).drawn(World(scenario).swarm_state()).plain.splitlines()
+        AsciiMap(scenario, columns, rows).drawn(World(scenario).swarm_state()).plain.splitlines()
     )
     assert legend.startswith("1.. UAS")
     assert len(drawn) + 2 <= rows

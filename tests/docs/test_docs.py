@@ -13,7 +13,7 @@ from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
-from uas_coverage_env.leaderboard import players_of
+from uas_coverage_env.leaderboard import planner_specs_of
 from uas_coverage_env.scenario import Scenario, scenario_names
 
 DOCS = ROOT / "docs"
@@ -95,7 +95,7 @@ def understood(words):
             load_planner(given["planner"], options)
         assert given["scenario"] in scenario_names() or given["scenario"].endswith(".toml"), words
     if command.name == "compare":
-        players_of(given["planners"], given["option"] or ())
+        planner_specs_of(given["planners"], given["option"] or ())
 
 
 def test_a_command_that_does_not_exist_would_be_noticed():

@@ -85,14 +85,14 @@ def test_a_kept_picture_shows_what_a_new_one_shows(village, seed, size_px):
     swarm, other = World(village).swarm_state(), World(village).swarm_state()
     kept = Picture(crowded, size_px=size_px)
     kept.draw(swarm)
-    twin = kept.twin()
+    clone = kept.clone()
     for _ in range(3):
         swarm.uncovered[:] = rng.random(49) < rng.random()
         swarm.x[:, :3] += rng.normal(0, 30, (2, 3))
         expected = picture(crowded, swarm, size_px=size_px)
         np.testing.assert_array_equal(kept.draw(swarm), expected)
         np.testing.assert_array_equal(
-            twin.draw(other), picture(crowded, other, size_px=size_px), "another mission's"
+            clone.draw(other), picture(crowded, other, size_px=size_px), "another mission's"
         )
 
 

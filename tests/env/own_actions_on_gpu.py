@@ -28,7 +28,7 @@ def compare():
         missions.step(asked)
         episode.asked[:] = asked[1]
         episode.step()
-        seen = missions.missions.looks.observation[1]
+        seen = missions.missions.first_observations.observation[1]
         different += int((seen != episode.observation).sum())
     wrong = CudaMissions(2, ground, action=faulty(0))
     wrong.step(np.array([[[0.0], [0.9]], [[0.3], [0.0]]]))

@@ -41,7 +41,9 @@ def compare(ground):
                 report = np.array(episode.step())
                 different += int((seen.rewards[lane] != report[:, REWARD]).sum())
                 ended[lane] = bool(seen.ended[lane])
-            different += int((seen.looks.observation[lane] != episode.observation).sum())
+            different += int(
+                (seen.first_observations.observation[lane] != episode.observation).sum()
+            )
     asked[0, 1, 2] = np.nan
     before = missions.missions.worlds.x.copy()
     missions.step(asked)

@@ -114,16 +114,16 @@ def soon(condition: Callable[[], bool]) -> bool:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="os.fork is of POSIX systems")
 def test_ten_kills_at_random_moments_change_nothing(nursery, two_yards, tmp_path):
     total = 2 * len(PLANNERS.split(",")) * SEEDS
-    lots = random.Random(0)
+    rng = random.Random(0)
     killed, counts = tmp_path / "killed", [0]
     # right at the start, and in the middle; once with processes side by side
-    targets = [0, 0, *sorted(lots.sample(range(total - 4), KILLS - 2))]
+    targets = [0, 0, *sorted(rng.sample(range(total - 4), KILLS - 2))]
     for n, target in enumerate(targets):
         jobs = 2 if n == KILLS // 2 else 1
         child = started(nursery, two_yards, killed, jobs)
         least = target if jobs == 1 else max(target, counts[-1] + 1)
         assert soon(lambda least=least: count(killed) >= least)
-        time.sleep(lots.uniform(0.0, 0.03))
+        time.sleep(rng.uniform(0.0, 0.03))
         helpers = children(child)
         assert jobs == 1 or helpers or not _stats()
         os.kill(child, signal.SIGKILL)

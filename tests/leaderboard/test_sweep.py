@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard import SETS, Sweep, players_of, scenarios_of, source_of
+from uas_coverage_env.leaderboard import SETS, Sweep, planner_specs_of, scenarios_of, source_of
 from uas_coverage_env.leaderboard.hashing import content_hash
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.sweep import difference
@@ -22,7 +22,9 @@ PLAIN = st.recursive(
 
 
 def sweep(scenarios="village", planners="milp-mpc", options=(), seeds=range(1), **settings):
-    return Sweep(scenarios_of([scenarios]), players_of([planners], options), seeds, **settings)
+    return Sweep(
+        scenarios_of([scenarios]), planner_specs_of([planners], options), seeds, **settings
+    )
 
 
 def keys(some: Sweep) -> list[str]:
@@ -68,7 +70,7 @@ def test_whatever_changes_a_flight_changes_its_key():
 
 
 def test_an_option_that_is_spelt_out_is_the_default():
-    (player,) = players_of(["milp-mpc"], []).values()
+    (player,) = planner_specs_of(["milp-mpc"], []).values()
     values = {
         key: ",".join(value) if isinstance(value, list) else value
         for key, value in player.options.items()
@@ -105,7 +107,7 @@ def test_a_vehicle_that_changes_changes_the_scenario(tmp_path, village_text):
 
 
 def test_a_policy_is_its_weights_not_its_folder():
-    (hover,) = players_of(["hover"], []).values()
+    (hover,) = planner_specs_of(["hover"], []).values()
     one = type(hover)("p", "policy:here", {}, "weights 1", "package")
     moved = type(hover)("p", "policy:there", {}, "weights 1", "package")
     trained = type(hover)("p", "policy:here", {}, "weights 2", "package")
@@ -136,7 +138,7 @@ def test_two_different_scenarios_of_one_name_are_refused(tmp_path, village_text)
 
 
 def test_a_player_can_fly_twice_under_labels():
-    players = players_of(["hover,still=hover"], [])
+    players = planner_specs_of(["hover,still=hover"], [])
     assert {label: player.planner for label, player in players.items()} == {
         "hover": "hover",
         "still": "hover",
@@ -153,5 +155,5 @@ def test_a_difference_is_named_where_it_lies():
 
 
 def test_the_source_is_that_of_the_world_and_of_who_flies():
-    hover = players_of(["hover"], []).values()
+    hover = planner_specs_of(["hover"], []).values()
     assert source_of(hover) == source_of(hover) != source_of([])

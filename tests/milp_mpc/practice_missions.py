@@ -3,7 +3,7 @@
 from itertools import product
 
 import numpy as np
-from uas_coverage_baselines.milp_mpc.planner import MilpMpc, Options
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort
 
 from uas_coverage_env.files.strict_toml import parse
@@ -69,7 +69,7 @@ def with_uas(scenario, row, **fields):
 
 def planner(scenario, **options):
     """A planner that works by nodes, on a short horizon, ready for the mission."""
-    made = MilpMpc(Options(**({"deterministic": True, "horizon": 8, "teams": 1} | options)))
+    made = MilpMpc(MilpMpcOptions(**({"deterministic": True, "horizon": 8, "teams": 1} | options)))
     made.reset(MissionBrief.of(scenario), 0)
     return made
 

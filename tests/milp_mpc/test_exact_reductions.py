@@ -14,7 +14,7 @@ from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.separation import from_obstacles
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
-from uas_coverage_baselines.milp_mpc.model.problem import Target, Tour, Weights
+from uas_coverage_baselines.milp_mpc.model.problem import Target, TourSegment, Weights
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, solve_lazily
 from uas_coverage_baselines.milp_mpc.model.reductions.bounds import rows_as_bounds
@@ -136,7 +136,7 @@ def test_a_nearly_empty_battery_limits_every_formulation_alike():
 def test_a_tour_costs_alike_with_and_without_coverage_states():
     problem = smaller(FLOWN[17].only(1), 8, 3)
     following = problem.waypoints_m[0] + np.array([40.0, -20.0, 0.0])
-    tour = Tour(
+    tour = TourSegment(
         waypoints=np.array([0]),
         aims_m=np.array([problem.waypoints_m[0], following]),
         radius_m=np.array([5.0, 5.0]),
@@ -263,7 +263,7 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         waypoints=[place, ((90.0, 20.0, -12.0), 6.0)],
         waypoint_sides=12,
         targets=[Target(np.array([80.0, 50.0, -5.0]), 0.2, 1), None],
-        tours=(None, Tour(np.array([1]), np.eye(3)[:2], np.ones(2), 0.5, np.array([6.0]))),
+        tours=(None, TourSegment(np.array([1]), np.eye(3)[:2], np.ones(2), 0.5, np.array([6.0]))),
         weights=Weights(lift=0.3, return_home=1.0),
         dt_s=0.5,
         physical_sides=12,

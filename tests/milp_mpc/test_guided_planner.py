@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 from practice_missions import mission
-from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided, Options
-from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
+from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief
@@ -14,7 +14,7 @@ from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import LOST
 
-REPEATABLE = Options(deterministic=True, horizon=10)
+REPEATABLE = GuidedOptions(deterministic=True, horizon=10)
 PLACES = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]
 STARTS = [(20.0, 20.0, -1.0), (20.0, 180.0, -1.0)]
 
@@ -36,7 +36,7 @@ def parked(leaves_at_s):
 
 def guide(scenario):
     brief = MissionBrief.of(scenario)
-    made = OrderGuide(brief, ProblemBuilder(brief, REPEATABLE), TourShape())
+    made = RouteGuide(brief, ProblemBuilder(brief, REPEATABLE), TourShape())
     world = World(scenario)
     made.begin(world.swarm_state(), 0)
     return made, world

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.modes import (
-    Memory,
     Mode,
+    ModeMemory,
     Situation,
     TargetChoice,
     best_fitting_waypoint,
@@ -44,19 +44,19 @@ EVERYTHING = (0, 1, 2, 3)
 @pytest.mark.parametrize(
     ("memory", "now", "following"),
     [
-        (Memory(LANDED), situation(), LANDED),
-        (Memory(LANDED), situation(covered=EVERYTHING, dod=0.9), LANDED),
-        (Memory(RETURN), situation(plans_coverage=True), RETURN),
-        (Memory(RETURN), situation(dod=0.9), RETURN),
-        (Memory(COVERING), situation(covered=EVERYTHING, plans_coverage=True), RETURN),
-        (Memory(COVERING), situation(dod=0.4, plans_coverage=True), RETURN),
-        (Memory(TRANSIT, 2), situation(covered=EVERYTHING), RETURN),
-        (Memory(TRANSIT, 2), situation(dod=0.41), RETURN),
-        (Memory(TRANSIT, 2), situation(plans_coverage=True), TRANSIT),
-        (Memory(TRANSIT, 2), situation(plans_coverage=False), TRANSIT),
-        (Memory(TRANSIT, 2), situation(covered=[2]), COVERING),
-        (Memory(COVERING), situation(plans_coverage=True, dod=0.39), COVERING),
-        (Memory(COVERING), situation(plans_coverage=False, dod=0.39), TRANSIT),
+        (ModeMemory(LANDED), situation(), LANDED),
+        (ModeMemory(LANDED), situation(covered=EVERYTHING, dod=0.9), LANDED),
+        (ModeMemory(RETURN), situation(plans_coverage=True), RETURN),
+        (ModeMemory(RETURN), situation(dod=0.9), RETURN),
+        (ModeMemory(COVERING), situation(covered=EVERYTHING, plans_coverage=True), RETURN),
+        (ModeMemory(COVERING), situation(dod=0.4, plans_coverage=True), RETURN),
+        (ModeMemory(TRANSIT, 2), situation(covered=EVERYTHING), RETURN),
+        (ModeMemory(TRANSIT, 2), situation(dod=0.41), RETURN),
+        (ModeMemory(TRANSIT, 2), situation(plans_coverage=True), TRANSIT),
+        (ModeMemory(TRANSIT, 2), situation(plans_coverage=False), TRANSIT),
+        (ModeMemory(TRANSIT, 2), situation(covered=[2]), COVERING),
+        (ModeMemory(COVERING), situation(plans_coverage=True, dod=0.39), COVERING),
+        (ModeMemory(COVERING), situation(plans_coverage=False, dod=0.39), TRANSIT),
     ],
 )
 def test_the_next_mode_is_that_of_algorithm_2(memory, now, following):
@@ -68,8 +68,8 @@ def updated(memories, situations, planned=(), blocked=()):
 
 
 def test_who_turns_to_transit_flies_to_the_best_fitting_waypoint():
-    (memory,) = updated([Memory()], [situation()])
-    assert memory == Memory(TRANSIT, 2)  # the nearest, at 40 m
+    (memory,) = updated([ModeMemory()], [situation()])
+    assert memory == ModeMemory(TRANSIT, 2)  # the nearest, at 40 m
 
 
 def test_the_nearest_waypoint_fits_best_where_height_and_heading_are_equal():
@@ -107,42 +107,42 @@ def test_a_waypoint_straight_above_is_a_target_like_any_other():
 def test_waypoints_that_are_covered_planned_or_blocked_are_no_targets(why):
     covered = [2] if why == "covered" else []
     rest = {why: [2]} if why != "covered" else {}
-    (memory,) = updated([Memory()], [situation(covered=covered)], **rest)
+    (memory,) = updated([ModeMemory()], [situation(covered=covered)], **rest)
     assert memory.mode is TRANSIT
     assert memory.waypoint != 2
 
 
 def test_a_waypoint_is_the_target_of_one_uas_only():
-    chosen = [m.waypoint for m in updated([Memory()] * 3, [situation()] * 3)]
+    chosen = [m.waypoint for m in updated([ModeMemory()] * 3, [situation()] * 3)]
     assert len(set(chosen)) == 3
     # of one that already flies there as well, whatever its row
-    first, second = updated([Memory(), Memory(TRANSIT, 2)], [situation()] * 2)
-    assert second == Memory(TRANSIT, 2)
+    first, second = updated([ModeMemory(), ModeMemory(TRANSIT, 2)], [situation()] * 2)
+    assert second == ModeMemory(TRANSIT, 2)
     assert first.waypoint != 2
 
 
 def test_a_target_is_kept_until_it_is_covered_even_if_another_fits_better_by_then():
     now = situation((0.0, 49.0, -10.0), plans_coverage=True)
-    assert updated([Memory(TRANSIT, 2)], [now]) == [Memory(TRANSIT, 2)]
+    assert updated([ModeMemory(TRANSIT, 2)], [now]) == [ModeMemory(TRANSIT, 2)]
     covered = situation((0.0, 49.0, -10.0), covered=[2])
-    assert updated([Memory(TRANSIT, 2)], [covered]) == [Memory(COVERING)]
+    assert updated([ModeMemory(TRANSIT, 2)], [covered]) == [ModeMemory(COVERING)]
 
 
 def test_a_target_that_gets_blocked_is_exchanged():
-    (memory,) = updated([Memory(TRANSIT, 2)], [situation()], blocked=[2])
+    (memory,) = updated([ModeMemory(TRANSIT, 2)], [situation()], blocked=[2])
     assert memory.mode is TRANSIT
     assert memory.waypoint in (0, 1, 3)
 
 
 def test_without_any_possible_target_the_uas_stays_in_covering_mode():
-    assert updated([Memory()], [situation()], planned=EVERYTHING) == [Memory(COVERING)]
-    (memory,) = updated([Memory(TRANSIT, 2)], [situation()], blocked=EVERYTHING)
-    assert memory == Memory(COVERING)
+    assert updated([ModeMemory()], [situation()], planned=EVERYTHING) == [ModeMemory(COVERING)]
+    (memory,) = updated([ModeMemory(TRANSIT, 2)], [situation()], blocked=EVERYTHING)
+    assert memory == ModeMemory(COVERING)
 
 
 def test_who_returns_forgets_its_target():
-    (memory,) = updated([Memory(TRANSIT, 2)], [situation(dod=0.5)])
-    assert memory == Memory(RETURN)
+    (memory,) = updated([ModeMemory(TRANSIT, 2)], [situation(dod=0.5)])
+    assert memory == ModeMemory(RETURN)
 
 
 subsets = st.sets(st.integers(0, 3))
@@ -161,7 +161,7 @@ def test_targets_are_open_unblocked_and_different_whatever_came_before(
     modes, order, covered, planned, blocked, plans
 ):
     memories = [
-        Memory(mode, order[row] if mode is TRANSIT else None) for row, mode in enumerate(modes)
+        ModeMemory(mode, order[row] if mode is TRANSIT else None) for row, mode in enumerate(modes)
     ]
     now = [situation(covered=covered, plans_coverage=plans)] * len(modes)
     result = updated(memories, now, planned, blocked)
@@ -181,13 +181,13 @@ def target(memory, now, seconds_left=600.0, seconds_home=60.0, home_m=(100.0, 0.
 
 
 def test_covering_and_landed_uas_have_no_target():
-    assert target(Memory(COVERING), situation()) is None
-    assert target(Memory(LANDED), situation()) is None
+    assert target(ModeMemory(COVERING), situation()) is None
+    assert target(ModeMemory(LANDED), situation()) is None
 
 
 def test_the_transit_target_is_the_waypoint_and_its_weight_is_normalised_by_the_distance():
     for position in ((0.0, 0.0, -10.0), (-200.0, 0.0, -10.0)):
-        made = target(Memory(TRANSIT, 0), situation(position))
+        made = target(ModeMemory(TRANSIT, 0), situation(position))
         distance_m = np.linalg.norm(WAYPOINTS[0] - position)
         assert made.position_m.tolist() == WAYPOINTS[0].tolist()
         assert made.waypoint == 0
@@ -195,21 +195,21 @@ def test_the_transit_target_is_the_waypoint_and_its_weight_is_normalised_by_the_
 
 
 def test_a_weight_stays_finite_at_the_target_itself():
-    near = target(Memory(TRANSIT, 0), situation(WAYPOINTS[0]))
-    home = target(Memory(RETURN), situation((100.0, 0.0, -1.0)))
+    near = target(ModeMemory(TRANSIT, 0), situation(WAYPOINTS[0]))
+    home = target(ModeMemory(RETURN), situation((100.0, 0.0, -1.0)))
     assert 0.0 < near.weight < 1.0
     assert 0.0 < home.weight < 1.0
 
 
 def test_the_return_target_is_the_initial_position_and_no_waypoint_relaxes_it():
-    made = target(Memory(RETURN), situation())
+    made = target(ModeMemory(RETURN), situation())
     assert made.position_m.tolist() == [100.0, 0.0, -1.0]
     assert made.waypoint is None
 
 
 def test_the_way_home_weighs_more_the_less_the_battery_gives():
     weights = [
-        target(Memory(RETURN), situation(), seconds_left=left).weight
+        target(ModeMemory(RETURN), situation(), seconds_left=left).weight
         for left in (2000.0, 600.0, 200.0, 100.0, 70.0, 60.0, 10.0, 0.0, -5.0)
     ]
     assert (np.diff(weights) >= 0.0).all()
@@ -219,14 +219,14 @@ def test_the_way_home_weighs_more_the_less_the_battery_gives():
 
 def test_the_way_home_weighs_much_once_there_is_nothing_left_to_cover():
     full = 2000.0
-    searching = target(Memory(RETURN), situation(), seconds_left=full)
-    done = target(Memory(RETURN), situation(covered=EVERYTHING), seconds_left=full)
+    searching = target(ModeMemory(RETURN), situation(), seconds_left=full)
+    done = target(ModeMemory(RETURN), situation(covered=EVERYTHING), seconds_left=full)
     assert done.weight > 2.0 * searching.weight
 
 
 def test_the_return_weight_is_normalised_by_the_distance_too():
     near, far = (
-        target(Memory(RETURN), situation((north, 0.0, -1.0), plans_coverage=False))
+        target(ModeMemory(RETURN), situation((north, 0.0, -1.0), plans_coverage=False))
         for north in (50.0, -150.0)
     )
     assert near.weight * 50.0 == pytest.approx(far.weight * 250.0)
@@ -234,7 +234,7 @@ def test_the_return_weight_is_normalised_by_the_distance_too():
 
 def test_near_home_flying_on_to_cover_costs_no_more_than_farther_out():
     at_50, at_100 = (
-        target(Memory(RETURN), situation((north, 0.0, -1.0), plans_coverage=True))
+        target(ModeMemory(RETURN), situation((north, 0.0, -1.0), plans_coverage=True))
         for north in (50.0, 0.0)
     )
     assert at_50.weight == at_100.weight

@@ -5,7 +5,7 @@ import pytest
 from practice_missions import LITTLE, mission, obstacle, with_uas, wrenches
 from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
-from uas_coverage_baselines.milp_mpc.planner import Options
+from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.search.decision import decide
 
@@ -37,7 +37,7 @@ def planned(request):
     for _ in range(4):
         world.step({name: Velocity(3.0, 4.0, 7.0) for name in world.names})
     swarm = world.swarm_state()
-    around = ProblemBuilder(MissionBrief.of(scenario), Options(horizon=HORIZON))
+    around = ProblemBuilder(MissionBrief.of(scenario), MilpMpcOptions(horizon=HORIZON))
     problem = around.problem(swarm, dict.fromkeys(world.names), Weights(), 0.15)
     plan = decide(problem, None, scenario.dt_s, LITTLE)
     assert plan is not None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from practice_missions import mission, obstacle, with_uas
 from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
-from uas_coverage_baselines.milp_mpc.planner import Options
+from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
 from uas_coverage_env.mission import MissionBrief
@@ -34,7 +34,7 @@ def scenario():
 
 @pytest.fixture
 def around(scenario):
-    return ProblemBuilder(MissionBrief.of(scenario), Options(horizon=9))
+    return ProblemBuilder(MissionBrief.of(scenario), MilpMpcOptions(horizon=9))
 
 
 def seen(scenario, **changes):
@@ -49,7 +49,7 @@ def without_targets(scenario):
 
 def test_clearances_are_the_sums_that_the_paper_writes_and_the_margins(scenario, around):
     problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
-    options = Options()
+    options = MilpMpcOptions()
     assert problem.obstacle_clearance_m == pytest.approx(
         np.array([[0.36 + 2.0], [0.5 + 2.0]]) + options.margin_m
     )

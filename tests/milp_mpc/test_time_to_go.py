@@ -7,7 +7,7 @@ import pytest
 from golden_lp import compare, readable
 from toy_problems import FIELD, S500, TO_OPTIMALITY, state, toy, written
 from uas_coverage_baselines.milp_mpc.model.blocks import TimeToGo
-from uas_coverage_baselines.milp_mpc.model.problem import Tour, Trajectories
+from uas_coverage_baselines.milp_mpc.model.problem import TourSegment, Trajectories
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -20,7 +20,7 @@ N = 4
 def with_tour(horizon=N, count=3, lead_s=1.0, **fields):
     """Toy places one after the other, then home."""
     places = np.array([place for place, _ in PLACES[:count]])
-    tour = Tour(
+    tour = TourSegment(
         np.arange(count),
         np.vstack([places, HOME]),
         np.array([3.0] * count + [0.0]),

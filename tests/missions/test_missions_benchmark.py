@@ -11,7 +11,7 @@ import pytest
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import seed_range
-from uas_coverage_env.scenario import draw_scenario
+from uas_coverage_env.scenario import sample_scenario
 
 
 @pytest.fixture
@@ -22,12 +22,12 @@ def mission(lively_town, tmp_path):
 
 def test_the_default_scenarios_are_as_large_as_they_should_be():
     seeds = seed_range("--seeds", missions.SEEDS)
-    drawn = [draw_scenario(seed) for seed in seeds]
+    drawn = [sample_scenario(seed) for seed in seeds]
     assert len(drawn) == 20
     assert {len(scenario.uas) for scenario in drawn} == {1, 2, 3, 4}
     assert all(20 <= len(scenario.waypoints) <= 60 for scenario in drawn)
     assert all(5 <= len(scenario.obstacles) <= 20 for scenario in drawn)
-    assert drawn[3] == draw_scenario(seeds[3])
+    assert drawn[3] == sample_scenario(seeds[3])
 
 
 def test_a_finished_flight_is_kept_and_not_flown_again(mission, monkeypatch):

@@ -9,7 +9,7 @@ from uas_coverage_env import generate_scenario
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.geometry import segment_clearance
 from uas_coverage_env.world import build_arena
-from uas_coverage_env.world.boxes import (
+from uas_coverage_env.world.broad_phase import (
     BLOCK,
     BOX,
     N_COLUMNS,

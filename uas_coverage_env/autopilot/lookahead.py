@@ -3,7 +3,7 @@
 import math
 
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
 from uas_coverage_env.vehicle import (
     N_INPUTS,
@@ -87,9 +87,9 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
     """Like `fly_and_brake`, with the command flown for n_held steps."""
     n_steps = path_m.shape[0] - 1
     vehicle = arena.vehicles[i]
-    x = room(N_STATES)
-    governed = room(2)
-    u = room(N_INPUTS)
+    x = stack_array(N_STATES)
+    governed = stack_array(2)
+    u = stack_array(N_INPUTS)
     for k in range(N_STATES):
         x[k] = start[k]
     for k in range(2):
@@ -174,8 +174,8 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     Returns:
         The smaller of slack_m and the distance to spare [m].
     """
-    low = room(3)
-    high = room(3)
+    low = stack_array(3)
+    high = stack_array(3)
     _box_of(path_m, n_flown, low, high)
     slack_m = _fence_slack(arena, path_m, n_flown, low, high, slack_m)
     normals = arena.normals

@@ -10,7 +10,7 @@ import typer
 
 from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle, warm_up
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
-from uas_coverage_env.cli.outside import add_outside_commands
+from uas_coverage_env.cli.plugins import add_plugin_commands
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import PlannerError
 
@@ -54,7 +54,7 @@ app.command("replay")(replay.replay)
 app.command("figure")(figure.figure)
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(vehicle.app, name="vehicle")
-add_outside_commands(app)
+add_plugin_commands(app)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -31,7 +31,7 @@ from uas_coverage_env.leaderboard import (
     fly_all,
     jobs_of,
     opened,
-    players_of,
+    planner_specs_of,
     scenarios_of,
     seed_range,
     source_of,
@@ -106,7 +106,7 @@ def compare(
     """
     sweep = Sweep(
         scenarios_of(scenarios),
-        players_of(planners, option or ()),
+        planner_specs_of(planners, option or ()),
         seed_range("--seeds", seeds),
         dynamics,
         safety_filter,

@@ -8,8 +8,8 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.spinner import Spinner
 
+from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.cli.text_map import TextMap
 from uas_coverage_env.cli.watch import FlightWindow
 from uas_coverage_env.draw import NoDisplayError
 from uas_coverage_env.flight import Planner, Progress
@@ -34,11 +34,11 @@ def shown(
             there is no display.
     """
     window = None if watch is None else _window(out, scenario, watch)
-    text_map = None
+    ascii_map = None
     if watch is not None and window is None:
-        text_map = TextMap(scenario, *out.size)
+        ascii_map = AsciiMap(scenario, *out.size)
     try:
-        with _lines(out, text_map) as write:
+        with _lines(out, ascii_map) as write:
 
             def update(progress: Progress) -> None:
                 write(progress)
@@ -61,7 +61,7 @@ def _window(out: Console, scenario: Scenario, planner: Planner) -> FlightWindow 
 
 
 @contextmanager
-def _lines(out: Console, text_map: TextMap | None) -> Iterator[Callable[[Progress], object]]:
+def _lines(out: Console, ascii_map: AsciiMap | None) -> Iterator[Callable[[Progress], object]]:
     if not out.is_terminal:
         yield _PlainLines(out)
         return
@@ -76,7 +76,7 @@ def _lines(out: Console, text_map: TextMap | None) -> Iterator[Callable[[Progres
                 compiling.close()
                 live.start()
             line = Spinner("dots", progress_line(progress))
-            live.update(line if text_map is None else Group(text_map.drawn(progress.swarm), line))
+            live.update(line if ascii_map is None else Group(ascii_map.drawn(progress.swarm), line))
 
         yield update
 

@@ -3,7 +3,7 @@
 Numba counts a reference for every array that a kernel takes out of a named tuple or slices, with
 an atomic instruction; in one step of two UAS that is as much work as the flight. The arrays of a
 step outlive it, so nothing has to be counted. The price is that such a kernel cannot make arrays:
-what it needs for a while lies on the stack (`room`). The same source compiles for a GPU.
+what it needs for a while lies on the stack (`stack_array`). The same source compiles for a GPU.
 
 Whatever is compiled with these decorators is kept on disk by the contents of its sources
 (`cache.py`).
@@ -90,7 +90,7 @@ def interpreted(kernel: Any) -> Callable[..., Any]:
     return getattr(kernel, "py_func", kernel)
 
 
-def room(size: int) -> NDArray[np.float64]:
+def stack_array(size: int) -> NDArray[np.float64]:
     """An array for the time of one call, in a kernel on the stack.
 
     Args:
@@ -102,8 +102,8 @@ def room(size: int) -> NDArray[np.float64]:
     return np.empty(size)
 
 
-def single_room(size: int) -> NDArray[np.float32]:
-    """`room` for single precision."""
+def stack_array_f32(size: int) -> NDArray[np.float32]:
+    """`stack_array` for single precision."""
     return np.empty(size, np.float32)
 
 
@@ -153,5 +153,5 @@ def _trailing_zeros() -> Any:
 
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
     lowest_bit = _trailing_zeros()
-    room = _on_the_stack(types.float64, ir.DoubleType())
-    single_room = _on_the_stack(types.float32, ir.FloatType())
+    stack_array = _on_the_stack(types.float64, ir.DoubleType())
+    stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.borrow import view_of
+from uas_coverage_env.compiled.array_views import view_of
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
 
 _COMPILED = not config.DISABLE_JIT  # pyright: ignore[reportAttributeAccessIssue]

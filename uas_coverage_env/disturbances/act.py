@@ -12,7 +12,7 @@ import numpy as np
 from numba import typeof, types
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.random import counted
@@ -125,7 +125,7 @@ def _act_on_all(arena, state, disturbances, outcome):
             block = arena.disturbances[d]
             if not block.acts:
                 continue
-            parameters = part(arena.disturbance_parameters, block.first, block.n)
+            parameters = slice_view(arena.disturbance_parameters, block.first, block.n)
             memory = state.disturbance_memory[i, d]
             random = state.disturbance_random[i, d]
             if disturbances is None:

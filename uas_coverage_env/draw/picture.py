@@ -131,14 +131,14 @@ class Picture:
         self._captions(image, draw, swarm)
         return self._canvas.smoothed()
 
-    def twin(self) -> "Picture":
+    def clone(self) -> "Picture":
         """Another one for the same scenario that shares background and canvas.
 
         It is for states that take turns with those of this one, such as another mission's.
         """
-        twin = copy(self)
-        twin._map = None
-        return twin
+        clone = copy(self)
+        clone._map = None
+        return clone
 
     def _map_with_waypoints(self, uncovered: NDArray[np.bool_]) -> "Image":
         if self._map is None:

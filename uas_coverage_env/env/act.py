@@ -11,7 +11,7 @@ from numba.np import numpy_support
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import write_brake
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
@@ -173,7 +173,7 @@ def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
         return
     for i in range(scratch.commands.shape[0]):
         begin_command(tables, learners, scratch, acting, i)
-        values = part(scratch.values, i * size, size)
+        values = slice_view(scratch.values, i * size, size)
         command = scratch.commands[i]
         if which != _OWN:
             _write_as_usual(

@@ -23,7 +23,7 @@ from uas_coverage_env.env.batch_kernel import (
     REST,
     SAME_STEP,
     BatchRules,
-    Lanes,
+    SubEnvironments,
     new_missions,
     step_batch,
     step_batch_in_threads,
@@ -33,9 +33,9 @@ from uas_coverage_env.env.express import joint_action_of, moment_of
 from uas_coverage_env.env.kernel import ACCEPTED, Rules
 from uas_coverage_env.env.memory import LEARNERS, Learners
 from uas_coverage_env.env.observe import observing_of
-from uas_coverage_env.env.pay import paying_of
-from uas_coverage_env.env.put_aside import check_like, check_values
+from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.state_dict import check_like, check_values
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
@@ -125,7 +125,7 @@ class CoverageBatch:
         return self.missions.learners
 
     @property
-    def lanes(self) -> Lanes:
+    def lanes(self) -> SubEnvironments:
         """What the lanes are doing."""
         return self.missions.lanes
 

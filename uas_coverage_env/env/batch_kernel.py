@@ -9,7 +9,7 @@ from numba import prange
 from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.borrow import borrow
+from uas_coverage_env.compiled.array_views import rows_view
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.random import SEEDS, counted
@@ -33,15 +33,15 @@ from uas_coverage_env.env.memory import (
 from uas_coverage_env.env.observation import K_WAYPOINTS, OBSERVATION
 from uas_coverage_env.env.observation.nearest import NO_TARGET
 from uas_coverage_env.env.observe import observing_of
-from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.pool import (
     MissionPool,
     ScenarioPool,
     first_learners_at,
-    first_look_at,
+    first_observation_at,
     learners_of,
     tables_at,
 )
+from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.world import ABSENT, FLYING, WorldState
@@ -60,7 +60,7 @@ SWARM_ENERGY, SWARM_COVERED, SWARM_REWARD, SWARM_FIRST_TERM = range(4)
 SWARM_FIRST_TERM on the sums of its terms."""
 
 
-class Lanes(NamedTuple):
+class SubEnvironments(NamedTuple):
     """What L lanes are doing, with room for U UAS."""
 
     seed: Annotated[NDArray[np.uint64], "L"]
@@ -81,7 +81,7 @@ class Lanes(NamedTuple):
     """One still flies after the last step allowed."""
 
 
-LANES = Memory(Lanes)
+LANES = Memory(SubEnvironments)
 
 
 class Final(NamedTuple):
@@ -107,7 +107,7 @@ class Missions(NamedTuple):
     """With an axis of lanes in front."""
     learners: Learners
     """Likewise."""
-    lanes: Lanes
+    lanes: SubEnvironments
     final: Final
     scratch: Scratch
     """With an axis of threads in front: all lanes that a thread flies share them, so they stay in
@@ -186,8 +186,8 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
     n_uas = first.report.shape[0]
     n_covered = first.report[0, COVERED]
-    seen = first_look_at(pool.looks, s).observation
-    _copy(seen, borrow(observation, lane, seen.shape))
+    seen = first_observation_at(pool.first_observations, s).observation
+    _copy(seen, rows_view(observation, lane, seen.shape))
     report = missions.learners.report
     for i in range(n_uas, report.shape[1]):
         missions.worlds.status[lane, i] = ABSENT
@@ -222,7 +222,7 @@ def _add_up(worlds, lanes, learners, lane, max_steps):
         if i < n_uas:
             flies |= worlds.status[lane, i] == FLYING
             lanes.rewards[lane, i] = report[i, REWARD]
-    swarm = borrow(lanes.swarm, lane, (lanes.swarm.shape[1],))
+    swarm = rows_view(lanes.swarm, lane, (lanes.swarm.shape[1],))
     for column in range(swarm.shape[0]):
         swarm[column] = 0.0
     for i in range(n_uas):
@@ -256,7 +256,7 @@ def _keep_end(missions, lane, observation, width):
     """Keep the end of a mission, before the next begins in the same step."""
     final = missions.final
     whole = (observation.shape[1], width)
-    _copy(borrow(observation, lane, whole), borrow(final.observation, lane, whole))
+    _copy(rows_view(observation, lane, whole), rows_view(final.observation, lane, whole))
     _copy(missions.learners.report[lane], final.report[lane])
     _copy(missions.learners.candidates[lane], final.candidates[lane])
     for column in range(final.swarm.shape[1]):
@@ -269,7 +269,7 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
     lanes = missions.lanes
     if order == REST:
         whole = (observation.shape[1], width)
-        _copy(borrow(before, lane, whole), borrow(observation, lane, whole))
+        _copy(rows_view(before, lane, whole), rows_view(observation, lane, whole))
         return
     begins = order != FLY
     if begins:
@@ -288,7 +288,7 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
         step_learners(
             arena, state, tables_at(pool.tables, s), learners,
             _scratch_of(missions.scratch, thread, pool.arenas, s), rules,
-            borrow(observation, lane, (n_uas, width)),
+            rows_view(observation, lane, (n_uas, width)),
         )  # fmt: skip
         over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
         if over and autoreset == NEXT_STEP:
@@ -314,7 +314,7 @@ def _all_finite(numbers):
 def _first_refused(pool, missions, orders):
     """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
     asked = missions.learners.asked
-    if _all_finite(borrow(asked, 0, (asked.size,))):
+    if _all_finite(rows_view(asked, 0, (asked.size,))):
         return ACCEPTED
     for lane in range(asked.shape[0]):
         if orders[lane] != FLY:

@@ -28,26 +28,26 @@ from uas_coverage_env.env.act import (
 )
 from uas_coverage_env.env.kernel import ACCEPTED, finish_step
 from uas_coverage_env.env.memory import (
+    FIRST_OBSERVATION,
     LEARNERS,
-    LOOK,
     REWARD,
     SCRATCH,
     STATUS,
+    FirstObservation,
     Learners,
-    Look,
     Scratch,
 )
 from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.env.observe import observing_of
-from uas_coverage_env.env.pay import paying_of
 from uas_coverage_env.env.pool import (
     MissionPool,
     ScenarioPool,
     first_learners_at,
-    first_look_at,
+    first_observation_at,
     learners_of,
     tables_at,
 )
+from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
@@ -65,7 +65,7 @@ class Missions(NamedTuple):
 
     worlds: WorldState
     learners: Learners
-    looks: Look
+    first_observations: FirstObservation
     scratch: Scratch
     rewards: NDArray[np.float64]
     """(N, U) of each UAS for the latest step."""
@@ -78,7 +78,7 @@ class Missions(NamedTuple):
 
 
 _scratch_of = lane_view(SCRATCH, sized_by=ARENA)
-_look_of = lane_view(LOOK, sized_by=ARENA)
+_look_of = lane_view(FIRST_OBSERVATION, sized_by=ARENA)
 
 
 @kernel
@@ -96,7 +96,7 @@ def step_mission(pool, acting, paying, observing, missions, nonlinear, lane):
     """
     state = state_of(missions.worlds, lane, pool.arenas, 0)
     learners = learners_of(missions.learners, lane, pool.arenas, 0)
-    seen = _look_of(missions.looks, lane, pool.arenas, 0)
+    seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
     missions.refused[lane] = first_not_finite(learners.asked) != ACCEPTED
     if missions.refused[lane]:
         return
@@ -104,7 +104,7 @@ def step_mission(pool, acting, paying, observing, missions, nonlinear, lane):
         missions.ended[lane] = False
         copy_arrays(start_of(pool.starts, 0), state)
         copy_arrays(first_learners_at(pool.learners, 0), learners)
-        copy_arrays(first_look_at(pool.looks, 0), seen)
+        copy_arrays(first_observation_at(pool.first_observations, 0), seen)
         for i in range(state.status.shape[0]):
             missions.rewards[lane, i] = 0.0
         return
@@ -225,7 +225,7 @@ class CudaMissions:
         missions = Missions(
             lanes_of(num_envs, pool.arrays.starts),
             LEARNERS.zeros(pool.sizes, lanes=num_envs),
-            LOOK.zeros(pool.sizes, lanes=num_envs),
+            FIRST_OBSERVATION.zeros(pool.sizes, lanes=num_envs),
             SCRATCH.zeros(pool.sizes, lanes=num_envs),
             np.zeros((num_envs, n_uas)),
             np.zeros(num_envs, dtype=np.bool_),
@@ -262,7 +262,7 @@ def _begin_all(pool: MissionPool, missions: Missions) -> None:
     parts = (
         (missions.worlds, STATE.mission(pool.starts, 0)),
         (missions.learners, LEARNERS.mission(pool.learners, 0)),
-        (missions.looks, LOOK.mission(pool.looks, 0)),
+        (missions.first_observations, FIRST_OBSERVATION.mission(pool.first_observations, 0)),
     )
     for arrays, first in parts:
         for array, start in zip(arrays, first, strict=True):

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.slots import Slots
-from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES
+from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES
 from uas_coverage_env.env.pool import MissionPool, ScenarioPool
-from uas_coverage_env.env.put_aside import check_values
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import fitted_to, in_slots
 from uas_coverage_env.world.state import STATE
 
-_MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, LOOK)
+_MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, FIRST_OBSERVATION)
 _WORDS = 6
 _WORD = 2**64 - 1
 

@@ -17,9 +17,9 @@ from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
 from uas_coverage_env.env.named import namer_of
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observe import observe, observing_of
-from uas_coverage_env.env.pay import paying_of
+from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
+from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES, SwarmState
@@ -129,7 +129,7 @@ class Episode:
         self._world.reset(seed, mission)
         self.steps = 0
         if self._first is None:
-            self._first = first_look(
+            self._first = first_observation(
                 self._world.arena, self._world.state, self.tables, self._observing, self._sizes
             )
         first, observation = self._first

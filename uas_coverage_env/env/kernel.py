@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.act import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
@@ -22,7 +22,7 @@ from uas_coverage_env.env.memory import (
 )
 from uas_coverage_env.env.observation.nearest import count_company
 from uas_coverage_env.env.observe import observe_one
-from uas_coverage_env.env.pay import pay
+from uas_coverage_env.env.reward_kernel import compute_rewards
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.world import FLYING
 
@@ -45,10 +45,10 @@ class Rules(NamedTuple):
 
 @inlined_kernel
 def finish_step(arena, state, tables, learners, scratch, paying, observing, observation, on_gpu):
-    """Pay for a step that was flown, and observe; arguments as for `step_learners` and `pay`."""
+    """Reward and observe a step; arguments as for `step_learners` and `compute_rewards`."""
     report = learners.report
     outcome = scratch.outcome
-    pay(arena, state, tables, learners, scratch, paying, on_gpu)
+    compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu)
     newly_covered = 0
     for i in range(report.shape[0]):
         newly_covered += outcome[i].newly_covered
@@ -124,9 +124,9 @@ def step_episode(at, nonlinear, before, observation):
             for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
     n_called = 1 + arena.disturbances.shape[0]
-    disturbances = part(at, _N_NUMBERS, n_called)
+    disturbances = slice_view(at, _N_NUMBERS, n_called)
     first = _N_NUMBERS + n_called
-    assistants = part(at, first, at.shape[0] - first)
+    assistants = slice_view(at, first, at.shape[0] - first)
     rules = Rules(acting, nonlinear, assistants, disturbances, paying, observing)
     step_learners(arena, state, tables, learners, scratch, rules, observation)
     return ACCEPTED

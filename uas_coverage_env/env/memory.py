@@ -48,7 +48,7 @@ class Learners(NamedTuple):
     """Of the latest step: the R terms of the reward, weighted."""
 
 
-class Look(NamedTuple):
+class FirstObservation(NamedTuple):
     """What is seen."""
 
     observation: Annotated[NDArray[np.float32], "U", "V"]
@@ -96,7 +96,7 @@ class Observing(NamedTuple):
     """Of all of them."""
 
 
-TABLES, LEARNERS, LOOK = Memory(Tables), Memory(Learners), Memory(Look)
+TABLES, LEARNERS, FIRST_OBSERVATION = Memory(Tables), Memory(Learners), Memory(FirstObservation)
 SCRATCH, ACTING = Memory(Scratch), Memory(Acting)
 PAYING, OBSERVING = Memory(Paying), Memory(Observing)
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
@@ -70,14 +70,16 @@ def observing_of(blocks: Sequence[ObservationBlock]) -> Observing:
 @inlined_kernel
 def _observe_as_usual(arena, state, tables, learners, i, row):
     """Write the blocks of `OBSERVATION`; what two of them need is computed once."""
-    home_dod = write_home(arena, state, i, part(row, _AT.home, _SIZE.home))
-    open_share = write_remaining(arena, state, i, part(row, _AT.remaining, _SIZE.remaining))
-    write_own(arena, state, tables, i, home_dod, open_share, part(row, _AT.own, _SIZE.own))
-    write_surroundings(arena, state, i, part(row, _AT.surroundings, _SIZE.surroundings))
-    write_waypoints(arena, state, tables, learners, i, part(row, _AT.waypoints, _SIZE.waypoints))
-    write_others(arena, state, tables, i, part(row, _AT.others, _SIZE.others))
+    home_dod = write_home(arena, state, i, slice_view(row, _AT.home, _SIZE.home))
+    open_share = write_remaining(arena, state, i, slice_view(row, _AT.remaining, _SIZE.remaining))
+    write_own(arena, state, tables, i, home_dod, open_share, slice_view(row, _AT.own, _SIZE.own))
+    write_surroundings(arena, state, i, slice_view(row, _AT.surroundings, _SIZE.surroundings))
+    write_waypoints(
+        arena, state, tables, learners, i, slice_view(row, _AT.waypoints, _SIZE.waypoints)
+    )
+    write_others(arena, state, tables, i, slice_view(row, _AT.others, _SIZE.others))
     write_moving_obstacles(
-        arena, state, tables, i, part(row, _AT.moving_obstacles, _SIZE.moving_obstacles)
+        arena, state, tables, i, slice_view(row, _AT.moving_obstacles, _SIZE.moving_obstacles)
     )
 
 
@@ -105,7 +107,8 @@ def observe_one(arena, state, tables, learners, observing, i, row, on_gpu):
             call = observing.calls[b]
             _write_block(
                 call[0], arena, state, tables, learners, i,
-                part(observing.parameters, call[3], call[4]), part(row, call[1], call[2]),
+                slice_view(observing.parameters, call[3], call[4]),
+                slice_view(row, call[1], call[2]),
             )  # fmt: skip
 
 

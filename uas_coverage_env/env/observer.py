@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.memory import LEARNERS, LOOK
+from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
 from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
 from uas_coverage_env.env.observe import observe, observing_of
@@ -44,7 +44,7 @@ class Observer:
         self._learners.targets[:] = NO_TARGET
         self._learners.candidates[:] = -1
         self._observing = observing_of(settings.observation)
-        self._observation = LOOK.zeros(sizes).observation
+        self._observation = FIRST_OBSERVATION.zeros(sizes).observation
         self.candidates = self._learners.candidates
 
     def observe(

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.memory import LEARNERS, LOOK, TABLES, Look
+from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES, FirstObservation
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.start import first_look, learners_sizes, tables_of
+from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
@@ -32,8 +32,8 @@ class MissionPool(NamedTuple):
     """Of `TABLES`."""
     learners: Pool
     """Of `LEARNERS`: at t = 0."""
-    looks: Pool
-    """Of `LOOK`: at t = 0."""
+    first_observations: Pool
+    """Of `FIRST_OBSERVATION`: at t = 0."""
 
 
 tables_at = pool_view(TABLES)
@@ -42,8 +42,8 @@ tables_at = pool_view(TABLES)
 first_learners_at = pool_view(LEARNERS)
 """In a kernel, (`MissionPool.learners`, s) -> the learners' arrays at the start of scenario s."""
 
-first_look_at = pool_view(LOOK)
-"""In a kernel, (`MissionPool.looks`, s) -> what is seen at the start of scenario s."""
+first_observation_at = pool_view(FIRST_OBSERVATION)
+"""In a kernel, (`MissionPool.first_observations`, s) -> what is seen at the start of scenario s."""
 
 learners_of = lane_view(LEARNERS, sized_by=ARENA)
 """In a kernel, (learners, lane, `MissionPool.arenas`, s) -> those of a lane in scenario s."""
@@ -99,7 +99,7 @@ class ScenarioPool:
         own_sizes = learners_sizes(settings, self.actions.size)
         observing = observing_of(settings.observation)
         first = [
-            first_look(
+            first_observation(
                 ARENA.mission(worlds.arenas, s),
                 STATE.mission(worlds.starts, s),
                 tables[s],
@@ -112,7 +112,7 @@ class ScenarioPool:
             *worlds,
             TABLES.pool(tables),
             LEARNERS.pool([learners for learners, _ in first]),
-            LOOK.pool([Look(observation) for _, observation in first]),
+            FIRST_OBSERVATION.pool([FirstObservation(observation) for _, observation in first]),
         )
         largest = {**STATE.largest(worlds.starts), **ARENA.largest(worlds.arenas)}
         self.sizes = {**largest, **own_sizes}

@@ -53,12 +53,12 @@ class Screen:
         """The scenario that it draws."""
         return self._scenario
 
-    def twin(self) -> "Screen":
+    def clone(self) -> "Screen":
         """A screen for another mission in the same scenario; both share what they draw on."""
-        twin = copy(self)
-        twin._picture = self._painter().twin()
-        twin._path_m = []
-        return twin
+        clone = copy(self)
+        clone._picture = self._painter().clone()
+        clone._path_m = []
+        return clone
 
     def begin(self, scenario: Scenario | None = None) -> None:
         """Forget the paths: a new mission begins.

@@ -7,8 +7,8 @@ from uas_coverage_env.env.actions import Actions
 from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
+    FIRST_OBSERVATION,
     LEARNERS,
-    LOOK,
     STATUS,
     Learners,
     Observing,
@@ -37,7 +37,7 @@ def learners_sizes(settings: MissionSettings, action_size: int) -> dict[str, int
     }
 
 
-def first_look(
+def first_observation(
     arena: Arena,
     state: WorldState,
     tables: Tables,
@@ -63,8 +63,8 @@ def first_look(
     learners.report[:, CONTACT_WITH] = -1
     learners.report[:, STATUS] = state.status
     learners.report[:, COVERED] = (~state.uncovered).sum()
-    look = LOOK.zeros(sizes)
+    first = FIRST_OBSERVATION.zeros(sizes)
     count_company(state.uncovered, tables.neighbours, learners.company)
     flying = state.status == FLYING
-    observe(arena, state, tables, learners, observing, flying, look.observation)
-    return learners, look.observation
+    observe(arena, state, tables, learners, observing, flying, first.observation)
+    return learners, first.observation

@@ -107,7 +107,7 @@ class Tiles:
             return
         # a background is megabytes: missions in the same scenario share it
         alike = next((screen for screen in screens if screen.scenario is scenario), None)
-        new = alike.twin() if alike else Screen(scenario, "rgb_array", size_px=self._size_px)
+        new = alike.clone() if alike else Screen(scenario, "rgb_array", size_px=self._size_px)
         screens[lane : lane + 1] = [new]
 
     def __getstate__(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from uas_coverage_env.files.folder import prepare_folder, write_files
+from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.metrics import summary
 from uas_coverage_env.flight.record import MODES, FlightRecord

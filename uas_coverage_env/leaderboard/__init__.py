@@ -2,7 +2,7 @@
 
 from uas_coverage_env.leaderboard.machine import machine
 from uas_coverage_env.leaderboard.picture import leaderboard_figure
-from uas_coverage_env.leaderboard.players import Player, players_of
+from uas_coverage_env.leaderboard.planner_specs import PlannerSpec, planner_specs_of
 from uas_coverage_env.leaderboard.publish import FLIGHTS, Comparison, failures, published, write
 from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES, Row
 from uas_coverage_env.leaderboard.scenario_sets import (
@@ -32,7 +32,7 @@ __all__ = [
     "Backend",
     "Comparison",
     "Entry",
-    "Player",
+    "PlannerSpec",
     "Row",
     "Scores",
     "StoppedError",
@@ -47,7 +47,7 @@ __all__ = [
     "leaderboard_figure",
     "machine",
     "opened",
-    "players_of",
+    "planner_specs_of",
     "published",
     "scenarios_of",
     "scores_of",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uas_coverage_env.files.folder import write_files
+from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture

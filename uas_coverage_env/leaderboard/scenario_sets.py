@@ -6,7 +6,7 @@ from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.hashing import content_hash
-from uas_coverage_env.scenario import Scenario, draw_scenario, load_scenario
+from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
@@ -86,4 +86,4 @@ def _scenarios(item: str) -> Iterator[Scenario]:
     else:
         yield load_scenario(item)
         return
-    yield from map(draw_scenario, seeds)
+    yield from map(sample_scenario, seeds)

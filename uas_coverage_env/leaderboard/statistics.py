@@ -116,8 +116,8 @@ def probability_of_improvement(
         return Estimate(value, *_interval(rows.reshape(len(rows), -1).mean(axis=-1)), n)
     if all(len(m) < 2 and len(t) < 2 for m, t in both):
         return Estimate(value, None, None, n)
-    lots = np.random.default_rng(0)
-    drawn = [_share_lower(_drawn(lots, m), _drawn(lots, t)) for m, t in both]
+    rng = np.random.default_rng(0)
+    drawn = [_share_lower(_drawn(rng, m), _drawn(rng, t)) for m, t in both]
     return Estimate(value, *_interval(np.mean(drawn, axis=0)), n)
 
 
@@ -154,10 +154,10 @@ def _seeds_drawn(table: FloatArray) -> FloatArray | None:
     counts = np.count_nonzero(~np.isnan(table), axis=1)
     if counts.max() < 2:
         return None
-    lots = np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     result = np.full((RESAMPLES, *table.shape), np.nan)
     for s, count in enumerate(counts):
-        result[:, s, :count] = _drawn(lots, table[s, :count])
+        result[:, s, :count] = _drawn(rng, table[s, :count])
     return result
 
 
@@ -165,12 +165,12 @@ def _scenarios_drawn(table: FloatArray) -> FloatArray | None:
     """(resamples, scenarios, flights) with scenarios drawn; None: there is one alone."""
     if len(table) < 2:
         return None
-    lots = np.random.default_rng(0)
-    return table[lots.integers(0, len(table), (RESAMPLES, len(table)))]
+    rng = np.random.default_rng(0)
+    return table[rng.integers(0, len(table), (RESAMPLES, len(table)))]
 
 
-def _drawn(lots: np.random.Generator, values: FloatArray) -> FloatArray:
-    return values[lots.integers(0, len(values), (RESAMPLES, len(values)))]
+def _drawn(rng: np.random.Generator, values: FloatArray) -> FloatArray:
+    return values[rng.integers(0, len(values), (RESAMPLES, len(values)))]
 
 
 def _share_lower(mine: FloatArray, theirs: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from uas_coverage_env.files.folder import prepare_folder
+from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.row import COLUMNS, Row
 from uas_coverage_env.leaderboard.sweep import difference

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from typing import Any
 
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
-from uas_coverage_env.leaderboard.players import Player
+from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
@@ -32,7 +32,7 @@ class Entry:
     key: str
     scenario_sha256: str
     scenario: Scenario
-    player: Player
+    player: PlannerSpec
     seed: int
     dynamics: Dynamics
     safety_filter: bool
@@ -51,7 +51,7 @@ class Sweep:
     """
 
     scenarios: Mapping[str, Scenario]
-    players: Mapping[str, Player]
+    players: Mapping[str, PlannerSpec]
     seeds: range
     dynamics: Dynamics = "lpv"
     safety_filter: bool = False
@@ -98,7 +98,7 @@ class Sweep:
         return {name: scenario_hash(scenario) for name, scenario in self.scenarios.items()}
 
 
-def source_of(players: Iterable[Player]) -> str:
+def source_of(players: Iterable[PlannerSpec]) -> str:
     """Hash of the source code that flies: the world's and the players'.
 
     It is kept with each flight but is not part of its key: a comment that changes should not

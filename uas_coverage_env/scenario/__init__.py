@@ -2,7 +2,7 @@
 
 from uas_coverage_env.scenario.checks import warnings
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
-from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios, draw_scenario
+from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios, sample_scenario
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
@@ -35,9 +35,9 @@ __all__ = [
     "Uas",
     "Waypoint",
     "Wind",
-    "draw_scenario",
     "generate_scenario",
     "load_scenario",
+    "sample_scenario",
     "scenario_names",
     "warnings",
 ]

@@ -18,7 +18,7 @@ N_UAS, N_WAYPOINTS, N_OBSTACLES = (1, 4), (20, 60), (5, 20)
 _SEEDS = (2**31, 2**32)
 
 
-def draw_scenario(
+def sample_scenario(
     seed: int,
     n_uas: Range = N_UAS,
     n_waypoints: Range = N_WAYPOINTS,
@@ -46,7 +46,7 @@ def draw_scenario(
 class GeneratedScenarios:
     """A family of generated scenarios: an environment's `scenario=` that draws one at each reset.
 
-    Called with a generator of random numbers it draws a seed, and `draw_scenario` does the rest.
+    Called with a generator of random numbers it draws a seed, and `sample_scenario` does the rest.
     The seeds are above those of the leaderboard's sets, which nothing should be trained on.
 
     Attributes:
@@ -71,7 +71,7 @@ class GeneratedScenarios:
 
     def __call__(self, rng: np.random.Generator) -> Scenario:
         """Draw a scenario."""
-        return draw_scenario(
+        return sample_scenario(
             int(rng.integers(*_SEEDS)), self.n_uas, self.n_waypoints, self.n_obstacles
         )
 

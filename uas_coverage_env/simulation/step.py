@@ -4,7 +4,7 @@ import math
 
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.views import Layout
 from uas_coverage_env.disturbances.act import disturb
@@ -20,11 +20,11 @@ from uas_coverage_env.vehicle import (
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
+    check_fence_and_battery,
     check_limits,
+    check_obstacles,
+    check_separation,
     count_breaches,
-    judge_fence_and_battery,
-    judge_obstacles,
-    judge_separation,
 )
 from uas_coverage_env.world.coverage import cover, land
 from uas_coverage_env.world.outcome import NONE
@@ -123,7 +123,7 @@ def _fly(arena, state, nonlinear, disturbances, outcome):
 
 
 @inlined_kernel
-def _lose(state, outcome):
+def _mark_lost(state, outcome):
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING and outcome[i].contact != NONE:
             state.status[i] = LOST
@@ -137,14 +137,14 @@ def carry_out(arena, state, nonlinear, disturbances, outcome):
     There `disturbances` is None, see `disturb`.
     """
     _fly(arena, state, nonlinear, disturbances, outcome)
-    judge_obstacles(arena, state, outcome)
-    judge_separation(arena, state, outcome)
-    judge_fence_and_battery(arena, state, outcome)
+    check_obstacles(arena, state, outcome)
+    check_separation(arena, state, outcome)
+    check_fence_and_battery(arena, state, outcome)
     count_breaches(arena, state, outcome)
     cover(arena, state, outcome)
     land(arena, state, outcome)
     check_limits(arena, state, nonlinear, outcome)
-    _lose(state, outcome)
+    _mark_lost(state, outcome)
     state.step[0] += 1
 
 
@@ -199,6 +199,6 @@ def step_world(at, commands, nonlinear, assistants, outcome):
     arena, state = _views(at)
     invalid = first_invalid(arena, state, commands)
     if invalid == ACCEPTED:
-        disturbances = part(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
+        disturbances = slice_view(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
         advance(arena, state, commands, nonlinear, assistants, disturbances, outcome)
     return invalid

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY, VZ, WX, WY, WZ
 from uas_coverage_env.vehicle.params import VehicleParams
 
@@ -120,7 +120,7 @@ def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear, disturbed):
         nonlinear: See `write_limited`; it has a tolerance of its own.
         disturbed: Whether disturbances act; likewise.
     """
-    values = room(N_LIMITS)
+    values = stack_array(N_LIMITS)
     write_limited(x, voltage_V, current_A, nonlinear, values)
     tolerance = LPV_TOLERANCE
     if nonlinear:

@@ -12,7 +12,7 @@ loss of motor speed with a falling battery voltage.
 
 import math
 
-from uas_coverage_env.compiled.kernels import kernel, room
+from uas_coverage_env.compiled.kernels import kernel, stack_array
 from uas_coverage_env.vehicle.compiled import MAX_MOTORS
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
@@ -221,14 +221,14 @@ def plant_step(vehicle, x, u, x_next):
     steps = max(math.ceil(vehicle.dt_s / _SUBSTEP_S - 1e-9), 1)
     h = vehicle.dt_s / steps
     left = math.exp(-h / vehicle.time_constant_th_s)
-    first = room(6)
-    torque = room(3)
-    roll = room(3)
-    pitch = room(3)
-    slope = room(_RIGID)
-    total = room(_RIGID)
-    middle = room(_RIGID)
-    motors = room(MAX_MOTORS)
+    first = stack_array(6)
+    torque = stack_array(3)
+    roll = stack_array(3)
+    pitch = stack_array(3)
+    slope = stack_array(_RIGID)
+    total = stack_array(_RIGID)
+    middle = stack_array(_RIGID)
+    motors = stack_array(MAX_MOTORS)
     for s in range(x.shape[0]):
         x_next[s] = x[s]
     for s in range(6):

@@ -13,7 +13,7 @@ from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
-from uas_coverage_env.world.boxes import N_COLUMNS, SURE_M, obstacle_columns
+from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.world.disturbance import (
     DISTURBANCE_DTYPE,
@@ -302,8 +302,8 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     )
     rules["measured_m"] = max(
         measured_m,
-        radius_m + float(rules["safe_distance_max_m"][0]) + 2 * SURE_M,
-        2 * radius_m + scenario.uas_safe_distance_m + 2 * SURE_M,
+        radius_m + float(rules["safe_distance_max_m"][0]) + 2 * EPS_M,
+        2 * radius_m + scenario.uas_safe_distance_m + 2 * EPS_M,
     )
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
@@ -361,7 +361,7 @@ def _obstacles(
         planes.append((sides, footprint.equations[:, 2]))
         low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
         record["hull_middle_m"] = (low_m + high_m) / 2
-        record["hull_half_m"] = (high_m - low_m) / 2 + SURE_M
+        record["hull_half_m"] = (high_m - low_m) / 2 + EPS_M
         near = _widened(hull, near_m)
         record["first_face"] = first
         record["last_face"] = record["first_side"] = first + hull.n_faces
@@ -370,8 +370,8 @@ def _obstacles(
         record["safe_distance_m"] = obstacle.safe_distance_m
         record["near_m"] = near_m
         # the corners are rounded in the last digits: widen the box rather than miss a contact
-        record["lower_m"] = near.min(axis=0) - SURE_M
-        record["upper_m"] = near.max(axis=0) + SURE_M
+        record["lower_m"] = near.min(axis=0) - EPS_M
+        record["upper_m"] = near.max(axis=0) + EPS_M
         record["middle_m"] = (record["lower_m"] + record["upper_m"]) / 2
         record["per_half_m"] = 2 / (record["upper_m"] - record["lower_m"])
         record["rise_m"] = near_m - max(0.0, float(hull.signed_distance(record["middle_m"])))
@@ -390,8 +390,8 @@ def _measure(obstacles: NDArray[np.void], scenario: Scenario, measured_m: float)
     if measured_m < math.inf:
         for record, hull in zip(obstacles, scenario.hulls, strict=True):
             widened_m = _widened(hull, measured_m)
-            record["measured_lower_m"] = widened_m.min(axis=0) - SURE_M
-            record["measured_upper_m"] = widened_m.max(axis=0) + SURE_M
+            record["measured_lower_m"] = widened_m.min(axis=0) - EPS_M
+            record["measured_upper_m"] = widened_m.max(axis=0) + EPS_M
 
 
 def _free_nodes(

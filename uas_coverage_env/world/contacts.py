@@ -2,8 +2,8 @@
 
 import math
 
-from uas_coverage_env.compiled.borrow import borrow
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.array_views import rows_view
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.geometry import (
     cylinder_clearance,
     cylinder_gap,
@@ -12,10 +12,10 @@ from uas_coverage_env.geometry import (
     signed_distance,
 )
 from uas_coverage_env.vehicle import DOD, X, Y, Z, limits_exceeded
-from uas_coverage_env.world.boxes import (
+from uas_coverage_env.world.broad_phase import (
     BLOCK,
+    EPS_M,
     MEASURED,
-    SURE_M,
     write_lower_bounds,
     write_meetings,
 )
@@ -27,8 +27,8 @@ from uas_coverage_env.world.state import FLYING
 @kernel
 def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     """A lower bound of the clearance of a segment: the face that both ends are farthest from."""
-    faces = borrow(normals, first, (last - first, 3))
-    away_m = borrow(offsets_m, first, (last - first,))
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, (last - first,))
     largest = -math.inf
     for h in range(away_m.shape[0]):
         n0 = faces[h, 0]
@@ -43,7 +43,7 @@ def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
 @inlined_kernel
 def _likely_nearest(columns, x0, y0, z0, x1, y1, z1):
     """The obstacle with the least lower bound."""
-    bound_m = room(BLOCK)
+    bound_m = stack_array(BLOCK)
     likely = 0
     least_m = math.inf
     for first in range(0, columns.shape[1], BLOCK):
@@ -59,7 +59,7 @@ def _likely_nearest(columns, x0, y0, z0, x1, y1, z1):
 @inlined_kernel
 def _may_be_measured(columns, x0, y0, z0, x1, y1, z1):
     """Whether a segment comes near enough to an obstacle for the distance to matter."""
-    meets = room(BLOCK)
+    meets = stack_array(BLOCK)
     n_met = 0
     for first in range(0, columns.shape[1], BLOCK):
         n = min(BLOCK, columns.shape[1] - first)
@@ -93,7 +93,7 @@ def obstacle_clearance(arena, x0, y0, z0, x1, y1, z1):
     measured_m = arena.rules[0].measured_m
     smallest = min(smallest, measured_m)
     likely = nearest
-    bound_m = room(BLOCK)
+    bound_m = stack_array(BLOCK)
     for begin in range(0, n_obstacles, BLOCK):
         n = min(BLOCK, columns.shape[1] - begin)
         write_lower_bounds(columns, begin, n, x0, y0, z0, x1, y1, z1, bound_m)
@@ -148,7 +148,7 @@ def _separation(before_m, other_before_m, after, other_after, measured_m):
 
 
 @inlined_kernel
-def _blame(event, contact, index):
+def _record_contact(event, contact, index):
     """Note what a UAS was lost to; of several contacts in a step, the first code counts."""
     if event.contact == NONE:
         event.contact = contact
@@ -156,7 +156,7 @@ def _blame(event, contact, index):
 
 
 @inlined_kernel
-def judge_obstacles(arena, state, outcome):
+def check_obstacles(arena, state, outcome):
     """Clearances from fixed and moving obstacles over the step, and contacts with them."""
     step = min(state.step[0], arena.moving_path_m.shape[0] - 2)
     now_m = arena.moving_path_m[step]
@@ -175,7 +175,7 @@ def judge_obstacles(arena, state, outcome):
         smallest, nearest = obstacle_clearance(arena, x0, y0, z0, x1, y1, z1)
         radius_m = arena.uas[i].radius_m
         if smallest < radius_m:
-            _blame(event, OBSTACLE, nearest)
+            _record_contact(event, OBSTACLE, nearest)
         for m in range(arena.moving.shape[0]):
             moving = arena.moving[m]
             gap_m = cylinder_gap(
@@ -193,14 +193,14 @@ def judge_obstacles(arena, state, outcome):
                 continue
             clearance = moving_clearance(arena.moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1)
             if clearance < radius_m:
-                _blame(event, MOVING_OBSTACLE, m)
+                _record_contact(event, MOVING_OBSTACLE, m)
             if clearance < rules.measured_m:
                 smallest = min(smallest, clearance)
         event.obstacle_clearance_m = smallest
 
 
 @inlined_kernel
-def judge_separation(arena, state, outcome):
+def check_separation(arena, state, outcome):
     """Separations between flying UAS over the step, and contacts: both are lost."""
     n_uas = state.status.shape[0]
     measured_m = arena.rules[0].measured_m
@@ -216,12 +216,12 @@ def judge_separation(arena, state, outcome):
             outcome[i].separation_m = min(outcome[i].separation_m, apart_m)
             outcome[j].separation_m = min(outcome[j].separation_m, apart_m)
             if apart_m < arena.uas[i].radius_m + arena.uas[j].radius_m:
-                _blame(outcome[i], UAS, j)
-                _blame(outcome[j], UAS, i)
+                _record_contact(outcome[i], UAS, j)
+                _record_contact(outcome[j], UAS, i)
 
 
 @inlined_kernel
-def judge_fence_and_battery(arena, state, outcome):
+def check_fence_and_battery(arena, state, outcome):
     """Contacts with the geofence and the end of the battery.
 
     The fence is convex: a segment that starts inside leaves it only if its end lies outside.
@@ -241,9 +241,9 @@ def judge_fence_and_battery(arena, state, outcome):
         )
         outcome[i].fence_clearance_m = -outside_m
         if outside_m > 0.0:
-            _blame(outcome[i], FENCE, -1)
+            _record_contact(outcome[i], FENCE, -1)
         if state.x[i, DOD] > arena.uas[i].dod_max:
-            _blame(outcome[i], BATTERY, -1)
+            _record_contact(outcome[i], BATTERY, -1)
 
 
 @kernel
@@ -289,11 +289,11 @@ def count_breaches(arena, state, outcome):
         radius_m = arena.uas[i].radius_m
         count = 0
         # at the end of the segment nothing is nearer than it was somewhere on it; the same below
-        if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + SURE_M:
+        if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + EPS_M:
             count = _obstacle_breaches(arena, next_m, i, x, y, z)
         for j in range(state.status.shape[0]):
             keep_m = radius_m + arena.uas[j].radius_m + rules.uas_safe_distance_m
-            if event.separation_m > keep_m + SURE_M:
+            if event.separation_m > keep_m + EPS_M:
                 continue
             if j != i and state.status[j] == FLYING and outcome[j].contact == NONE:
                 other = state.x[j]

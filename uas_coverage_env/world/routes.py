@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.geometry import segment_meets, signed_distance
-from uas_coverage_env.world.boxes import BLOCK, BOX, write_meetings
+from uas_coverage_env.world.broad_phase import BLOCK, BOX, write_meetings
 
 _CREEP_M = 1e-3
 
@@ -123,7 +123,7 @@ def _obstructs(obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1):
 @inlined_kernel
 def line_is_clear(arena, x0, y0, z0, x1, y1, z1):
     """Whether the straight line in space keeps the distance of routes from every obstacle."""
-    meets = room(BLOCK)
+    meets = stack_array(BLOCK)
     columns = arena.obstacle_columns
     n_obstacles = arena.obstacles.shape[0]
     for first in range(0, n_obstacles, BLOCK):

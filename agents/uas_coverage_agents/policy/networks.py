@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from uas_coverage_agents.policy.gaze import Gaze
+from uas_coverage_agents.policy.attention import Attention
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.policy.tensors import Tensors, Width
 from uas_coverage_env.files.strict_toml import StrictModel
@@ -61,5 +61,5 @@ class Mlp(StrictModel):
         return np.tanh(x) if self.squash else x
 
 
-Network = Annotated[Gaze | Mlp | Pointer, Field(discriminator="kind")]
+Network = Annotated[Attention | Mlp | Pointer, Field(discriminator="kind")]
 """Any network; several kinds are told apart by `kind`."""

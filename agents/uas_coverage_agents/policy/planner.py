@@ -12,7 +12,7 @@ from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
 
 
-class Pilot(Protocol):
+class PolicyRunner(Protocol):
     """Flies a swarm with a policy of its interface; a planner without options."""
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -28,22 +28,22 @@ class Pilot(Protocol):
         ...
 
 
-PILOTS = {
-    "velocity": "uas_coverage_agents.velocity.pilot:VelocityPilot",
-    "waypoint": "uas_coverage_agents.waypoint.pilot:WaypointPilot",
+RUNNERS = {
+    "velocity": "uas_coverage_agents.velocity.policy_runner:VelocityRunner",
+    "waypoint": "uas_coverage_agents.waypoint.policy_runner:WaypointRunner",
 }
-"""Interface of a policy -> entry point of its pilot, made as `Pilot(policy, assistants)`; loaded
-where it flies, since pilots are made of what is in this package."""
+"""Interface of a policy -> entry point of its runner, `PolicyRunner(policy, assistants)`; loaded
+where it flies, since runners import this package."""
 
 
-def pilot_of(policy: Policy, assistants: Assistants) -> Pilot:
+def pilot_of(policy: Policy, assistants: Assistants) -> PolicyRunner:
     """The pilot that flies a policy.
 
     Raises:
         ValueError: The policy cannot be flown; says why.
     """
     interface = policy.description.interface
-    return EntryPoint(interface, PILOTS[interface], "").load()(policy, assistants)
+    return EntryPoint(interface, RUNNERS[interface], "").load()(policy, assistants)
 
 
 class PolicyPlanner:
@@ -66,11 +66,11 @@ class PolicyPlanner:
         self.argument = str(argument)
         self.policy = load_policy(argument)
         try:
-            self._pilot = self._piloted()
+            self._pilot = self._runner()
         except ValueError as error:
             raise InputError(f"{self.argument}: cannot be flown: {error}") from error
 
-    def _piloted(self) -> Pilot:
+    def _runner(self) -> PolicyRunner:
         return pilot_of(self.policy, self.assistants)
 
     @property

@@ -38,7 +38,7 @@ class CurvePoint(StrictModel):
     flight_steps: float
 
 
-class Standing(StrictModel):
+class TrainingState(StrictModel):
     """How far a training has come.
 
     Attributes:
@@ -73,7 +73,7 @@ class Checkpoint:
         tensors: Model, optimisers, random numbers and lanes, see `frozen`.
     """
 
-    standing: Standing
+    standing: TrainingState
     tensors: dict[str, NDArray[np.generic]]
 
 
@@ -129,7 +129,7 @@ def _read(path: Path) -> Checkpoint:
         raise InputError(f"{source}: cannot be read ({' '.join(str(error).split())})") from None
     if not isinstance(data, dict):
         raise InputError(f"{source}: should be an object, not {type(data).__name__}")
-    standing = parse(data, Standing, source)
+    standing = parse(data, TrainingState, source)
     if hashlib.sha256(content).hexdigest() != standing.tensors_sha256:
         raise InputError(f"{tensors_path}: is not what {path.name} was written with")
     try:

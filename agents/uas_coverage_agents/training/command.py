@@ -18,11 +18,11 @@ from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.config import load_config, published_names
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.files.folder import prepare_folder
+from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
 
 if TYPE_CHECKING:
-    from uas_coverage_agents.training.loop import Order, TrainingProgress
+    from uas_coverage_agents.training.loop import TrainingJob, TrainingProgress
 
 ORDER = "order.json"
 
@@ -92,19 +92,19 @@ def train(
         )
     loop, filelock = _learn_extra()
     name = Path(algorithm).stem
-    order = loop.Order(name, config, seed, minutes, missions, checkpoint_s)
+    job = loop.TrainingJob(name, config, seed, minutes, missions, checkpoint_s)
     directory = out or Path("trainings") / f"{name}-{seed}"
     screen = Console(highlight=False, soft_wrap=True)
-    _check_directory(directory, order, overwrite=overwrite)
+    _check_directory(directory, job, overwrite=overwrite)
     try:
         with filelock.FileLock(directory / ".lock", timeout=0), _shown(screen) as on_progress:
             if overwrite:
                 _throw_away(directory)
-            _note(directory, order, screen)
+            _note(directory, job, screen)
             if zip_file is not None:
-                policy = loop.import_zip(order, zip_file, directory)
+                policy = loop.import_zip(job, zip_file, directory)
             else:
-                policy = loop.train(order, directory, on_progress)
+                policy = loop.train(job, directory, on_progress)
     except filelock.Timeout:
         raise InputError(f"{directory}: another training is at work there") from None
     except KeyboardInterrupt:
@@ -129,18 +129,18 @@ def _learn_extra() -> tuple[Any, Any]:
     return loop, filelock
 
 
-def _record(order: "Order") -> dict[str, Any]:
+def _record(job: "TrainingJob") -> dict[str, Any]:
     """What has to be the same for a training to go on."""
     return {
-        "name": order.name,
-        "seed": order.seed,
-        "minutes": order.minutes,
-        "missions": order.missions,
-        "config": order.config.model_dump(mode="json"),
+        "name": job.name,
+        "seed": job.seed,
+        "minutes": job.minutes,
+        "missions": job.missions,
+        "config": job.config.model_dump(mode="json"),
     }
 
 
-def _check_directory(directory: Path, order: "Order", *, overwrite: bool) -> None:
+def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) -> None:
     """Refuse to mix a training with something else."""
     names = prepare_folder(directory) - {".lock"}
     if names and ORDER not in names:
@@ -151,7 +151,7 @@ def _check_directory(directory: Path, order: "Order", *, overwrite: bool) -> Non
         there = json.loads((directory / ORDER).read_bytes())
     except (OSError, ValueError, RecursionError):
         there = None
-    if there != json.loads(json.dumps(_record(order))):
+    if there != json.loads(json.dumps(_record(job))):
         raise InputError(
             f"{directory}: holds a training with other settings; give another --out, or start "
             f"anew with --overwrite"
@@ -168,12 +168,12 @@ def _throw_away(directory: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _note(directory: Path, order: "Order", screen: Console) -> None:
+def _note(directory: Path, job: "TrainingJob", screen: Console) -> None:
     path = directory / ORDER
     if path.exists():
         screen.print(f"{directory}: going on with the training there", markup=False)
         return
-    write_atomically(path, json.dumps(_record(order), indent=1).encode())
+    write_atomically(path, json.dumps(_record(job), indent=1).encode())
 
 
 @contextmanager

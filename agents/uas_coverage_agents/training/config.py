@@ -131,8 +131,8 @@ class TrainingConfig(StrictModel):
                 f"learning.algorithm is {self.learning.algorithm!r}, but player.interface is "
                 f"{self.player.interface!r}; waypoints need maskable-ppo, velocities ppo or sac"
             )
-        gaze = isinstance(self.player, VelocitySettings) and self.player.network == "gaze"
-        if gaze and self.learning.algorithm != "ppo":
+        attention = isinstance(self.player, VelocitySettings) and self.player.network == "gaze"
+        if attention and self.learning.algorithm != "ppo":
             raise ValueError("player.network is 'gaze', which is learned by ppo alone")
         return self
 

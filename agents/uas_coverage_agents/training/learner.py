@@ -11,7 +11,7 @@ from uas_coverage_agents.policy import Network, Observation
 from uas_coverage_agents.training.config import TrainingConfig
 
 
-class Lanes(Protocol):
+class StatefulVecEnv(Protocol):
     """A `VecEnv` that can be put aside and taken up again, bit for bit."""
 
     def state_dict(self) -> dict[str, NDArray[np.generic]]:
@@ -27,7 +27,7 @@ class Learner(Protocol):
     """How policies of one interface are trained."""
 
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
-        """The environment to learn in, seeded; it is a `Lanes` too."""
+        """The environment to learn in, seeded; it is a `StatefulVecEnv` too."""
         ...
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:

@@ -13,16 +13,16 @@ from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.checkpoint import (
     Checkpoint,
     CurvePoint,
-    Standing,
+    TrainingState,
     newest_checkpoint,
     write_checkpoint,
 )
-from uas_coverage_agents.training.freeze import frozen, thaw
+from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
 from uas_coverage_agents.training.scenarios import validation_scenarios
 from uas_coverage_agents.training.score import MEASURES
-from uas_coverage_agents.training.trainee import Order, Trainee
+from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 
-__all__ = ["Order", "TrainingProgress", "import_zip", "train"]
+__all__ = ["TrainingJob", "TrainingProgress", "import_zip", "train"]
 
 CHECKPOINTS = "checkpoints"
 POLICY = "policy"
@@ -48,7 +48,7 @@ class TrainingProgress:
 
 
 def train(
-    order: Order,
+    job: TrainingJob,
     directory: Path,
     on_progress: Callable[[TrainingProgress], object] = lambda _: None,
 ) -> Policy:
@@ -57,66 +57,72 @@ def train(
     `checkpoints/`, `tensorboard/`, `learning_curve.csv` and `.png`, and in the end `policy/`.
 
     Args:
-        order: What to train.
+        job: What to train.
         directory: Where; a checkpoint in it is gone on from.
         on_progress: Told now and then.
 
     Raises:
         InputError: The checkpoints there cannot be read or are those of another network.
     """
-    trainee = Trainee.untrained(order)
+    training_run = TrainingRun.untrained(job)
     before = newest_checkpoint(directory / CHECKPOINTS)
     if before is not None:
-        thaw(before.tensors, trainee.model, trainee.lanes)
-    watch = _Watch(trainee, directory, before.standing if before else None, on_progress)
+        from_arrays(before.tensors, training_run.model, training_run.lanes)
+    watch = _TrainingCallback(
+        training_run, directory, before.standing if before else None, on_progress
+    )
     if before is None or not before.standing.done:
-        model = trainee.model
+        model = training_run.model
         model.lr_schedule = watch.learning_rate
         model.set_logger(configure(str(directory / "tensorboard"), ["tensorboard"]))
-        end = order.config.steps if order.minutes is None else _NO_END
+        end = job.config.steps if job.minutes is None else _NO_END
         model.learn(end - model.num_timesteps, callback=watch, reset_num_timesteps=False)
         watch.finish()
-    trainee.lanes.close()
-    return trainee.publish(directory / POLICY)
+    training_run.lanes.close()
+    return training_run.publish(directory / POLICY)
 
 
-def import_zip(order: Order, zip_file: Path, directory: Path) -> Policy:
+def import_zip(job: TrainingJob, zip_file: Path, directory: Path) -> Policy:
     """Turn a model that Stable-Baselines3 has saved into a policy, scored like a trained one.
 
     Raises:
         InputError: The file is no such zip, or holds another network.
     """
-    trainee = Trainee.untrained(order)
-    trainee.read_zip(zip_file)
-    return trainee.publish(directory / POLICY)
+    training_run = TrainingRun.untrained(job)
+    training_run.read_zip(zip_file)
+    return training_run.publish(directory / POLICY)
 
 
-class _Watch(BaseCallback):
+class _TrainingCallback(BaseCallback):
     """Looks up between two updates: the only moments at which a training can be put aside."""
 
     def __init__(
         self,
-        trainee: Trainee,
+        training_run: TrainingRun,
         directory: Path,
-        standing: Standing | None,
+        standing: TrainingState | None,
         on_progress: Callable[[TrainingProgress], object],
     ) -> None:
         super().__init__()
-        self._trainee, self._directory, self._on_progress = trainee, directory, on_progress
-        order = trainee.order
+        self._training_run, self._directory, self._on_progress = (
+            training_run,
+            directory,
+            on_progress,
+        )
+        job = training_run.job
         self._points = list(standing.curve) if standing else []
         self._process_before_s = (standing.process_s if standing else 0.0) - time.process_time()
         self._wall_before_s = (standing.wall_s if standing else 0.0) - time.monotonic()
         self._saved_at_s = time.monotonic()
         self._scenarios = validation_scenarios(
-            order.config.scenarios.family, min(order.missions, _CURVE_MISSIONS)
+            job.config.scenarios.family, min(job.missions, _CURVE_MISSIONS)
         )
         self._share = 0.0
         self._look_at_the_clock()
 
     def learning_rate(self, _: float) -> float:
         """Falls linearly with what is done of the training."""
-        learning = self._trainee.order.config.learning
+        learning = self._training_run.job.config.learning
         left = learning.final_share + (1.0 - learning.final_share) * (1.0 - self._share)
         return learning.learning_rate * left
 
@@ -130,24 +136,24 @@ class _Watch(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         self._look_at_the_clock()
-        order = self._trainee.order
-        if order.minutes is None:
-            self._share = min(1.0, self.model.num_timesteps / order.config.steps)
+        job = self._training_run.job
+        if job.minutes is None:
+            self._share = min(1.0, self.model.num_timesteps / job.config.steps)
         else:
-            self._share = min(1.0, self._trainee.wall_s / (60.0 * order.minutes))
+            self._share = min(1.0, self._training_run.wall_s / (60.0 * job.minutes))
         if self._share * _CURVE_POINTS >= len(self._points):
             self._fly()
-        if time.monotonic() - self._saved_at_s >= order.checkpoint_s:
+        if time.monotonic() - self._saved_at_s >= job.checkpoint_s:
             self._save(done=False)
         self._tell()
 
     def _on_step(self) -> bool:
         # the clock is looked at before a rollout, so that none is thrown away
-        return self._trainee.order.minutes is None or self._share < 1.0
+        return self._training_run.job.minutes is None or self._share < 1.0
 
     def _look_at_the_clock(self) -> None:
-        self._trainee.process_s = self._process_before_s + time.process_time()
-        self._trainee.wall_s = self._wall_before_s + time.monotonic()
+        self._training_run.process_s = self._process_before_s + time.process_time()
+        self._training_run.wall_s = self._wall_before_s + time.monotonic()
 
     def _tell(self) -> None:
         point = self._points[-1] if self._points else None
@@ -155,27 +161,27 @@ class _Watch(BaseCallback):
 
     def _save(self, *, done: bool) -> None:
         """Put the training aside."""
-        standing = Standing(
+        standing = TrainingState(
             steps=self.model.num_timesteps,
             updates=self.model._n_updates,
-            process_s=self._trainee.process_s,
-            wall_s=self._trainee.wall_s,
+            process_s=self._training_run.process_s,
+            wall_s=self._training_run.wall_s,
             done=done,
             curve=tuple(self._points),
         )
-        checkpoint = Checkpoint(standing, frozen(self.model, self._trainee.lanes))
+        checkpoint = Checkpoint(standing, to_arrays(self.model, self._training_run.lanes))
         write_checkpoint(self._directory / CHECKPOINTS, checkpoint)
         self._saved_at_s = time.monotonic()
 
     def _fly(self) -> None:
         """Fly validation missions for the learning curve; the training's generator is not used."""
-        results = self._trainee.flights(self._scenarios)
+        results = self._training_run.flights(self._scenarios)
         means = dict(zip(MEASURES, results.mean(axis=0).tolist(), strict=True))
         self._points.append(
             CurvePoint(
                 steps=self.model.num_timesteps,
-                process_s=self._trainee.process_s,
-                wall_s=self._trainee.wall_s,
+                process_s=self._training_run.process_s,
+                wall_s=self._training_run.wall_s,
                 **{name: mean for name, mean in means.items() if name in CurvePoint.model_fields},
             )
         )

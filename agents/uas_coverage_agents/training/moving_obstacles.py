@@ -23,8 +23,8 @@ def some_with_moving_obstacles(
         share: Of those that get some, 0 to 1.
         seed: Of the training.
     """
-    lots = np.random.default_rng([seed, len(scenarios)])
-    moving = lots.random(len(scenarios)) < share
+    rng = np.random.default_rng([seed, len(scenarios)])
+    moving = rng.random(len(scenarios)) < share
     return [
         with_moving_obstacles(scenario, seed * len(scenarios) + number) if moves else scenario
         for number, (scenario, moves) in enumerate(zip(scenarios, moving, strict=True))
@@ -33,22 +33,22 @@ def some_with_moving_obstacles(
 
 def with_moving_obstacles(scenario: Scenario, seed: int) -> Scenario:
     """The scenario with one or two obstacles that are parked and leave, or cross it slowly."""
-    lots = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     corners_m = np.array(scenario.geofence.vertices_m)
     moving = tuple(
-        _moving_obstacle(lots, f"moving_{m + 1}", corners_m.min(axis=0), corners_m.max(axis=0))
-        for m in range(int(lots.integers(1, 3)))
+        _moving_obstacle(rng, f"moving_{m + 1}", corners_m.min(axis=0), corners_m.max(axis=0))
+        for m in range(int(rng.integers(1, 3)))
     )
     return scenario.model_copy(update={"moving_obstacles": moving})
 
 
 def _moving_obstacle(
-    lots: np.random.Generator, name: str, low_m: np.ndarray, high_m: np.ndarray
+    rng: np.random.Generator, name: str, low_m: np.ndarray, high_m: np.ndarray
 ) -> MovingObstacle:
     west_m = min(low_m[1] + _FREE_WEST_M, high_m[1])
-    start_m = lots.uniform((low_m[0], west_m), high_m[:2])
-    if lots.random() < 0.5:
-        leaves_s = float(lots.uniform(*_DEPARTURE_S))
+    start_m = rng.uniform((low_m[0], west_m), high_m[:2])
+    if rng.random() < 0.5:
+        leaves_s = float(rng.uniform(*_DEPARTURE_S))
         pieces = (
             (0.0, (0.0, 0.0, 0.0)),
             (leaves_s, (0.0, 0.0, -3.0)),
@@ -56,14 +56,14 @@ def _moving_obstacle(
             (leaves_s + 66.0, (0.0, 0.0, 0.0)),
         )
     else:
-        heading = float(lots.uniform(0.0, 2.0 * np.pi))
-        speed_mps = float(lots.uniform(*_SPEED_MPS))
+        heading = float(rng.uniform(0.0, 2.0 * np.pi))
+        speed_mps = float(rng.uniform(*_SPEED_MPS))
         pieces = ((0.0, (speed_mps * np.cos(heading), speed_mps * np.sin(heading), 0.0)),)
     return MovingObstacle(
         name=name,
         radius_m=8.0,
-        height_m=float(lots.uniform(6.0, 30.0)),
-        safe_distance_m=float(lots.uniform(*_SAFE_DISTANCE_M)),
+        height_m=float(rng.uniform(6.0, 30.0)),
+        safe_distance_m=float(rng.uniform(*_SAFE_DISTANCE_M)),
         start_m=(float(start_m[0]), float(start_m[1]), -5.0),
         schedule=tuple(
             ScheduledVelocity(from_s=from_s, velocity_mps=velocity_mps)

@@ -18,7 +18,7 @@ _OUTLOOK = [
 """Columns that tell, linearly, most of what a mission will still cost."""
 
 
-class Pool(nn.Module):
+class SetPooling(nn.Module):
     """Candidates and team in; what each candidate, and what all together are like, out."""
 
     def __init__(self, pointer: Pointer) -> None:
@@ -43,7 +43,7 @@ class Pool(nn.Module):
         return candidates, e, torch.relu(self.team(torch.cat([team, mean], 1)))
 
 
-class Actor(nn.Module):
+class PointerActor(nn.Module):
     """The network that flies, weight for weight."""
 
     def __init__(self, pointer: Pointer) -> None:
@@ -51,7 +51,7 @@ class Actor(nn.Module):
         h = pointer.hidden
         self._way = pointer.way
         self._prior = pointer.prior
-        self.pool = Pool(pointer)
+        self.pool = SetPooling(pointer)
         self.score_candidate = nn.Linear(h, h, bias=False)
         self.score_team = nn.Linear(h, h)
         self.score_out = nn.Linear(h, 1, bias=False)
@@ -76,7 +76,7 @@ class Critic(nn.Module):
 
     def __init__(self, pointer: Pointer) -> None:
         super().__init__()
-        self.pool = Pool(pointer)
+        self.pool = SetPooling(pointer)
         self.out = nn.Linear(pointer.hidden, pointer.hidden)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
@@ -101,7 +101,9 @@ class PointerPolicy(MaskableActorCriticPolicy):
     def _build_mlp_extractor(self) -> None:
         pointer = self.pointer
         critic_width = pointer.hidden + len(_OUTLOOK)
-        both: Any = ActorCritic(Actor(pointer), pointer.outputs, Critic(pointer), critic_width)
+        both: Any = ActorCritic(
+            PointerActor(pointer), pointer.outputs, Critic(pointer), critic_width
+        )
         self.mlp_extractor = both
 
     def _build(self, lr_schedule: Any) -> None:

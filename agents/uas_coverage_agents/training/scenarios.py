@@ -2,7 +2,7 @@
 
 from uas_coverage_agents.policy import ScenarioFamily, Towns
 from uas_coverage_agents.training.config import TrainingScenarios
-from uas_coverage_env.scenario import Scenario, draw_scenario, load_scenario
+from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
 
 VALIDATION = Towns(first_seed=900_000, n_uas=(1, 4), n_waypoints=(20, 60), n_obstacles=(5, 20))
 """What learners are validated on; nothing is trained on these seeds."""
@@ -10,7 +10,7 @@ VALIDATION = Towns(first_seed=900_000, n_uas=(1, 4), n_waypoints=(20, 60), n_obs
 
 def town(towns: Towns, number: int) -> Scenario:
     """One of the towns: seed `first_seed + number` draws the counts, then the town itself."""
-    return draw_scenario(
+    return sample_scenario(
         towns.first_seed + number, towns.n_uas, towns.n_waypoints, towns.n_obstacles
     )
 

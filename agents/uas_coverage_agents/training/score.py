@@ -39,10 +39,12 @@ def fly(
         (missions, measures) in the order of MEASURES.
     """
     assistants = Assistants(return_mode=return_mode, safety_filter=safety_filter)
-    pilot = pilot_of(policy, assistants)
+    runner = pilot_of(policy, assistants)
     return np.array(
         [
-            measured(rollout(scenario, pilot, safety_filter=safety_filter, return_mode=return_mode))
+            measured(
+                rollout(scenario, runner, safety_filter=safety_filter, return_mode=return_mode)
+            )
             for scenario in scenarios
         ]
     )

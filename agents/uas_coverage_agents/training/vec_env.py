@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from uas_coverage_env.env import CoverageBatch, observation_bounds
 from uas_coverage_env.env.memory import STATUS
-from uas_coverage_env.env.put_aside import check_like, check_values
+from uas_coverage_env.env.state_dict import check_like, check_values
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING
 

@@ -15,12 +15,12 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from uas_coverage_agents.policy import Mlp, Network, Observation
+from uas_coverage_agents.training.attention import AttentionPolicy
 from uas_coverage_agents.training.config import SacSettings, TrainingConfig
-from uas_coverage_agents.training.gaze import GazePolicy
 from uas_coverage_agents.training.moving_obstacles import some_with_moving_obstacles
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
-from uas_coverage_agents.velocity.pilot import OUTPUTS, gaze, observation
+from uas_coverage_agents.velocity.policy_runner import OUTPUTS, attention_network, observation
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
 from uas_coverage_env.env.observation.scales import NEARBY_M
@@ -34,7 +34,7 @@ _PITCH_M = 68.0
 """About as far apart as neighbouring waypoints of generated towns are [m]."""
 
 
-class VelocityLanes(VecEnvWrapper):
+class VelocityVecEnv(VecEnvWrapper):
     """The lanes of UAS as a learner should see them.
 
     A UAS decides while it flies and return mode has not taken it over. The lane of one that does
@@ -165,7 +165,7 @@ class VelocityLearner:
 
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
         """The environment to learn in."""
-        player = _player(config)
+        player = _settings(config)
         lanes = CoverageVecEnv(
             config.lanes,
             some_with_moving_obstacles(
@@ -176,11 +176,11 @@ class VelocityLearner:
             reward_weights=player.rewards,
         )
         lanes.seed(seed)
-        return VelocityLanes(lanes, player.nearing, config.learning.gamma)
+        return VelocityVecEnv(lanes, player.nearing, config.learning.gamma)
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
         """The untrained model."""
-        player, learning = _player(config), config.learning
+        player, learning = _settings(config), config.learning
         activation = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[player.activation]
         network: dict[str, Any] = {"net_arch": list(player.hidden), "activation_fn": activation}
         if isinstance(learning, SacSettings):
@@ -201,7 +201,10 @@ class VelocityLearner:
             )
         kind: Any = "MlpPolicy"
         if player.network == "gaze":
-            kind, network = GazePolicy, {"gaze": gaze(player.hidden[0], player.keys)}
+            kind, network = (
+                AttentionPolicy,
+                {"network": attention_network(player.hidden[0], player.keys)},
+            )
         with warnings.catch_warnings():
             # of a rest that is no whole batch: `DecidingRollouts` leaves it out
             warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
@@ -221,8 +224,8 @@ class VelocityLearner:
 
     def export(self, model: BaseAlgorithm) -> tuple[Network, dict[str, NDArray[np.float32]]]:
         """The network that gives the mean action, and its weights."""
-        if isinstance(model.policy, GazePolicy):
-            return model.policy.gaze, model.policy.tensors()
+        if isinstance(model.policy, AttentionPolicy):
+            return model.policy.network, model.policy.tensors()
         parts = _actor(model)
         modules = [part for part in parts if isinstance(part, torch.nn.Linear)]
         tensors = {}
@@ -244,7 +247,7 @@ class VelocityLearner:
         return observation()
 
 
-def _player(config: TrainingConfig) -> VelocitySettings:
+def _settings(config: TrainingConfig) -> VelocitySettings:
     if not isinstance(config.player, VelocitySettings):
         raise TypeError(f"the learner of velocities cannot train {config.player.interface}s")
     return config.player

@@ -14,7 +14,7 @@ from uas_coverage_agents.training.moving_obstacles import some_with_moving_obsta
 from uas_coverage_agents.training.pointer import PointerPolicy
 from uas_coverage_agents.training.scenarios import training_scenarios
 from uas_coverage_agents.training.waypoint_env import WaypointVecEnv
-from uas_coverage_agents.waypoint.pilot import network, observation
+from uas_coverage_agents.waypoint.policy_runner import network, observation
 from uas_coverage_agents.waypoint.settings import WaypointSettings
 
 
@@ -23,7 +23,7 @@ class WaypointLearner:
 
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
         """Teams on the scenarios of the configuration, some of them with moving obstacles."""
-        player = _player(config)
+        player = _settings(config)
         scenarios = some_with_moving_obstacles(
             training_scenarios(config.scenarios, seed), player.moving_share, seed
         )
@@ -31,7 +31,7 @@ class WaypointLearner:
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
         """A model that takes the nearest waypoint at first."""
-        player, learning = _player(config), cast(PpoSettings, config.learning)
+        player, learning = _settings(config), cast(PpoSettings, config.learning)
         return MaskablePPO(
             PointerPolicy,
             lanes,
@@ -51,5 +51,5 @@ class WaypointLearner:
         return observation()
 
 
-def _player(config: TrainingConfig) -> WaypointSettings:
+def _settings(config: TrainingConfig) -> WaypointSettings:
     return cast(WaypointSettings, config.player)

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.waypoint.lanes import (
+from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
+from uas_coverage_agents.waypoint.settings import WaypointSettings
+from uas_coverage_agents.waypoint.sub_environments import (
     LANES,
     begin_lanes,
     make_lanes,
     pool_legs,
     step_lanes,
 )
-from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
-from uas_coverage_agents.waypoint.settings import WaypointSettings
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
     FILTERED,
@@ -27,7 +27,7 @@ from uas_coverage_agents.waypoint.team import (
     TIME,
 )
 from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.env.put_aside import Limits, check_like, check_values
+from uas_coverage_env.env.state_dict import Limits, check_like, check_values
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
@@ -176,16 +176,16 @@ class WaypointVecEnv(VecEnv):
 
     def _draw(self, lane: int) -> tuple[NDArray, NDArray, NDArray]:
         """The next mission of a lane: scenario, what is covered, and lost charge."""
-        lots = np.random.default_rng((self._seed, lane, int(self._missions[lane])))
+        rng = np.random.default_rng((self._seed, lane, int(self._missions[lane])))
         self._missions[lane] += 1
-        s = int(lots.integers(len(self._n_uas)))
+        s = int(rng.integers(len(self._n_uas)))
         covered = np.zeros(self._lanes.blocked.shape[1], dtype=np.bool_)
         discharged = np.zeros(self._lanes.targets.shape[1])
-        if lots.random() < self._settings.covered_share:
-            share = lots.uniform(0.0, _LARGEST_SHARE_COVERED)
-            covered[:] = lots.random(len(covered)) < share
-        if lots.random() < self._settings.discharged_share:
-            discharged[:] = lots.uniform(0.0, _MOST_DISCHARGED, len(discharged))
+        if rng.random() < self._settings.covered_share:
+            share = rng.uniform(0.0, _LARGEST_SHARE_COVERED)
+            covered[:] = rng.random(len(covered)) < share
+        if rng.random() < self._settings.discharged_share:
+            discharged[:] = rng.uniform(0.0, _MOST_DISCHARGED, len(discharged))
         return np.array(s), covered, discharged
 
     def close(self) -> None:

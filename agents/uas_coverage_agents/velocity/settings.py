@@ -13,7 +13,7 @@ class VelocitySettings(StrictModel):
 
     Attributes:
         interface: "velocity".
-        network: "layers", one after the other; or "gaze", see `policy.gaze.Gaze`.
+        network: "layers", one after the other; or "gaze", see `policy.attention.Attention`.
         hidden: Widths of the layers of actor and of critic; of "gaze" the one of its actor.
         keys: Of "gaze", see there.
         activation: Of the layers of "layers".

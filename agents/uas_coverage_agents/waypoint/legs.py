@@ -21,7 +21,7 @@ ROUTED_UNITS = 6.0
 _LONE_UNIT_M = 60.0
 
 
-class Legs(NamedTuple):
+class LegTimes(NamedTuple):
     """What does not change during a mission; computed once, for the slowest of the fleet."""
 
     between_s: Annotated[NDArray[np.float64], "W", "W"]
@@ -34,7 +34,7 @@ class Legs(NamedTuple):
     """`unit_m` and `unit_s`, see `layout`."""
 
 
-LEGS = Memory(Legs)
+LEGS = Memory(LegTimes)
 
 
 @allocating_kernel
@@ -113,7 +113,7 @@ def _fill(arena, between_s, home_s, return_s, unit):
             return_s[i, a] = seconds_home(arena, i, there)
 
 
-def legs_of(arena: Arena) -> Legs:
+def legs_of(arena: Arena) -> LegTimes:
     """The leg times of a scenario."""
     legs = LEGS.zeros(ARENA.sizes_of(arena))
     _fill(arena, *legs)

@@ -5,7 +5,7 @@ from pathlib import Path
 from pydantic import Field
 
 from uas_coverage_agents.policy.planner import PolicyPlanner
-from uas_coverage_agents.waypoint.pilot import WaypointPilot
+from uas_coverage_agents.waypoint.policy_runner import WaypointRunner
 from uas_coverage_env.flight import AssistedOptions
 
 SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-waypoint"
@@ -32,5 +32,5 @@ class LearnedWaypoint(PolicyPlanner):
         self._simulations = options.simulations
         super().__init__(options, SHIPPED)
 
-    def _piloted(self) -> WaypointPilot:
-        return WaypointPilot(self.policy, self.assistants, self._simulations)
+    def _runner(self) -> WaypointRunner:
+        return WaypointRunner(self.policy, self.assistants, self._simulations)

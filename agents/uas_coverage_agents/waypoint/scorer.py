@@ -11,7 +11,7 @@ from uas_coverage_agents.waypoint.layout import N_CANDIDATE, N_TEAM, WAY, K
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
 
-class Weights(NamedTuple):
+class ScorerWeights(NamedTuple):
     """The tensors of a `Pointer`; matrices are transposed: inputs along the first axis."""
 
     candidate_0: NDArray[np.float64]
@@ -31,10 +31,10 @@ class Weights(NamedTuple):
     prior: NDArray[np.float64]
 
 
-def weights_of(network: Pointer, tensors: Tensors) -> Weights:
+def weights_of(network: Pointer, tensors: Tensors) -> ScorerWeights:
     """The weights in the order in which they are used."""
     arrays = [np.array(tensors[name].T, dtype=np.float64, order="C") for name in network.shapes()]
-    return Weights._make([*arrays, np.array([network.prior])])
+    return ScorerWeights._make([*arrays, np.array([network.prior])])
 
 
 @allocating_kernel
@@ -53,7 +53,7 @@ def score(weights, observation, scores):
     """Write the score of every choice, see `Pointer`; those that are not there get -inf.
 
     Args:
-        weights: `Weights`.
+        weights: `ScorerWeights`.
         observation: (OBSERVATION_SIZE,).
         scores: (K+1,) written.
     """

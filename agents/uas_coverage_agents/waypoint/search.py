@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE, K
-from uas_coverage_agents.waypoint.look import NO_TARGET
+from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, score
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
@@ -39,7 +39,7 @@ _PRICES_WH = np.array([PRICES_WH.get(column, 0.0) for column in range(LEFT + 1)]
 NEVER = -1
 
 
-class Plan(NamedTuple):
+class TargetPlan(NamedTuple):
     """Targets of each UAS in their order."""
 
     targets: NDArray[np.int64]
@@ -50,9 +50,9 @@ class Plan(NamedTuple):
     """(U,) the next of them."""
 
 
-def no_plan(n_uas: int, n_waypoints: int) -> Plan:
+def no_plan(n_uas: int, n_waypoints: int) -> TargetPlan:
     """Nothing planned yet."""
-    return Plan(
+    return TargetPlan(
         targets=np.full((n_uas, 2 * n_waypoints + 2), NO_TARGET),
         length=np.zeros(n_uas, dtype=np.int64),
         following=np.zeros(n_uas, dtype=np.int64),
@@ -69,7 +69,7 @@ class Moment(NamedTuple):
     """(W,) what comes last."""
 
 
-class Desk(NamedTuple):
+class Workspace(NamedTuple):
     """Room for one simulated mission: its state, an observation and what follows from it."""
 
     state: WorldState
@@ -116,7 +116,18 @@ def planned(uncovered, plan, at, i, candidates, legal):
 
 @allocating_kernel
 def simulate(
-    arena, legs, weights, start, return_mode, assistants, plan, change_at, keep_on, desk, rng, new
+    arena,
+    legs,
+    weights,
+    start,
+    return_mode,
+    assistants,
+    plan,
+    change_at,
+    keep_on,
+    workspace,
+    rng,
+    new,
 ):
     """Fly one mission to its end.
 
@@ -131,18 +142,18 @@ def simulate(
         change_at: Number of the decision at which another choice is drawn; NEVER for none.
         keep_on: Whether the plan is followed after that, as far as it fits; else, and where the
             plan has nothing for a UAS, the policy decides.
-        desk: Room.
+        workspace: Room.
         rng: Random numbers.
-        new: `Plan`; what was flown is written.
+        new: `TargetPlan`; what was flown is written.
 
     Returns:
         (cost [Wh], number of decisions).
     """
-    state = desk.state
+    state = workspace.state
     copy_arrays(start.state, state)
     targets = start.targets.copy()
     blocked = start.blocked.copy()
-    candidates, legal, observation = desk.choices
+    candidates, legal, observation = workspace.choices
     account = np.zeros(_PRICES_WH.shape[0])
     at = plan.following.copy()
     new.length[:] = 0
@@ -151,7 +162,7 @@ def simulate(
     while True:
         i = fly_on(
             arena, legs, state, return_mode, assistants, blocked, targets,
-            desk.commands, desk.outcome, desk.choices, account,
+            workspace.commands, workspace.outcome, workspace.choices, account,
         )  # fmt: skip
         if i == NOBODY:
             break
@@ -159,13 +170,13 @@ def simulate(
         if n <= change_at or keep_on:
             choice = planned(state.uncovered, plan, at, i, candidates, legal)
         if n == change_at:
-            score(weights, observation, desk.scores)
-            other = _draw(desk.scores, legal, choice, rng)
+            score(weights, observation, workspace.scores)
+            other = _draw(workspace.scores, legal, choice, rng)
             if other >= 0:
                 choice = other
                 at[i] = max(at[i] - 1, 0)  # what was to be next may come after it
         if choice < 0:
-            choice = best_choice(weights, observation, legal, desk.scores)
+            choice = best_choice(weights, observation, legal, workspace.scores)
         choose(targets, candidates, i, choice)
         if new.length[i] < new.targets.shape[1]:
             new.targets[i, new.length[i]] = targets[i]
@@ -176,7 +187,18 @@ def simulate(
 
 @allocating_kernel
 def improve(
-    arena, legs, weights, now, return_mode, assistants, plan, n_simulations, desk, rng, trial, best
+    arena,
+    legs,
+    weights,
+    now,
+    return_mode,
+    assistants,
+    plan,
+    n_simulations,
+    workspace,
+    rng,
+    trial,
+    best,
 ):
     """The cheapest plan that some simulations find.
 
@@ -189,23 +211,24 @@ def improve(
         assistants: See `simulate`.
         plan: The plan so far; may be empty.
         n_simulations: How many are tried.
-        desk: Room.
+        workspace: Room.
         rng: Random numbers.
-        trial: `Plan`, room.
-        best: `Plan`; written.
+        trial: `TargetPlan`, room.
+        best: `TargetPlan`; written.
 
     Returns:
         Cost of the best plan [Wh].
     """
     best_Wh, n_decisions = simulate(
-        arena, legs, weights, now, return_mode, assistants, plan, NEVER, True, desk, rng, best
+        arena, legs, weights, now, return_mode, assistants, plan, NEVER, True, workspace, rng, best
     )
     for n in range(n_simulations - 1):
         # first the policy alone: no plan is worse than that
         change_at = NEVER if n == 0 else rng.integers(0, max(n_decisions, 1))
         keep_on = n > 0 and rng.random() < 0.5
         cost_Wh, n_new = simulate(
-            arena, legs, weights, now, return_mode, assistants, best, change_at, keep_on, desk, rng,
+            arena, legs, weights, now, return_mode, assistants, best, change_at, keep_on, workspace,
+            rng,
             trial,
         )  # fmt: skip
         if cost_Wh < best_Wh:

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE
-from uas_coverage_agents.waypoint.look import (
+from uas_coverage_agents.waypoint.observation import (
     NO_TARGET,
     allowed,
     claimed_by_mates,
     covers,
-    look,
+    observe,
 )
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.compiled.kernels import allocating_kernel
@@ -30,7 +30,7 @@ ACCOUNT_SIZE = LEFT + 1
 
 
 class Choices(NamedTuple):
-    """What the UAS that decides may choose, and what it sees; see `look`."""
+    """What the UAS that decides may choose, and what it sees; see `observe`."""
 
     candidates: NDArray[np.int64]
     """(K,)."""
@@ -92,7 +92,7 @@ def next_to_decide(arena, legs, state, return_mode, blocked, targets, choices):
         elif _needs_target(state, blocked, claimed, may, targets, i):
             targets[i] = NO_TARGET
             candidates, legal, row = choices
-            if look(arena, legs, state, blocked, targets, i, candidates, legal, row) > 1:
+            if observe(arena, legs, state, blocked, targets, i, candidates, legal, row) > 1:
                 return i
             choose(targets, candidates, i, legal.argmax())
     return NOBODY

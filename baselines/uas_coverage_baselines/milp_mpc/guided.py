@@ -1,7 +1,7 @@
 """`milp-mpc-guided`: the same OCP along a global order of the waypoints.
 
 What the paper's planner loses, it loses in the order of the waypoints. Here the order of the whole
-swarm is searched apart (`uas_coverage_baselines.order`) and given to the OCP as a terminal cost,
+swarm is searched apart (`uas_coverage_baselines.routing`) and given to the OCP as a terminal cost,
 the time still to go along one's own order, and as the few waypoints that get binaries.
 """
 
@@ -17,15 +17,15 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Target
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
-from uas_coverage_baselines.milp_mpc.order_guide import OrderGuide, TourShape
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Mode, SwarmState
 
 _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is left to visit
 
 
-class Options(MovingHorizonOptions):
+class GuidedOptions(MovingHorizonOptions):
     """Options of `milp-mpc-guided`."""
 
     waypoint_sides: int = Field(default=12, ge=4, le=16, multiple_of=4, description="H_WP")
@@ -49,7 +49,7 @@ class Options(MovingHorizonOptions):
     weight_climb: float = weight(0.03, "of the climb rate")
 
 
-class MilpMpcGuided(MovingHorizon[Options]):
+class MilpMpcGuided(MovingHorizon[GuidedOptions]):
     """MILP-MPC with a global order as terminal cost.
 
     Args:
@@ -57,10 +57,10 @@ class MilpMpcGuided(MovingHorizon[Options]):
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 
-    Options = Options
+    Options = GuidedOptions
 
-    def __init__(self, options: Options | None = None, blocks: Sequence[Block] = OCP) -> None:
-        super().__init__(options or Options(), blocks)
+    def __init__(self, options: GuidedOptions | None = None, blocks: Sequence[Block] = OCP) -> None:
+        super().__init__(options or GuidedOptions(), blocks)
         self._weights = self.options.weights
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
@@ -73,7 +73,7 @@ class MilpMpcGuided(MovingHorizon[Options]):
         super().reset(brief, seed)
         self._builder = ProblemBuilder(brief, self.options)
         decision_s = self.options.threads * self.options.time_limit_s
-        self._guide = OrderGuide(brief, self._builder, TourShape(), decision_s)
+        self._guide = RouteGuide(brief, self._builder, TourShape(), decision_s)
         self._guide.begin(first_sight(brief), seed)
         self._returning: set[str] = set()
 

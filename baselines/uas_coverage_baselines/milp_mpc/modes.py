@@ -38,7 +38,7 @@ class Mode(IntEnum):
 
 
 @dataclass(frozen=True)
-class Memory:
+class ModeMemory:
     """What a UAS remembers between decisions.
 
     Attributes:
@@ -71,7 +71,7 @@ class Situation:
     plans_coverage: bool
 
 
-def next_mode(memory: Memory, now: Situation) -> Mode:
+def next_mode(memory: ModeMemory, now: Situation) -> Mode:
     """Algorithm 2; landing is observed, not decided."""
     if memory.mode in (Mode.LANDED, Mode.RETURN):
         return memory.mode
@@ -135,13 +135,13 @@ def best_fitting_waypoint(
 
 
 def update_modes(
-    memories: Sequence[Memory],
+    memories: Sequence[ModeMemory],
     situations: Sequence[Situation],
     waypoints_m: FloatArray,
     planned: Collection[int],
     blocked: Collection[int],
     choice: TargetChoice,
-) -> list[Memory]:
+) -> list[ModeMemory]:
     """Algorithm 3 without the rows, which follow from the memories (`target_of`).
 
     Args:
@@ -168,12 +168,12 @@ def update_modes(
             kept[row] = waypoint
         if mode is Mode.TRANSIT and waypoint is None:
             mode = Mode.COVERING
-        result.append(Memory(mode, waypoint if mode is Mode.TRANSIT else None))
+        result.append(ModeMemory(mode, waypoint if mode is Mode.TRANSIT else None))
     return result
 
 
 def target_of(
-    memory: Memory,
+    memory: ModeMemory,
     now: Situation,
     home_m: FloatArray,
     waypoints_m: FloatArray,

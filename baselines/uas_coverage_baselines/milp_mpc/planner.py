@@ -10,7 +10,7 @@ from pydantic import Field
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Target, Weights
 from uas_coverage_baselines.milp_mpc.modes import (
-    Memory,
+    ModeMemory,
     Situation,
     TargetChoice,
     target_of,
@@ -24,7 +24,7 @@ from uas_coverage_env.vehicle import DOD, VX, VZ
 from uas_coverage_env.world import Mode, SwarmState
 
 
-class Options(MovingHorizonOptions):
+class MilpMpcOptions(MovingHorizonOptions):
     """Options of `milp-mpc`."""
 
     priority_per_s: float = Field(
@@ -43,7 +43,7 @@ class Options(MovingHorizonOptions):
     weight_return_home: float = weight(Weights.return_home, "of the way home")
 
 
-class MilpMpc(MovingHorizon[Options]):
+class MilpMpc(MovingHorizon[MilpMpcOptions]):
     """The paper's energy-aware MILP-MPC (Gasche et al., Sec. III).
 
     Args:
@@ -51,17 +51,19 @@ class MilpMpc(MovingHorizon[Options]):
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 
-    Options = Options
+    Options = MilpMpcOptions
 
-    def __init__(self, options: Options | None = None, blocks: Sequence[Block] = OCP) -> None:
-        super().__init__(options or Options(), blocks)
+    def __init__(
+        self, options: MilpMpcOptions | None = None, blocks: Sequence[Block] = OCP
+    ) -> None:
+        super().__init__(options or MilpMpcOptions(), blocks)
         self._weights, self._choice = self.options.weights, TargetChoice()
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
         super().reset(brief, seed)
         self._builder = ProblemBuilder(brief, self.options)
-        self._memories = {uas.name: Memory() for uas in brief.uas}
+        self._memories = {uas.name: ModeMemory() for uas in brief.uas}
 
     def mode(self, name: str) -> Mode:
         """The operation mode."""

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
-from uas_coverage_baselines.tour.pursuit import LEGS, Task, brake_seconds, empty_plan
+from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
 from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import AssistedOptions
@@ -119,14 +119,14 @@ class Tour:
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
         return Velocity(north_mps, east_mps, altitude_m, mode)
 
-    def _task(self, i: int, view: View) -> Task:
+    def _task(self, i: int, view: View) -> PursuitTask:
         schedule = self._schedule
         route = schedule.order.routes[i]
         if self._returns[i]:
             route = route[:0]
         radius_m, blocked = self._radius_m[route], view.blocked[route]
         within_m = radius_m - np.minimum(_COVERED_WITHIN_M, radius_m / 50.0)
-        return Task(
+        return PursuitTask(
             np.ascontiguousarray(route),
             np.where(blocked, -1.0, within_m),
             np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),

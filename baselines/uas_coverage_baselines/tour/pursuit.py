@@ -32,7 +32,7 @@ _LAG_S = 1.6  # the inner loop follows a velocity with about this delay
 _AIM_SHARE = 0.8  # of the radius, at most, for the first aim
 
 
-class Task(NamedTuple):
+class PursuitTask(NamedTuple):
     """What one UAS has to do next.
 
     Attributes:
@@ -54,7 +54,7 @@ class Task(NamedTuple):
     moving_margin_m: float
 
 
-class Plan(NamedTuple):
+class PursuitPlan(NamedTuple):
     """A plan for N steps and L legs, and its simulated flight.
 
     Attributes:
@@ -82,9 +82,9 @@ class Plan(NamedTuple):
     path_m: FloatArray
 
 
-def empty_plan(n_steps: int) -> Plan:
+def empty_plan(n_steps: int) -> PursuitPlan:
     """A plan in which nothing is written yet."""
-    return Plan(
+    return PursuitPlan(
         np.zeros((LEGS, 3)),
         np.zeros(LEGS),
         np.ones(n_steps),

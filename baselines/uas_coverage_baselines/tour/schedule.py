@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.order import Effort, Order, Task, improved, no_order
+from uas_coverage_baselines.routing import (
+    Routes,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD, VX, VY
 from uas_coverage_env.vehicle.range import TOUR
@@ -59,17 +65,21 @@ class Schedule:
         self._moves = moves
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
-        self.order = no_order(len(brief.uas))
+        self.order = empty_routes(len(brief.uas))
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
         if (view.blocked & view.uncovered).any():  # how late is late, is known with an order
-            self.take(improved(self.task(view), self.order, Effort(self._moves), seed), view)
+            self.take(
+                improve_routes(self.task(view), self.order, SearchEffort(self._moves), seed), view
+            )
         task = self.task(view)
         orders = [
-            improved(task, no_order(task.n_uas), Effort(self._moves), seed + attempt)
+            improve_routes(
+                task, empty_routes(task.n_uas), SearchEffort(self._moves), seed + attempt
+            )
             for attempt in range(_FIRST_SEARCHES)
         ]
         self.take(min(orders, key=lambda order: order.cost_s), view)
@@ -79,18 +89,18 @@ class Schedule:
         open_ = view.uncovered
         routes = tuple(route[open_[route]] for route in self.order.routes)
         left_out = self.order.left_out[open_[self.order.left_out]]
-        self.order = Order(routes, left_out, self.order.seconds, self.order.cost_s)
+        self.order = Routes(routes, left_out, self.order.seconds, self.order.cost_s)
         self._time_legs(view)
         if self._has_changed(view):
             task = self.task(view)
-            kept = improved(task, self.order, Effort(0), 0)
-            efforts = (Effort(_MOVES_AGAIN, hottest_s=1.5), Effort(_MOVES_AGAIN))
-            found = [improved(task, kept, effort, round(view.time_s)) for effort in efforts]
+            kept = improve_routes(task, self.order, SearchEffort(0), 0)
+            efforts = (SearchEffort(_MOVES_AGAIN, hottest_s=1.5), SearchEffort(_MOVES_AGAIN))
+            found = [improve_routes(task, kept, effort, round(view.time_s)) for effort in efforts]
             better = min(found, key=lambda order: order.cost_s)
             worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
             self.take(better if worthwhile else kept, view)
 
-    def take(self, order: Order, view: View) -> None:
+    def take(self, order: Routes, view: View) -> None:
         """Fly an order from now on."""
         self.order = order
         self._taken_under = self._seen = view
@@ -171,7 +181,7 @@ class Schedule:
             np.linalg.norm(first_m[:2]) / self.legs.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
         )
 
-    def task(self, view: View) -> Task:
+    def task(self, view: View) -> RoutingTask:
         """The routing problem of a moment."""
         legs, x = self.legs, view.x
         n_uas = len(x)
@@ -181,7 +191,7 @@ class Schedule:
         # enough to be thought of while there is other work near it
         work_s = self._legs_left(view)[view.may_work]
         opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0
-        return Task(
+        return RoutingTask(
             open_waypoints=np.flatnonzero(view.uncovered),
             first_s=first_s,
             between_s=legs.between_s,

@@ -1,6 +1,6 @@
 """The moving obstacles nearest to a UAS."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -32,8 +32,8 @@ def write_moving_obstacles(arena, state, tables, i, row):
     scale = tables.scales[i]
     sample = min(state.step[0], arena.moving_path_m.shape[0] - 1)
     x = state.x[i]
-    index = room(K_MOVING)
-    away_m = room(K_MOVING)
+    index = stack_array(K_MOVING)
+    away_m = stack_array(K_MOVING)
     found = 0
     for m in range(arena.moving.shape[0]):
         centre_m = arena.moving_path_m[sample, m]

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.compiled.borrow import part
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, room
+from uas_coverage_env.compiled.array_views import slice_view
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, stack_array
 from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.scales import CROWD, CROWD_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
@@ -91,7 +91,7 @@ def nearest_waypoints(arena, state, i, candidates):
     columns = arena.waypoint_columns
     uncovered = state.uncovered
     n_waypoints = uncovered.shape[0]
-    away_m2 = room(K_WAYPOINTS)
+    away_m2 = stack_array(K_WAYPOINTS)
     found = 0
     for c in range(K_WAYPOINTS):
         w = candidates[c]
@@ -102,8 +102,8 @@ def nearest_waypoints(arena, state, i, candidates):
         n = min(_WORD, n_waypoints - first)
         limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
         bits = _open_within(
-            part(columns, first, n), part(columns, n_waypoints + first, n),
-            part(columns, 2 * n_waypoints + first, n), part(uncovered, first, n),
+            slice_view(columns, first, n), slice_view(columns, n_waypoints + first, n),
+            slice_view(columns, 2 * n_waypoints + first, n), slice_view(uncovered, first, n),
             x, y, z, limit_m2,
         )  # fmt: skip
         held = 0

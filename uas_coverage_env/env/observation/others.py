@@ -1,6 +1,6 @@
 """The other UAS that fly nearest to a UAS."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -39,8 +39,8 @@ def write_others(arena, state, tables, i, row):
     """Write the group."""
     x = state.x[i]
     scale = tables.scales[i]
-    index = room(K_UAS)
-    away_m = room(K_UAS)
+    index = stack_array(K_UAS)
+    away_m = stack_array(K_UAS)
     found = 0
     for j in range(state.status.shape[0]):
         if j != i and state.status[j] == FLYING:

@@ -1,7 +1,7 @@
 """Where the weight of the open waypoints lies."""
 
-from uas_coverage_env.compiled.borrow import part
-from uas_coverage_env.compiled.kernels import counting_kernel, inlined_kernel, kernel, room
+from uas_coverage_env.compiled.array_views import slice_view
+from uas_coverage_env.compiled.kernels import counting_kernel, inlined_kernel, kernel, stack_array
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
@@ -72,11 +72,11 @@ def _open_weight(arena, state, i, sums):
     n = state.uncovered.shape[0]
     columns = arena.waypoint_columns
     _add_open(
-        part(columns, 0, n),
-        part(columns, n, n),
-        part(columns, 5 * n, n),
-        part(columns, 6 * n, n),
-        part(columns, 7 * n, n),
+        slice_view(columns, 0, n),
+        slice_view(columns, n, n),
+        slice_view(columns, 5 * n, n),
+        slice_view(columns, 6 * n, n),
+        slice_view(columns, 7 * n, n),
         state.uncovered, state.x[i, X], state.x[i, Y], sums,
     )  # fmt: skip
     left = 0.0
@@ -88,13 +88,13 @@ def _open_weight(arena, state, i, sums):
 @kernel
 def share_of_open_weight(arena, state, i):
     """Share of all weight that is still to be covered."""
-    return _open_weight(arena, state, i, room(_N_SUMS)) * (1.0 / ALL_SHARES)
+    return _open_weight(arena, state, i, stack_array(_N_SUMS)) * (1.0 / ALL_SHARES)
 
 
 @inlined_kernel
 def write_remaining(arena, state, i, row):
     """Write the group; returns the share of all weight that is still to be covered."""
-    sums = room(_N_SUMS)
+    sums = stack_array(_N_SUMS)
     left = _open_weight(arena, state, i, sums)
     per_share = 1.0 / left if left > 0.0 else 0.0
     for s in range(_N_SECTORS):

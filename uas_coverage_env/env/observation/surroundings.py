@@ -2,14 +2,14 @@
 
 import math
 
-from uas_coverage_env.compiled.borrow import borrow, part
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room
+from uas_coverage_env.compiled.array_views import rows_view, slice_view
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import X, Y, Z
-from uas_coverage_env.world.boxes import (
+from uas_coverage_env.world.broad_phase import (
     BLOCK,
     HULL_HALF,
     HULL_MIDDLE,
@@ -58,8 +58,8 @@ _N, _NE, _E, _SE, _S, _SW, _W, _NW, _UP, _DOWN = range(N_RAYS)
 @kernel
 def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
     """How far a ray goes before it enters a hull, at most free_m."""
-    faces = borrow(normals, first, (last - first, 3))
-    away_m = borrow(offsets_m, first, (last - first,))
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, (last - first,))
     enters_m = 0.0
     leaves_m = free_m
     misses = False
@@ -86,8 +86,8 @@ def _both_ways(inside_m, slope, free_m, ahead, behind):
 @inlined_kernel
 def _rays_to_fence(normals, offsets_m, first, last, x, y, z, free_m):
     """Write how far the rays go before they leave the fence; returns how far away that is."""
-    faces = borrow(normals, first, (last - first, 3))
-    away_m = borrow(offsets_m, first, (last - first,))
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, (last - first,))
     for ray in range(N_RAYS):
         free_m[ray] = RAY_M
     outermost = -math.inf
@@ -177,12 +177,12 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
         in_reach: (n or more,) written: 1 where a ray may meet its hull's box, 0 elsewhere.
     """
     stride = columns.shape[1]
-    middle_x = part(columns, MIDDLE * stride + first, n)
-    middle_y = part(columns, (MIDDLE + 1) * stride + first, n)
-    middle_z = part(columns, (MIDDLE + 2) * stride + first, n)
-    per_half_x = part(columns, PER_HALF * stride + first, n)
-    per_half_y = part(columns, (PER_HALF + 1) * stride + first, n)
-    per_half_z = part(columns, (PER_HALF + 2) * stride + first, n)
+    middle_x = slice_view(columns, MIDDLE * stride + first, n)
+    middle_y = slice_view(columns, (MIDDLE + 1) * stride + first, n)
+    middle_z = slice_view(columns, (MIDDLE + 2) * stride + first, n)
+    per_half_x = slice_view(columns, PER_HALF * stride + first, n)
+    per_half_y = slice_view(columns, (PER_HALF + 1) * stride + first, n)
+    per_half_z = slice_view(columns, (PER_HALF + 2) * stride + first, n)
     for o in range(n):
         beyond[o] = max(
             abs(x - middle_x[o]) * per_half_x[o],
@@ -191,12 +191,12 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
         )
     # a loop of its own: of one that reads all twelve columns the compiler thinks, for less than
     # twenty obstacles, that vector instructions would not pay
-    hull_x = part(columns, HULL_MIDDLE * stride + first, n)
-    hull_y = part(columns, (HULL_MIDDLE + 1) * stride + first, n)
-    hull_z = part(columns, (HULL_MIDDLE + 2) * stride + first, n)
-    half_x = part(columns, HULL_HALF * stride + first, n)
-    half_y = part(columns, (HULL_HALF + 1) * stride + first, n)
-    half_z = part(columns, (HULL_HALF + 2) * stride + first, n)
+    hull_x = slice_view(columns, HULL_MIDDLE * stride + first, n)
+    hull_y = slice_view(columns, (HULL_MIDDLE + 1) * stride + first, n)
+    hull_z = slice_view(columns, (HULL_MIDDLE + 2) * stride + first, n)
+    half_x = slice_view(columns, HULL_HALF * stride + first, n)
+    half_y = slice_view(columns, (HULL_HALF + 1) * stride + first, n)
+    half_z = slice_view(columns, (HULL_HALF + 2) * stride + first, n)
     for o in range(n):
         north_m = hull_x[o] - x
         east_m = hull_y[o] - y
@@ -265,13 +265,13 @@ def write_surroundings(arena, state, i, row):
     x = state.x[i, X]
     y = state.x[i, Y]
     z = state.x[i, Z]
-    free_m = room(N_RAYS)
+    free_m = stack_array(N_RAYS)
     inside_m = _rays_to_fence(
         normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z, free_m
     )
     clearance_m = HEIGHT_M
-    beyond = room(BLOCK)
-    in_reach = room(BLOCK)
+    beyond = stack_array(BLOCK)
+    in_reach = stack_array(BLOCK)
     columns = arena.obstacle_columns
     n_obstacles = arena.obstacles.shape[0]
     for first in range(0, n_obstacles, BLOCK):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, room, single_room
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array, stack_array_f32
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -101,22 +101,22 @@ def write_waypoints(arena, state, tables, learners, i, row):
     home_down_m = uas.home_m[2]
     margin_per_m = np.float32(uas.dod_per_s / (uas.speed_mps * MARGIN))
     margin_left = np.float32((uas.dod_max - state.x[i, DOD]) * (1.0 / MARGIN))
-    wanted = room(K_WAYPOINTS)
-    north_m = room(K_WAYPOINTS)
-    east_m = room(K_WAYPOINTS)
-    down_m = room(K_WAYPOINTS)
-    weight = single_room(K_WAYPOINTS)
-    next_one = single_room(K_WAYPOINTS)
-    crowd = single_room(K_WAYPOINTS)
-    rival_m2 = single_room(K_WAYPOINTS)
-    taken = single_room(K_WAYPOINTS)
-    north = single_room(K_WAYPOINTS)
-    east = single_room(K_WAYPOINTS)
-    there = single_room(K_WAYPOINTS)
-    below = single_room(K_WAYPOINTS)
-    rival = single_room(K_WAYPOINTS)
-    from_home = single_room(K_WAYPOINTS)
-    margin = single_room(K_WAYPOINTS)
+    wanted = stack_array(K_WAYPOINTS)
+    north_m = stack_array(K_WAYPOINTS)
+    east_m = stack_array(K_WAYPOINTS)
+    down_m = stack_array(K_WAYPOINTS)
+    weight = stack_array_f32(K_WAYPOINTS)
+    next_one = stack_array_f32(K_WAYPOINTS)
+    crowd = stack_array_f32(K_WAYPOINTS)
+    rival_m2 = stack_array_f32(K_WAYPOINTS)
+    taken = stack_array_f32(K_WAYPOINTS)
+    north = stack_array_f32(K_WAYPOINTS)
+    east = stack_array_f32(K_WAYPOINTS)
+    there = stack_array_f32(K_WAYPOINTS)
+    below = stack_array_f32(K_WAYPOINTS)
+    rival = stack_array_f32(K_WAYPOINTS)
+    from_home = stack_array_f32(K_WAYPOINTS)
+    margin = stack_array_f32(K_WAYPOINTS)
     columns = arena.waypoint_columns
     n = 0
     for c in range(K_WAYPOINTS):

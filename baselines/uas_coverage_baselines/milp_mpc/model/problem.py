@@ -60,7 +60,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Tour:
+class TourSegment:
     """What a UAS is to visit next, in this order, before it goes on (`milp-mpc-guided`).
 
     Attributes:
@@ -184,7 +184,7 @@ class PlanningProblem:
     home_m: FloatArray
     dod_max: FloatArray
     targets: tuple[Target | None, ...]
-    tours: tuple[Tour | None, ...] = ()
+    tours: tuple[TourSegment | None, ...] = ()
     dt_s: float = 1.0
     weights: Weights = field(default_factory=Weights)
     physical_sides: int = 8

@@ -18,7 +18,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     MovingHull,
     PlanningProblem,
     Target,
-    Tour,
+    TourSegment,
     Weights,
 )
 from uas_coverage_env.geometry import ConvexPolytope
@@ -114,7 +114,7 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
     }
 
 
-def _tour(tour: Tour) -> dict[str, Any]:
+def _tour(tour: TourSegment) -> dict[str, Any]:
     arrays = {name: getattr(tour, name).tolist() for name in _OF_A_TOUR}
     return {"waypoints": tour.waypoints.tolist(), "lead_s": tour.lead_s, **arrays}
 
@@ -163,8 +163,8 @@ def _problem(
     )
 
 
-def _read_tour(tour: dict[str, Any]) -> Tour:
-    return Tour(
+def _read_tour(tour: dict[str, Any]) -> TourSegment:
+    return TourSegment(
         waypoints=np.array(tour["waypoints"], np.int64),
         lead_s=tour["lead_s"],
         **{name: np.array(tour[name], float) for name in _OF_A_TOUR},

@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal, gains
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
-from uas_coverage_baselines.milp_mpc.model.problem import NEVER, PlanningProblem, Tour, Trajectories
+from uas_coverage_baselines.milp_mpc.model.problem import (
+    NEVER,
+    PlanningProblem,
+    TourSegment,
+    Trajectories,
+)
 from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance, sphere_faces
@@ -139,7 +144,7 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
     return padded
 
 
-def _along(tour: Tour | None) -> NDArray[np.int64]:
+def _along(tour: TourSegment | None) -> NDArray[np.int64]:
     """(S, _TOUR_DEPTH) a tour, without one of its waypoints, and with two neighbours exchanged."""
     order = [] if tour is None else tour.waypoints[:_TOUR_DEPTH].tolist()
     sequences = [order]

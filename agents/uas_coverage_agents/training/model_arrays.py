@@ -14,8 +14,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.training.learner import Lanes
-from uas_coverage_env.env.put_aside import check_values
+from uas_coverage_agents.training.learner import StatefulVecEnv
+from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.files.strict_toml import InputError
 
 Arrays = dict[str, NDArray[np.generic]]
@@ -24,7 +24,7 @@ _KEYS = 624  # of NumPy's global generator
 _REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-def frozen(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
+def to_arrays(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
     """Everything that decides how the training goes on, in arrays of its own.
 
     To be called between two updates: what a rollout has collected so far is not kept.
@@ -39,7 +39,7 @@ def frozen(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
     arrays["last/observation"] = np.array(model._last_obs)
     arrays["last/episode_starts"] = np.array(model._last_episode_starts)
     arrays["last/counters"] = np.array([model.num_timesteps, model._n_updates, model._episode_num])
-    for name, array in cast(Lanes, lanes).state_dict().items():
+    for name, array in cast(StatefulVecEnv, lanes).state_dict().items():
         arrays[f"lanes/{name}"] = np.array(array)
     if isinstance(model, OffPolicyAlgorithm):
         buffer = cast(Any, model.replay_buffer)
@@ -50,14 +50,14 @@ def frozen(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
     return arrays
 
 
-def thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
-    """Put a freshly made model and its lanes where they were when `frozen` was called.
+def from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+    """Put a freshly made model and its lanes where they were when `to_arrays` was called.
 
     Raises:
         InputError: The arrays are those of another model.
     """
     try:
-        _thaw(arrays, model, lanes)
+        _from_arrays(arrays, model, lanes)
     except (KeyError, ValueError, IndexError, RuntimeError, TypeError, OverflowError) as error:
         reason = " ".join(str(error).split())[:200]
         raise InputError(
@@ -90,7 +90,7 @@ def _check(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     check_values({k: array for k, array in arrays.items() if k.startswith(ours)}, limits)
 
 
-def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+def _from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     _check(arrays, model, lanes)
     with torch.no_grad():
         _make_optimiser_state(arrays, model)
@@ -114,7 +114,7 @@ def _thaw(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     steps, updates, episodes = arrays["last/counters"].tolist()
     model.num_timesteps, model._n_updates, model._episode_num = steps, updates, episodes
     state = {name[6:]: array for name, array in arrays.items() if name.startswith("lanes/")}
-    cast(Lanes, lanes).load_state_dict(state)
+    cast(StatefulVecEnv, lanes).load_state_dict(state)
     if isinstance(model, OffPolicyAlgorithm):
         buffer = cast(Any, model.replay_buffer)
         pos, full = arrays["memory/place"].tolist()

@@ -16,7 +16,7 @@ from uas_coverage_env.files.strict_toml import InputError
 GROUP = "uas_coverage.commands"
 
 
-def add_outside_commands(app: typer.Typer) -> None:
+def add_plugin_commands(app: typer.Typer) -> None:
     """Add them all; one that cannot be loaded says so when it is called, and harms no other."""
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         try:

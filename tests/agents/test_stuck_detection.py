@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from uas_coverage_agents.velocity.patience import LOOK_AWAY_S, PATIENCE_S, Patience
+from uas_coverage_agents.velocity.stuck_detection import HIDDEN_FOR_S, STUCK_AFTER_S, StuckDetection
 
 from uas_coverage_env.env import OBSERVATION_SIZE, observation_columns
 from uas_coverage_env.env.observation import K_WAYPOINTS
@@ -23,28 +23,28 @@ def sight(*waypoints: int, closeness: float = NEAR) -> tuple[np.ndarray, np.ndar
     return view, candidates
 
 
-def after(patience: Patience, seconds: float, *waypoints: int, closeness: float = NEAR):
+def after(detection: StuckDetection, seconds: float, *waypoints: int, closeness: float = NEAR):
     """The last view of so many seconds before the same waypoints."""
     for _ in range(round(seconds)):
-        view = patience.look(*sight(*waypoints, closeness=closeness))
+        view = detection.filter(*sight(*waypoints, closeness=closeness))
     return view
 
 
 @pytest.fixture
-def patience() -> Patience:
-    return Patience(n_uas=1, n_waypoints=9, dt_s=1.0)
+def detection() -> StuckDetection:
+    return StuckDetection(n_uas=1, n_waypoints=9, dt_s=1.0)
 
 
-def test_at_first_everything_is_shown_as_it_is(patience):
+def test_at_first_everything_is_shown_as_it_is(detection):
     view, candidates = sight(4, 2, 7)
-    assert np.array_equal(patience.look(view, candidates), view)
-    assert np.array_equal(after(patience, PATIENCE_S - 1, 4, 2, 7), view)
+    assert np.array_equal(detection.filter(view, candidates), view)
+    assert np.array_equal(after(detection, STUCK_AFTER_S - 1, 4, 2, 7), view)
 
 
-def test_what_was_tried_for_too_long_is_hidden_and_the_others_move_up(patience):
+def test_what_was_tried_for_too_long_is_hidden_and_the_others_move_up(detection):
     view, _ = sight(4, 2, 7)
-    after(patience, PATIENCE_S, 4, 2, 7)
-    seen = after(patience, 1, 4, 2, 7)
+    after(detection, STUCK_AFTER_S, 4, 2, 7)
+    seen = after(detection, 1, 4, 2, 7)
     expected = view.copy()
     width = THERE[1] - THERE[0]
     end = THERE[0] + 3 * width
@@ -53,30 +53,30 @@ def test_what_was_tried_for_too_long_is_hidden_and_the_others_move_up(patience):
     assert np.array_equal(seen, expected)
 
 
-def test_it_is_shown_again_later(patience):
+def test_it_is_shown_again_later(detection):
     view, _ = sight(4, 2)
-    after(patience, PATIENCE_S, 4, 2)
+    after(detection, STUCK_AFTER_S, 4, 2)
     # the other one is far away meanwhile, or it would be tried for too long as well
     away, candidates = sight(2, 4, closeness=FAR)
-    for _ in range(round(LOOK_AWAY_S) - 1):
-        assert patience.look(away, candidates)[0, THERE].sum() == 1.0
-    assert np.array_equal(patience.look(view, sight(4, 2)[1]), view)
+    for _ in range(round(HIDDEN_FOR_S) - 1):
+        assert detection.filter(away, candidates)[0, THERE].sum() == 1.0
+    assert np.array_equal(detection.filter(view, sight(4, 2)[1]), view)
 
 
-def test_the_last_one_is_never_hidden(patience):
+def test_the_last_one_is_never_hidden(detection):
     view, _ = sight(4)
-    assert np.array_equal(after(patience, 3 * PATIENCE_S, 4), view)
+    assert np.array_equal(after(detection, 3 * STUCK_AFTER_S, 4), view)
 
 
-def test_a_long_way_to_the_nearest_does_not_try_patience(patience):
+def test_a_long_way_to_the_nearest_does_not_try_patience(detection):
     view, _ = sight(4, 2, closeness=FAR)
-    assert np.array_equal(after(patience, 5 * PATIENCE_S, 4, 2, closeness=FAR), view)
+    assert np.array_equal(after(detection, 5 * STUCK_AFTER_S, 4, 2, closeness=FAR), view)
 
 
 def test_each_uas_has_its_own_patience():
-    patience = Patience(n_uas=2, n_waypoints=9, dt_s=1.0)
-    for _ in range(round(PATIENCE_S) + 1):
+    detection = StuckDetection(n_uas=2, n_waypoints=9, dt_s=1.0)
+    for _ in range(round(STUCK_AFTER_S) + 1):
         (one, first), (two, second) = sight(4, 2), sight(2, 4, closeness=FAR)
-        seen = patience.look(np.concatenate([one, two]), np.concatenate([first, second]))
+        seen = detection.filter(np.concatenate([one, two]), np.concatenate([first, second]))
     assert seen[0, THERE].sum() == 1.0
     assert np.array_equal(seen[1], two[0])

@@ -9,13 +9,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel
 
 BLOCK = 64
 """So many obstacles are looked at at once; kernels take more in several turns."""
 
-SURE_M = 1e-6
+EPS_M = 1e-6
 """More than rounding can change in a distance [m]."""
 
 MIDDLE, PER_HALF, NEAR, RISE, HULL_MIDDLE, HULL_HALF, BOX, MEASURED = 0, 3, 6, 7, 8, 11, 14, 20
@@ -88,19 +88,19 @@ def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
     stride = columns.shape[1]
-    middle_x = part(columns, MIDDLE * stride + first, n)
-    middle_y = part(columns, (MIDDLE + 1) * stride + first, n)
-    middle_z = part(columns, (MIDDLE + 2) * stride + first, n)
-    per_half_x = part(columns, PER_HALF * stride + first, n)
-    per_half_y = part(columns, (PER_HALF + 1) * stride + first, n)
-    per_half_z = part(columns, (PER_HALF + 2) * stride + first, n)
-    near_m = part(columns, NEAR * stride + first, n)
-    rise_m = part(columns, RISE * stride + first, n)
+    middle_x = slice_view(columns, MIDDLE * stride + first, n)
+    middle_y = slice_view(columns, (MIDDLE + 1) * stride + first, n)
+    middle_z = slice_view(columns, (MIDDLE + 2) * stride + first, n)
+    per_half_x = slice_view(columns, PER_HALF * stride + first, n)
+    per_half_y = slice_view(columns, (PER_HALF + 1) * stride + first, n)
+    per_half_z = slice_view(columns, (PER_HALF + 2) * stride + first, n)
+    near_m = slice_view(columns, NEAR * stride + first, n)
+    rise_m = slice_view(columns, RISE * stride + first, n)
     for o in range(n):
         times = max(0.0, max(x_low - middle_x[o], middle_x[o] - x_high) * per_half_x[o])
         times = max(times, max(y_low - middle_y[o], middle_y[o] - y_high) * per_half_y[o])
         times = max(times, max(z_low - middle_z[o], middle_z[o] - z_high) * per_half_z[o])
-        far_m = near_m[o] + rise_m[o] * (times - 1.0) - SURE_M
+        far_m = near_m[o] + rise_m[o] * (times - 1.0) - EPS_M
         bound_m[o] = far_m if times > 1.0 else -math.inf
 
 
@@ -115,12 +115,12 @@ def write_meetings(columns, box, first, n, x0, y0, z0, x1, y1, z1, meets):
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
     stride = columns.shape[1]
-    lower_x = part(columns, box * stride + first, n)
-    lower_y = part(columns, (box + 1) * stride + first, n)
-    lower_z = part(columns, (box + 2) * stride + first, n)
-    upper_x = part(columns, (box + 3) * stride + first, n)
-    upper_y = part(columns, (box + 4) * stride + first, n)
-    upper_z = part(columns, (box + 5) * stride + first, n)
+    lower_x = slice_view(columns, box * stride + first, n)
+    lower_y = slice_view(columns, (box + 1) * stride + first, n)
+    lower_z = slice_view(columns, (box + 2) * stride + first, n)
+    upper_x = slice_view(columns, (box + 3) * stride + first, n)
+    upper_y = slice_view(columns, (box + 4) * stride + first, n)
+    upper_z = slice_view(columns, (box + 5) * stride + first, n)
     for o in range(n):
         beyond = max(lower_x[o] - x_high, x_low - upper_x[o])
         beyond = max(beyond, max(lower_y[o] - y_high, y_low - upper_y[o]))

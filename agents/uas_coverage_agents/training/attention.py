@@ -1,4 +1,4 @@
-"""The gaze network in torch, as a policy of Stable-Baselines3; see `policy.gaze.Gaze`."""
+"""The gaze network in torch, as a policy of Stable-Baselines3; see `policy.network.Attention`."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import nn
 
-from uas_coverage_agents.policy.gaze import Gaze
+from uas_coverage_agents.policy.attention import Attention
 from uas_coverage_agents.training.actor_critic import ActorCritic
 from uas_coverage_env.env import observation_columns
 from uas_coverage_env.env.observation.scales import HEIGHT_M
@@ -32,18 +32,18 @@ _CRITIC = 128
 """Width of the layers that estimate the value; they do not fly along."""
 
 
-class Actor(nn.Module):
+class AttentionActor(nn.Module):
     """The network that flies, weight for weight, but for its last layer."""
 
-    def __init__(self, gaze: Gaze) -> None:
+    def __init__(self, network: Attention) -> None:
         super().__init__()
-        self._gaze = gaze
-        seen = gaze.features + gaze.keys
-        self.own = nn.Linear(gaze.own, gaze.hidden)
-        self.key = nn.Linear(gaze.features, gaze.keys)
-        self.query = nn.Linear(gaze.hidden, gaze.keys)
-        self.bent = nn.Linear(gaze.features, 1, bias=False)
-        self.hidden = nn.Linear(gaze.hidden + seen, gaze.hidden)
+        self._network = network
+        seen = network.features + network.keys
+        self.own = nn.Linear(network.own, network.hidden)
+        self.key = nn.Linear(network.features, network.keys)
+        self.query = nn.Linear(network.hidden, network.keys)
+        self.bent = nn.Linear(network.features, 1, bias=False)
+        self.hidden = nn.Linear(network.hidden + seen, network.hidden)
         for tensor in (self.query.weight, self.query.bias, self.bent.weight):
             nn.init.zeros_(tensor)
         with torch.no_grad():
@@ -51,10 +51,10 @@ class Actor(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """(n, inputs) -> (n, numbers that the outputs are a linear function of)."""
-        gaze = self._gaze
-        end = gaze.before + gaze.candidates * gaze.features
-        own = torch.cat([x[:, : gaze.before], x[:, end:]], 1)
-        w = x[:, gaze.before : end].reshape(-1, gaze.candidates, gaze.features)
+        network = self._network
+        end = network.before + network.candidates * network.features
+        own = torch.cat([x[:, : network.before], x[:, end:]], 1)
+        w = x[:, network.before : end].reshape(-1, network.candidates, network.features)
         c = torch.tanh(self.own(own))
         e = torch.tanh(self.key(w))
         score = (torch.matmul(e, self.query(c)[:, :, None]) + self.bent(w))[..., 0]
@@ -65,33 +65,33 @@ class Actor(nn.Module):
         return torch.cat([h, a, own], 1)
 
 
-class GazePolicy(ActorCriticPolicy):
+class AttentionPolicy(ActorCriticPolicy):
     """Flies with a gaze network; before training, straight to the nearest open waypoint.
 
     Args:
         args: As of the base.
-        gaze: The network.
+        network: The network.
         kwargs: As of the base; `ortho_init` has to be off, it would scramble the first actions.
     """
 
-    def __init__(self, *args: Any, gaze: Gaze, **kwargs: Any) -> None:
-        self.gaze = gaze
+    def __init__(self, *args: Any, network: Attention, **kwargs: Any) -> None:
+        self.network = network
         super().__init__(*args, **{"ortho_init": False, **kwargs})
 
     def _build_mlp_extractor(self) -> None:
-        gaze = self.gaze
+        network = self.network
         # the actor first: the order in which weights are drawn is part of what a seed means
-        actor = Actor(gaze)
+        actor = AttentionActor(network)
         critic = nn.Sequential(
-            nn.Linear(gaze.inputs, _CRITIC), nn.Tanh(), nn.Linear(_CRITIC, _CRITIC), nn.Tanh()
+            nn.Linear(network.inputs, _CRITIC), nn.Tanh(), nn.Linear(_CRITIC, _CRITIC), nn.Tanh()
         )
-        both: Any = ActorCritic(actor, gaze.last, critic, _CRITIC)
+        both: Any = ActorCritic(actor, network.last, critic, _CRITIC)
         self.mlp_extractor = both
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
-        target = self.gaze.hidden
-        own = self.gaze.last - self.gaze.own
+        target = self.network.hidden
+        own = self.network.last - self.network.own
         out: Any = self.action_net
         with torch.no_grad():
             out.weight.zero_()
@@ -102,7 +102,7 @@ class GazePolicy(ActorCriticPolicy):
             out.weight[2, own + _UP] = 1.0
 
     def tensors(self) -> dict[str, NDArray[np.float32]]:
-        """The weights by the names of `Gaze.shapes`."""
+        """The weights by the names of `Attention.shapes`."""
         parts = {
             **self.mlp_extractor.actor.state_dict(),
             **{f"out.{name}": tensor for name, tensor in self.action_net.state_dict().items()},

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from uas_coverage_env.files.folder import prepare_folder, write_files
+from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from uas_coverage_agents.waypoint.greedy_rollout import ABSENT, IN_THE_AIR, greedy_rollout
 from uas_coverage_agents.waypoint.layout import (
     CANDIDATE_AT,
     CANDIDATE_TABLE,
@@ -19,7 +20,6 @@ from uas_coverage_agents.waypoint.layout import (
     K,
 )
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
-from uas_coverage_agents.waypoint.outlook import ABSENT, IN_THE_AIR, outlook
 from uas_coverage_env.autopilot import path_length_home_m
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
@@ -132,7 +132,7 @@ def _turning_s(cruise_mps, vx, vy, towards):
 
 @allocating_kernel
 def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, place):
-    """Where and when each UAS is free, see `outlook`."""
+    """Where and when each UAS is free, see `greedy_rollout`."""
     for j in range(targets.shape[0]):
         place[j] = ABSENT
         ready_s[j] = 0.0
@@ -162,7 +162,7 @@ def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, 
 
 
 @allocating_kernel
-def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
+def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
     """Write what UAS i sees and may choose; the numbers are those of `layout`.
 
     Args:
@@ -279,7 +279,7 @@ def look(arena, legs, state, blocked, targets, i, candidates, legal, row):
             length_m = math.hypot(towards[k, 0], towards[k, 1])
             along = x[VX] * towards[k, 0] + x[VY] * towards[k, 1]
             values[CANDIDATE_AT.ahead] = along / max(speed_mps * length_m, 1e-6)
-        total_s[k], longest_s[k], left[k] = outlook(
+        total_s[k], longest_s[k], left[k] = greedy_rollout(
             legs, from_s, here_home_s, budgets_s, trial_ready_s, trial_place, trial_todo, n_trial
         )
         if k < K and (best < 0 or _worth(total_s, longest_s, left, k, best)):

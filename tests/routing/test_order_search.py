@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from uas_coverage_baselines.order import (
-    Beginning,
-    Effort,
-    Order,
-    Task,
-    improved,
-    no_order,
+from uas_coverage_baselines.routing import (
+    Routes,
+    RouteWindow,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
 )
-from uas_coverage_baselines.order import search as search_module
+from uas_coverage_baselines.routing import search as search_module
 
-SOME = Effort(20_000)
+SOME = SearchEffort(20_000)
 seeds = st.integers(0, 10_000)
 few = settings(max_examples=15, deadline=None, derandomize=True)
 
@@ -30,7 +30,7 @@ def task(seed=0, waypoints=8, uas=2, **changes):
     here, start = rng.uniform(0.0, 300.0, (2, uas, 2))
     speed = np.array([12.0, 9.0, 10.0])[:uas]
     apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
-    made = Task(
+    made = RoutingTask(
         open_waypoints=np.arange(waypoints),
         first_s=np.linalg.norm(here[:, None] - places[None, :, :2], axis=2) / speed[:, None],
         between_s=apart[None] / speed[:, None, None],
@@ -119,10 +119,10 @@ def test_every_open_waypoint_is_visited_once_or_left_out(seed, waypoints, uas):
     rng = np.random.default_rng(seed)
     wanted = np.flatnonzero(rng.random(waypoints) < 0.7)
     tight = rng.uniform(20.0, 120.0, uas)
-    found = improved(
+    found = improve_routes(
         task(seed, waypoints, uas, open_waypoints=wanted, budget_s=tight),
-        no_order(uas),
-        Effort(3000),
+        empty_routes(uas),
+        SearchEffort(3000),
         seed,
     )
     assert visits(found) == wanted.tolist()
@@ -132,8 +132,8 @@ def test_every_open_waypoint_is_visited_once_or_left_out(seed, waypoints, uas):
 @given(seeds, st.integers(0, 4000), st.sampled_from([0, 3]))
 def test_an_order_is_never_worse_than_the_one_it_starts_from(seed, moves, window):
     problem = task(seed, 15)
-    before = improved(problem, no_order(2), Effort(0), 0)
-    after = improved(problem, before, Effort(moves, window=window), seed)
+    before = improve_routes(problem, empty_routes(2), SearchEffort(0), 0)
+    after = improve_routes(problem, before, SearchEffort(moves, window=window), seed)
     assert after.cost_s <= before.cost_s + 1e-9
 
 
@@ -141,7 +141,7 @@ def test_an_order_is_never_worse_than_the_one_it_starts_from(seed, moves, window
 @given(seeds)
 def test_the_same_arguments_give_the_same_order(seed):
     problem = task(seed, 20)
-    one, two = (improved(problem, no_order(2), Effort(5000), 7) for _ in range(2))
+    one, two = (improve_routes(problem, empty_routes(2), SearchEffort(5000), 7) for _ in range(2))
     assert [r.tolist() for r in one.routes] == [r.tolist() for r in two.routes]
     assert one.cost_s == two.cost_s
 
@@ -151,10 +151,10 @@ def test_the_same_arguments_give_the_same_order(seed):
 def test_seconds_and_cost_are_those_of_the_routes(seed, uas):
     opens = np.where(np.arange(8) % 3 == 0, 40.0, 0.0)
     problem = task(seed, 8, uas, not_before_s=opens)
-    found = improved(problem, no_order(uas), Effort(2000), seed)
+    found = improve_routes(problem, empty_routes(uas), SearchEffort(2000), seed)
     alone = [seconds_of(problem, u, route) for u, route in enumerate(found.routes)]
     assert found.seconds == pytest.approx(alone, abs=0.2)  # turns are tabulated
-    total = Effort(0).total_weight
+    total = SearchEffort(0).total_weight
     exact = cost_of(problem, found.seconds, found.left_out, total)
     assert found.cost_s == pytest.approx(exact, abs=1e-6)
 
@@ -162,8 +162,8 @@ def test_seconds_and_cost_are_those_of_the_routes(seed, uas):
 @pytest.mark.parametrize(("seed", "waypoints", "uas"), [(0, 7, 1), (1, 7, 2), (2, 6, 2)])
 def test_the_search_finds_the_optimum_of_all_orders(seed, waypoints, uas):
     problem = task(seed, waypoints, uas)
-    effort = Effort(60_000)
-    found = min(improved(problem, no_order(uas), effort, s).cost_s for s in range(3))
+    effort = SearchEffort(60_000)
+    found = min(improve_routes(problem, empty_routes(uas), effort, s).cost_s for s in range(3))
     assert found == pytest.approx(cheapest(problem, effort.total_weight), abs=0.3)
 
 
@@ -188,7 +188,7 @@ def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
         neighbours=np.argsort(apart, axis=1, kind="stable")[:, 1:],
         budget_s=np.full(2, budget_s),
     )
-    found = improved(problem, no_order(2), SOME, seed)
+    found = improve_routes(problem, empty_routes(2), SOME, seed)
     # so little overtime is cheaper than a waypoint; the guide's reserve is far more
     slight_s = search_module._LEFT_OUT_S / search_module._OVERTIME
     assert (found.seconds <= problem.budget_s + slight_s).all()
@@ -197,17 +197,17 @@ def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
 
 def test_a_uas_that_may_not_fly_gets_nothing():
     problem = task(3, 10, budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
-    found = improved(problem, no_order(2), SOME, 0)
+    found = improve_routes(problem, empty_routes(2), SOME, 0)
     assert len(found.routes[1]) == 0
     assert sorted(found.routes[0]) == list(range(10))
 
 
 def test_a_lost_uass_waypoints_go_to_the_others():
     problem = task(3, 10)
-    before = improved(problem, no_order(2), SOME, 0)
+    before = improve_routes(problem, empty_routes(2), SOME, 0)
     assert len(before.routes[1])
     lost = replace(problem, budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
-    after = improved(lost, before, SOME, 0)
+    after = improve_routes(lost, before, SOME, 0)
     assert sorted(after.routes[0]) == list(range(10))
 
 
@@ -215,7 +215,7 @@ def test_a_waypoint_that_opens_late_is_waited_for():
     problem = task(4, 1, 1)
     opens = 40.0
     late = replace(problem, not_before_s=np.array([opens]))
-    found = improved(late, no_order(1), Effort(100), 0)
+    found = improve_routes(late, empty_routes(1), SearchEffort(100), 0)
     back = late.home_s[0, 0] + late.turn_s[0, 0] * turn(
         late.position_m[0], late.waypoints_m[0, :2], late.start_m[0]
     )
@@ -224,9 +224,9 @@ def test_a_waypoint_that_opens_late_is_waited_for():
 
 def test_visited_waypoints_vanish_and_new_ones_are_inserted():
     problem = task(5, 10)
-    before = improved(replace(problem, open_waypoints=np.arange(8)), no_order(2), SOME, 0)
+    before = improve_routes(replace(problem, open_waypoints=np.arange(8)), empty_routes(2), SOME, 0)
     now = np.array([1, 2, 4, 5, 7, 8, 9])
-    after = improved(replace(problem, open_waypoints=now), before, Effort(0), 0)
+    after = improve_routes(replace(problem, open_waypoints=now), before, SearchEffort(0), 0)
     assert visits(after) == now.tolist()
     for old, new in zip(before.routes, after.routes, strict=True):
         assert [w for w in old if w in now] == [w for w in new if w < 8]
@@ -234,14 +234,14 @@ def test_visited_waypoints_vanish_and_new_ones_are_inserted():
 
 def test_with_nothing_open_everybody_goes_home():
     problem = task(6, 5, open_waypoints=np.zeros(0, np.int64))
-    found = improved(problem, improved(task(6, 5), no_order(2), SOME, 0), SOME, 0)
+    found = improve_routes(problem, improve_routes(task(6, 5), empty_routes(2), SOME, 0), SOME, 0)
     assert visits(found) == []
     assert found.seconds == pytest.approx(problem.idle_s)
 
 
 def test_one_waypoint_alone_goes_to_somebody():
-    found = improved(task(7, 1), no_order(2), SOME, 0)
-    assert isinstance(found, Order)
+    found = improve_routes(task(7, 1), empty_routes(2), SOME, 0)
+    assert isinstance(found, Routes)
     assert visits(found) == [0]
     assert not len(found.left_out)
 
@@ -250,16 +250,18 @@ def test_one_waypoint_alone_goes_to_somebody():
 @given(seed=seeds, most=st.integers(2, 5))
 def test_searching_the_beginnings_is_searching_the_whole_with_the_rests_as_they_are(seed, most):
     whole = task(seed, waypoints=14, turn_s=np.zeros((2, 14)))
-    order = improved(whole, no_order(2), Effort(200), seed)
-    part = Beginning.of(whole, order, most)
-    as_it_is = improved(part.task, part.order, Effort(0), 0)
+    order = improve_routes(whole, empty_routes(2), SearchEffort(200), seed)
+    part = RouteWindow.of(whole, order, most)
+    as_it_is = improve_routes(part.task, part.order, SearchEffort(0), 0)
     assert as_it_is.seconds == pytest.approx(order.seconds)
     assert as_it_is.cost_s == pytest.approx(order.cost_s)
-    better = improved(part.task, as_it_is, SOME, seed)
+    better = improve_routes(part.task, as_it_is, SOME, seed)
     joined = part.joined(better)
     assert sorted(np.concatenate(joined.routes)) == list(range(14))
     if all(map(len, better.routes)):  # setting off for the rest at once is not in `idle_s`
-        assert improved(whole, joined, Effort(0), 0).cost_s == pytest.approx(better.cost_s)
+        assert improve_routes(whole, joined, SearchEffort(0), 0).cost_s == pytest.approx(
+            better.cost_s
+        )
     for old, new in zip(order.routes, joined.routes, strict=True):
         if len(old) > most:
             assert new[len(new) - len(old) + most :].tolist() == old[most:].tolist()
@@ -268,17 +270,17 @@ def test_searching_the_beginnings_is_searching_the_whole_with_the_rests_as_they_
 def test_what_no_battery_reaches_stays_left_out_when_beginnings_are_searched():
     neighbours = np.array([[(w + 1) % 14, (w + 2) % 14] for w in range(14)])
     whole = task(5, waypoints=14, budget_s=np.full(2, 60.0), neighbours=neighbours)
-    order = improved(whole, no_order(2), SOME, 0)
-    part = Beginning.of(whole, order, 2)
+    order = improve_routes(whole, empty_routes(2), SOME, 0)
+    part = RouteWindow.of(whole, order, 2)
     assert len(order.left_out)
     assert any(map(len, part.rests))
-    joined = part.joined(improved(part.task, part.order, SOME, 1))
+    joined = part.joined(improve_routes(part.task, part.order, SOME, 1))
     assert sorted(np.concatenate([*joined.routes, joined.left_out])) == list(range(14))
 
 
 def test_short_routes_are_searched_as_a_whole():
     whole = task(3)
-    order = improved(whole, no_order(2), SOME, 0)
-    part = Beginning.of(whole, order, 8)
+    order = improve_routes(whole, empty_routes(2), SOME, 0)
+    part = RouteWindow.of(whole, order, 8)
     assert part.task is whole
     assert [r.tolist() for r in part.joined(order).routes] == [r.tolist() for r in order.routes]

@@ -19,9 +19,9 @@ from uas_coverage_agents.waypoint.layout import (
     K,
 )
 from uas_coverage_agents.waypoint.legs import legs_of
-from uas_coverage_agents.waypoint.look import NO_TARGET
+from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
-from uas_coverage_agents.waypoint.search import Desk, Moment, improve, no_plan, planned
+from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NOBODY, Choices, choose, next_to_decide
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
@@ -60,7 +60,7 @@ def observation() -> Observation:
 _NOWHERE = np.zeros((1, 0, 3))
 
 
-class WaypointPilot:
+class WaypointRunner:
     """Every UAS chooses with the same network where to fly next; the world flies it there.
 
     Args:
@@ -102,7 +102,7 @@ class WaypointPilot:
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
         self._blocked = np.zeros(n_waypoints, dtype=np.bool_)
-        self._desk = Desk(
+        self._workspace = Workspace(
             state=STATE.zeros({"U": n_uas, "W": n_waypoints, "D": 0}),
             commands=np.zeros(n_uas, dtype=COMMAND_DTYPE),
             outcome=np.zeros(n_uas, dtype=OUTCOME_DTYPE),
@@ -132,7 +132,7 @@ class WaypointPilot:
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
         state.returning[:] |= self._returning
-        choices = self._desk.choices
+        choices = self._workspace.choices
         looked_ahead = self._simulations == 0
         while True:
             i = next_to_decide(
@@ -142,7 +142,7 @@ class WaypointPilot:
             if i == NOBODY:
                 break
             choice = best_choice(
-                self._weights, choices.observation, choices.legal, self._desk.scores
+                self._weights, choices.observation, choices.legal, self._workspace.scores
             )
             if not looked_ahead:
                 self._look_ahead(state)
@@ -156,13 +156,13 @@ class WaypointPilot:
 
     def _look_ahead(self, state: WorldState) -> None:
         """Make the plan better; the observation on the desk is lost."""
-        choices = self._desk.choices
+        choices = self._workspace.choices
         kept = choices.candidates.copy(), choices.legal.copy()
         return_mode = self._assistants.return_mode
         improve(
             self._still, self._legs, self._weights, Moment(state, self._targets, self._blocked),
             return_mode, assistants(return_mode, self._assistants.safety_filter), self._plan,
-            self._simulations, self._desk, self._rng, self._trial, self._best,
+            self._simulations, self._workspace, self._rng, self._trial, self._best,
         )  # fmt: skip
         self._plan, self._best = self._best, self._plan
         choices.candidates[:], choices.legal[:] = kept

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
 from uas_coverage_agents.waypoint.legs import LEGS, legs_of
-from uas_coverage_agents.waypoint.look import NO_TARGET
+from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.team import (
     ACCOUNT_SIZE,
     NOBODY,
@@ -42,7 +42,7 @@ def pool_legs(scenarios: Sequence[Scenario]) -> Pool:
     return LEGS.pool([legs_of(build_arena(scenario)) for scenario in scenarios])
 
 
-class Lanes(NamedTuple):
+class WaypointSubEnvironments(NamedTuple):
     """What L lanes need besides the world."""
 
     scenario: Annotated[NDArray[np.int64], "L", Values(0, "S")]
@@ -60,10 +60,10 @@ class Lanes(NamedTuple):
     """Of the mission so far."""
 
 
-LANES = Memory(Lanes)
+LANES = Memory(WaypointSubEnvironments)
 
 
-def make_lanes(n_lanes: int, pool: WorldPool) -> tuple[Lanes, WorldState]:
+def make_lanes(n_lanes: int, pool: WorldPool) -> tuple[WaypointSubEnvironments, WorldState]:
     """Lanes that fly any scenario of a pool; nothing has begun."""
     lanes = LANES.zeros({**ARENA.largest(pool.arenas), "L": n_lanes})
     lanes.decider[:] = NOBODY
@@ -97,7 +97,7 @@ def begin_lane(
     Args:
         worlds: `WorldPool`.
         all_legs: Of `pool_legs`.
-        lanes: `Lanes`; written.
+        lanes: `WaypointSubEnvironments`; written.
         states: `lanes_of` the pool; written.
         lane: Which lane.
         s: Index of the scenario.
@@ -124,7 +124,7 @@ class _Given(NamedTuple):
 
     worlds: WorldPool
     legs: Pool
-    lanes: Lanes
+    lanes: WaypointSubEnvironments
     states: WorldState
 
 
@@ -161,7 +161,7 @@ def step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants
     Args:
         worlds: `WorldPool`.
         all_legs: Of `pool_legs`.
-        lanes: `Lanes`; written.
+        lanes: `WaypointSubEnvironments`; written.
         states: `lanes_of` the pool; written.
         choices: (L,) legal choices.
         return_mode: Whether the world brings UAS home in time.

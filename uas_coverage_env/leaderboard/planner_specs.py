@@ -13,7 +13,7 @@ _LABELLED = re.compile(r"([\w.+-]+)=(.+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Player:
+class PlannerSpec:
     """A planner as it is flown.
 
     Attributes:
@@ -41,7 +41,7 @@ class Player:
         }
 
 
-def players_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, Player]:
+def planner_specs_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, PlannerSpec]:
     """The planners that the command line names, by label, in their order.
 
     Args:
@@ -71,12 +71,14 @@ def players_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, Player
         if key in given[label]:
             raise InputError(f"--option {label}:{key} is given twice; give it once")
         given[label][key] = value
-    return {label: _player(label, planner, given[label]) for label, planner in planners.items()}
+    return {
+        label: _planner_spec(label, planner, given[label]) for label, planner in planners.items()
+    }
 
 
-def _player(label: str, name: str, options: Mapping[str, str]) -> Player:
+def _planner_spec(label: str, name: str, options: Mapping[str, str]) -> PlannerSpec:
     planner = load_planner(name, options)
-    return Player(
+    return PlannerSpec(
         label,
         name,
         options_of(planner),

@@ -19,7 +19,7 @@ from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
 
-def borrow(array: NDArray, row: int, shape: tuple[int, ...]) -> Any:
+def rows_view(array: NDArray, row: int, shape: tuple[int, ...]) -> Any:
     """The elements of a C-contiguous array from the beginning of a row on, in another shape.
 
     Args:
@@ -30,7 +30,7 @@ def borrow(array: NDArray, row: int, shape: tuple[int, ...]) -> Any:
     return array[row:].reshape(-1)[: math.prod(shape)].reshape(shape)
 
 
-def part(array: NDArray, first: int, n: int) -> Any:
+def slice_view(array: NDArray, first: int, n: int) -> Any:
     """Some elements of a C-contiguous array one after the other, however many axes it has.
 
     Args:
@@ -41,7 +41,7 @@ def part(array: NDArray, first: int, n: int) -> Any:
     return array.reshape(-1)[first : first + n]
 
 
-def lend(address: int, dtype: np.dtype, shape: tuple[int, ...]) -> Any:
+def carray(address: int, dtype: np.dtype, shape: tuple[int, ...]) -> Any:
     """The C-contiguous array that lies at an address, for as long as its owner keeps it.
 
     Args:
@@ -59,9 +59,9 @@ def view_of(builder, context, view_type, start, shape, itemsize):
     strides = [itemsize]
     for size in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], size))
-    part = make_array(view_type)(context, builder)
+    view = make_array(view_type)(context, builder)
     populate_array(
-        part,
+        view,
         data=start,
         shape=shape,
         strides=strides,
@@ -69,7 +69,7 @@ def view_of(builder, context, view_type, start, shape, itemsize):
         meminfo=None,
         parent=None,
     )
-    return part._getvalue()
+    return view._getvalue()
 
 
 def _sizes(builder, context, shape, shape_type):
@@ -79,7 +79,7 @@ def _sizes(builder, context, shape, shape_type):
     ]
 
 
-@type_callable(borrow)
+@type_callable(rows_view)
 def _type_of_borrowed(context):
     def typer(array, row, shape):
         if not isinstance(array, types.Array) or array.layout != "C":
@@ -91,7 +91,7 @@ def _type_of_borrowed(context):
     return typer
 
 
-@lower_builtin(borrow, types.Array, types.Integer, types.BaseTuple)
+@lower_builtin(rows_view, types.Array, types.Integer, types.BaseTuple)
 def _borrowed(context, builder, signature, arguments):
     array_type, row_type, shape_type = signature.args
     whole = make_array(array_type)(context, builder, arguments[0])
@@ -103,7 +103,7 @@ def _borrowed(context, builder, signature, arguments):
     return view_of(builder, context, signature.return_type, start, sizes, whole.itemsize)
 
 
-@type_callable(part)
+@type_callable(slice_view)
 def _type_of_part(context):
     def typer(array, first, n):
         if not isinstance(array, types.Array) or array.layout != "C":
@@ -113,7 +113,7 @@ def _type_of_part(context):
     return typer
 
 
-@lower_builtin(part, types.Array, types.Integer, types.Integer)
+@lower_builtin(slice_view, types.Array, types.Integer, types.Integer)
 def _parted(context, builder, signature, arguments):
     array_type, first_type, n_type = signature.args
     whole = make_array(array_type)(context, builder, arguments[0])
@@ -123,7 +123,7 @@ def _parted(context, builder, signature, arguments):
     return view_of(builder, context, signature.return_type, start, [size], whole.itemsize)
 
 
-@type_callable(lend)
+@type_callable(carray)
 def _type_of_lent(context):
     def typer(address, dtype, shape):
         return types.Array(dtype.dtype, len(shape), "C")
@@ -131,7 +131,7 @@ def _type_of_lent(context):
     return typer
 
 
-@lower_builtin(lend, types.Integer, types.DType, types.BaseTuple)
+@lower_builtin(carray, types.Integer, types.DType, types.BaseTuple)
 def _lent(context, builder, signature, arguments):
     address_type, dtype_type, shape_type = signature.args
     element = context.get_data_type(dtype_type.dtype)

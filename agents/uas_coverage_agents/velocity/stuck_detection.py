@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from uas_coverage_env.env import observation_columns
 from uas_coverage_env.env.observation.scales import NEARBY_M
 
-PATIENCE_S = 20.0
+STUCK_AFTER_S = 20.0
 """For how long a waypoint may be the next one near by; covering one takes less than ten [s]."""
 
-LOOK_AWAY_S = 60.0
+HIDDEN_FOR_S = 60.0
 """[s]"""
 
 _NEAR_M = 60.0
@@ -22,12 +22,12 @@ _FEATURES = int(_THERE[1] - _THERE[0])
 _END = _FIRST + len(_THERE) * _FEATURES
 
 
-class Patience:
+class StuckDetection:
     """Hides from each UAS the waypoints that it has tried for too long.
 
     A policy without memory that waits for a moving obstacle to leave a waypoint, or flies circles
-    round one, would do so until the battery is empty. A waypoint that was for `PATIENCE_S` the
-    nearest that is shown, and near, is hidden for `LOOK_AWAY_S`, unless there is no other.
+    round one, would do so until the battery is empty. A waypoint that was for `STUCK_AFTER_S` the
+    nearest that is shown, and near, is hidden for `HIDDEN_FOR_S`, unless there is no other.
 
     Args:
         n_uas: Size of the swarm.
@@ -40,7 +40,7 @@ class Patience:
         self._hidden_s = np.zeros((n_uas, n_waypoints))
         self._dt_s = dt_s
 
-    def look(
+    def filter(
         self, view: NDArray[np.float32], candidates: NDArray[np.integer]
     ) -> NDArray[np.float32]:
         """What is left of a view; to be asked once per sample.
@@ -67,7 +67,7 @@ class Patience:
             if seen[i, _CLOSENESS] > _NEAR:
                 w = offered[shown[0]]
                 self._tried_s[i, w] += self._dt_s
-                if self._tried_s[i, w] >= PATIENCE_S:
+                if self._tried_s[i, w] >= STUCK_AFTER_S:
                     self._tried_s[i, w] = 0.0
-                    self._hidden_s[i, w] = LOOK_AWAY_S
+                    self._hidden_s[i, w] = HIDDEN_FOR_S
         return seen

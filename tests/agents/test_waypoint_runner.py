@@ -5,10 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from uas_coverage_agents.policy.pointer import Pointer
-from uas_coverage_agents.waypoint.lanes import begin_lanes, make_lanes, pool_legs, step_lanes
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
-from uas_coverage_agents.waypoint.pilot import WaypointPilot, network, observation
+from uas_coverage_agents.waypoint.policy_runner import WaypointRunner, network, observation
 from uas_coverage_agents.waypoint.scorer import score, weights_of
+from uas_coverage_agents.waypoint.sub_environments import (
+    begin_lanes,
+    make_lanes,
+    pool_legs,
+    step_lanes,
+)
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NOBODY, TIME
 from waypoint_missions import PRIOR, tensors, town, with_something_parked
 
@@ -26,7 +31,7 @@ def policy_of(weights, hidden=16):
 
 
 def flown(scenario, weights, simulations=0, seed=0):
-    pilot = WaypointPilot(policy_of(weights), BOTH, simulations)
+    pilot = WaypointRunner(policy_of(weights), BOTH, simulations)
     return rollout(scenario, pilot, seed, return_mode=True, safety_filter=True)
 
 
@@ -59,9 +64,9 @@ def test_a_flight_decides_as_the_training_does(weights, n_uas):
 
 
 def test_the_compiled_network_is_the_network_of_the_policy_file():
-    lots = np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     pointer, weights = network(16, PRIOR), tensors(seed=4)
-    row = lots.normal(size=OBSERVATION_SIZE).astype(np.float32)
+    row = rng.normal(size=OBSERVATION_SIZE).astype(np.float32)
     each = row[pointer.team :].reshape(K, -1)
     each[:, 0] = 1.0
     each[7:] = 0.0
@@ -75,11 +80,11 @@ def test_the_compiled_network_is_the_network_of_the_policy_file():
 
 def test_before_training_the_nearest_candidate_wins():
     weights = tensors()
-    lots = np.random.default_rng(5)
-    rows = lots.normal(size=(20, OBSERVATION_SIZE))
+    rng = np.random.default_rng(5)
+    rows = rng.normal(size=(20, OBSERVATION_SIZE))
     each = rows[:, network(16, PRIOR).team :].reshape(20, K, -1)
     each[..., 0] = 1.0
-    each[..., 1] = np.sort(lots.uniform(0.0, 3.0, (20, K)), axis=1)
+    each[..., 1] = np.sort(rng.uniform(0.0, 3.0, (20, K)), axis=1)
     scores = network(16, PRIOR).forward(weights, rows)
     assert (scores.argmax(axis=1) == 0).all()
 
@@ -126,11 +131,11 @@ def test_a_policy_of_another_layout_is_refused():
     policy = policy_of(tensors())
     policy.description.observation = observation().model_copy(update={"layout": "waypoint_v0"})
     with pytest.raises(ValueError, match="train it anew"):
-        WaypointPilot(policy, BOTH)
+        WaypointRunner(policy, BOTH)
     policy = policy_of(tensors())
     policy.description.network = network(16, PRIOR).model_copy(update={"way": 2})
     with pytest.raises(ValueError, match="train it anew"):
-        WaypointPilot(policy, BOTH)
+        WaypointRunner(policy, BOTH)
 
 
 def test_a_pointer_whose_sizes_contradict_each_other_is_refused():

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from uas_coverage_agents.policy.gaze import Gaze
+from uas_coverage_agents.policy.attention import Attention
 from uas_coverage_agents.training.config import load_config
-from uas_coverage_agents.training.trainee import Order, Trainee
-from uas_coverage_agents.velocity.pilot import gaze
+from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
+from uas_coverage_agents.velocity.policy_runner import attention_network
 
 from uas_coverage_env import InputError
 from uas_coverage_env.env import observation_columns
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 CHANGES = ['player.network="gaze"', "player.hidden=[8]", "player.keys=4"]
-SMALL = Gaze(inputs=11, outputs=2, before=2, candidates=3, features=2, keys=4, hidden=5)
+SMALL = Attention(inputs=11, outputs=2, before=2, candidates=3, features=2, keys=4, hidden=5)
 
 
-def tensors_of(network: Gaze, seed: int = 0) -> dict[str, np.ndarray]:
-    lots = np.random.default_rng(seed)
-    return {name: lots.normal(size=shape) for name, shape in network.shapes().items()}
+def tensors_of(network: Attention, seed: int = 0) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return {name: rng.normal(size=shape) for name, shape in network.shapes().items()}
 
 
 def views(n: int, seed: int = 0) -> np.ndarray:
@@ -32,8 +32,8 @@ def views(n: int, seed: int = 0) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def trainee() -> Trainee:
-    return Trainee.untrained(Order("tiny", load_config(TINY, changes=CHANGES), seed=0))
+def training_run() -> TrainingRun:
+    return TrainingRun.untrained(TrainingJob("tiny", load_config(TINY, changes=CHANGES), seed=0))
 
 
 @given(st.permutations(range(3)), st.integers(0, 99))
@@ -69,12 +69,12 @@ def test_the_largest_weights_give_finite_outputs():
 
 def test_sizes_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match="before \\+ candidates \\* features is 102"):
-        Gaze.model_validate(SMALL.model_dump() | {"before": 96})
+        Attention.model_validate(SMALL.model_dump() | {"before": 96})
 
 
-def test_before_training_it_flies_to_the_nearest_open_waypoint(trainee):
-    network, tensors = trainee.learner.export(trainee.model)
-    assert network == gaze(8, 4)
+def test_before_training_it_flies_to_the_nearest_open_waypoint(training_run):
+    network, tensors = training_run.learner.export(training_run.model)
+    assert network == attention_network(8, 4)
     x = np.zeros((1, network.inputs))
     there, closeness = (
         observation_columns("waypoints", name)[:, 0] for name in ("valid", "closeness")
@@ -88,15 +88,17 @@ def test_before_training_it_flies_to_the_nearest_open_waypoint(trainee):
     assert np.allclose(outputs[0, :2], [0.54, 0.72], atol=0.1)
 
 
-def test_what_is_exported_decides_as_the_model_does(trainee):
-    seen = np.random.default_rng(0).uniform(-1, 1, (6, trainee.model.observation_space.shape[0]))
-    expected, _ = trainee.model.predict(seen.astype(np.float32), deterministic=True)
-    assert np.allclose(np.clip(trainee.policy().forward(seen), -1, 1), expected, atol=1e-5)
+def test_what_is_exported_decides_as_the_model_does(training_run):
+    seen = np.random.default_rng(0).uniform(
+        -1, 1, (6, training_run.model.observation_space.shape[0])
+    )
+    expected, _ = training_run.model.predict(seen.astype(np.float32), deterministic=True)
+    assert np.allclose(np.clip(training_run.policy().forward(seen), -1, 1), expected, atol=1e-5)
 
 
 def test_it_learns_and_explores_less_and_less():
     changes = [*CHANGES, "player.first_deviation=0.5", "learning.epochs=1"]
-    fresh = Trainee.untrained(Order("tiny", load_config(TINY, changes=changes), seed=0))
+    fresh = TrainingRun.untrained(TrainingJob("tiny", load_config(TINY, changes=changes), seed=0))
     before = fresh.policy().tensors
     fresh.model.lr_schedule = lambda _: 0.25 * fresh.model.learning_rate
     fresh.model.learn(64)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.borrow import part
+from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.env.memory import LEARNERS, SCRATCH, TABLES, Paying
@@ -66,7 +66,7 @@ def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64]) -> Payi
 def _pay_as_usual(arena, state, tables, learners, scratch, i):
     """Write the terms of `REWARD`, not yet weighted."""
     row = learners.terms[i]
-    none = part(learners.terms, 0, 0)
+    none = slice_view(learners.terms, 0, 0)
     row[_AT.coverage] = default.coverage(arena, state, tables, learners, scratch, i, none)
     row[_AT.team_coverage] = default.team_coverage(arena, state, tables, learners, scratch, i, none)
     row[_AT.energy] = default.energy(arena, state, tables, learners, scratch, i, none)
@@ -78,7 +78,7 @@ def _pay_as_usual(arena, state, tables, learners, scratch, i):
 
 
 @inlined_kernel
-def pay(arena, state, tables, learners, scratch, paying, on_gpu):
+def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
     """Write the weighted terms of every UAS that flew in this step; those of the others are zero.
 
     Args:
@@ -106,7 +106,7 @@ def pay(arena, state, tables, learners, scratch, paying, on_gpu):
                 call = paying.calls[t]
                 terms[i, call[1]] = _value_of(
                     call[0], arena, state, tables, learners, scratch, i,
-                    part(paying.parameters, call[2], call[3]),
+                    slice_view(paying.parameters, call[2], call[3]),
                 )  # fmt: skip
         for term in range(n_terms):
             # adding zero makes -0.0 a plain zero

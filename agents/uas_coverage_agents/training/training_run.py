@@ -36,7 +36,7 @@ _LARGEST_ZIPPED = 2**26
 
 
 @dataclass(frozen=True)
-class Order:
+class TrainingJob:
     """One training that was asked for.
 
     Attributes:
@@ -57,11 +57,11 @@ class Order:
 
 
 @dataclass
-class Trainee:
+class TrainingRun:
     """Everything that a training works on.
 
     Attributes:
-        order: What was asked for.
+        job: What was asked for.
         learner: How policies of this interface are trained.
         lanes: Where it learns.
         model: What it has learned.
@@ -69,7 +69,7 @@ class Trainee:
         wall_s: Time so far, in all sessions [s].
     """
 
-    order: Order
+    job: TrainingJob
     learner: Learner
     lanes: VecEnv
     model: BaseAlgorithm
@@ -77,29 +77,29 @@ class Trainee:
     wall_s: float = 0.0
 
     @classmethod
-    def untrained(cls, order: Order) -> "Trainee":
+    def untrained(cls, job: TrainingJob) -> "TrainingRun":
         """A fresh one.
 
         One thread, so that a seed gives the same weights again on the same machine.
         """
         torch.set_num_threads(1)
-        learner = learner_of(order.config)
-        lanes = learner.lanes(order.config, order.seed)
-        return cls(order, learner, lanes, learner.model(order.config, lanes, order.seed))
+        learner = learner_of(job.config)
+        lanes = learner.lanes(job.config, job.seed)
+        return cls(job, learner, lanes, learner.model(job.config, lanes, job.seed))
 
     def policy(self) -> Policy:
         """What it would fly like now."""
         network, tensors = self.learner.export(self.model)
-        config = self.order.config
+        config = self.job.config
         description = PolicyDescription(
             interface=config.player.interface,
             network=network,
             observation=self.learner.observation(config),
             scenarios=config.scenarios.family,
             training=Training(
-                algorithm=self.order.name,
+                algorithm=self.job.name,
                 settings=config.model_dump(mode="json"),
-                seed=self.order.seed,
+                seed=self.job.seed,
                 steps=self.model.num_timesteps,
                 process_s=round(self.process_s, 1),
                 wall_s=round(self.wall_s, 1),
@@ -111,7 +111,7 @@ class Trainee:
 
     def flights(self, scenarios: list[Scenario]) -> NDArray[np.float64]:
         """How it flies these now, with the assistants that it learns with; see `fly`."""
-        player = self.order.config.player
+        player = self.job.config.player
         return fly(
             self.policy(),
             scenarios,
@@ -121,8 +121,8 @@ class Trainee:
 
     def publish(self, directory: Path) -> Policy:
         """Score it on unseen scenarios and write it; gives what was written."""
-        family = self.order.config.scenarios.family
-        scenarios = validation_scenarios(family, self.order.missions)
+        family = self.job.config.scenarios.family
+        scenarios = validation_scenarios(family, self.job.missions)
         scored = score(self.flights(scenarios), f"{family.name}, validation")
         policy = self.policy()
         described = policy.description.model_copy(update={"score": scored})

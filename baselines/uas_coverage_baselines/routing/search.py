@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.order.task import Task
+from uas_coverage_baselines.routing.task import RoutingTask
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
@@ -32,7 +32,7 @@ _LEFT_OUT_S = 120.0  # cost of leaving out a waypoint of weight 1
 
 
 @dataclass(frozen=True)
-class Effort:
+class SearchEffort:
     """How much to search.
 
     Attributes:
@@ -51,7 +51,7 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class Order:
+class Routes:
     """Who visits what.
 
     Attributes:
@@ -67,13 +67,13 @@ class Order:
     cost_s: float
 
 
-def no_order(n_uas: int) -> Order:
+def empty_routes(n_uas: int) -> Routes:
     """Nobody visits anything: where a search begins."""
     nothing = np.zeros(0, np.int64)
-    return Order((nothing,) * n_uas, nothing, np.zeros(n_uas), np.inf)
+    return Routes((nothing,) * n_uas, nothing, np.zeros(n_uas), np.inf)
 
 
-def improved(task: Task, order: Order, effort: Effort, seed: int) -> Order:
+def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed: int) -> Routes:
     """The best order found from a given one; the same arguments give the same order.
 
     Args:
@@ -114,7 +114,7 @@ def improved(task: Task, order: Order, effort: Effort, seed: int) -> Order:
         effort.total_weight,
         np.random.default_rng(seed),
     )
-    return Order(
+    return Routes(
         tuple(routes[u, : lengths[u]].copy() for u in range(U)),
         routes[U, : lengths[U]].copy(),
         seconds,
@@ -143,7 +143,7 @@ class _Arrays(NamedTuple):
     turn_of_cosine: FloatArray
 
 
-def _arrays(task: Task) -> _Arrays:
+def _arrays(task: RoutingTask) -> _Arrays:
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
     return _Arrays(
         first=task.first_s,
@@ -277,8 +277,8 @@ def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window,
         moves: how many are tried.
         hottest_s: first temperature.
         coldest_s: last temperature.
-        window: see `Effort`.
-        total_weight: see `Effort`.
+        window: see `SearchEffort`.
+        total_weight: see `SearchEffort`.
         rng: source of random numbers.
     """
     neighbours = task.neighbours

@@ -13,7 +13,7 @@ _NOT_THERE = -1e9
 """Score of a candidate that is not there; its weight is zero in any case."""
 
 
-class Gaze(StrictModel):
+class Attention(StrictModel):
     """Attention over candidates, whatever their number and order.
 
     What is known beside the candidates becomes c = tanh(W₁ own + b₁), a candidate w becomes the

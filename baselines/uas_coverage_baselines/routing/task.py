@@ -11,7 +11,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Task:
+class RoutingTask:
     """The routing problem of one moment: U UAS that may be sent, W waypoints.
 
     Attributes:

@@ -17,7 +17,7 @@ IN_THE_AIR = -1
 
 
 @allocating_kernel
-def outlook(legs, from_s, here_home_s, budget_s, ready_s, place, todo, n_todo):
+def greedy_rollout(legs, from_s, here_home_s, budget_s, ready_s, place, todo, n_todo):
     """Let every UAS go on greedily until nothing is left.
 
     Args:

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from uas_coverage_agents.policy.attention import Attention
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
-from uas_coverage_agents.policy.gaze import Gaze
-from uas_coverage_agents.velocity.patience import Patience
+from uas_coverage_agents.velocity.stuck_detection import StuckDetection
 from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
@@ -24,10 +24,10 @@ def observation() -> Observation:
     return Observation.of(LAYOUT, OBSERVATION, SCALES)
 
 
-def gaze(hidden: int, keys: int) -> Gaze:
+def attention_network(hidden: int, keys: int) -> Attention:
     """The gaze network that reads `observation()`."""
     there = observation_columns("waypoints", "valid")[:, 0].tolist()
-    return Gaze(
+    return Attention(
         inputs=OBSERVATION_SIZE,
         outputs=OUTPUTS,
         before=there[0],
@@ -38,7 +38,7 @@ def gaze(hidden: int, keys: int) -> Gaze:
     )
 
 
-class VelocityPilot:
+class VelocityRunner:
     """Every UAS on its own, with the same network: its observation in, its velocity out.
 
     Args:
@@ -64,14 +64,14 @@ class VelocityPilot:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; nothing is drawn."""
         self._observer = Observer(brief)
-        self._patience = Patience(len(brief.uas), len(brief.waypoints), brief.dt_s)
+        self._stuck = StuckDetection(len(brief.uas), len(brief.waypoints), brief.dt_s)
         ranges = actions_of("velocity", brief.as_scenario()).ranges
         lowest, self._middle, highest = np.moveaxis(ranges, 2, 0)
         self._below, self._above = self._middle - lowest, highest - self._middle
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """The mean action of the policy, scaled to the vehicle as the environment does."""
-        view = self._patience.look(self._observer.observe(swarm), self._observer.candidates)
+        view = self._stuck.filter(self._observer.observe(swarm), self._observer.candidates)
         outputs = self._policy.forward(view)
         shares = np.clip(outputs, -1.0, 1.0)
         values = self._middle + shares * np.where(shares < 0.0, self._below, self._above)

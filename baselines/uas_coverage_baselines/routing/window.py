@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.order.search import Order
-from uas_coverage_baselines.order.task import Task
+from uas_coverage_baselines.routing.search import Routes
+from uas_coverage_baselines.routing.task import RoutingTask
 
 
 @dataclass(frozen=True)
-class Beginning:
+class RouteWindow:
     """The first waypoints of every route, each UAS's home being what follows them.
 
     Attributes:
@@ -27,13 +27,13 @@ class Beginning:
         aside: left out of the whole order, and far from these waypoints.
     """
 
-    task: Task
-    order: Order
+    task: RoutingTask
+    order: Routes
     rests: tuple[NDArray[np.int64], ...]
     aside: NDArray[np.int64]
 
     @classmethod
-    def of(cls, task: Task, order: Order, most: int) -> Beginning:
+    def of(cls, task: RoutingTask, order: Routes, most: int) -> RouteWindow:
         """The first `most` waypoints of each route of an order."""
         rests = tuple(route[most:] for route in order.routes)
         if not any(map(len, rests)):
@@ -60,7 +60,7 @@ class Beginning:
             part, replace(order, routes=first, left_out=left_out), rests, order.left_out[~near]
         )
 
-    def joined(self, order: Order) -> Order:
+    def joined(self, order: Routes) -> Routes:
         """The whole order again, with the beginnings as `order` has them."""
         routes = zip(order.routes, self.rests, strict=True)
         return replace(

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.model.problem import Tour
+from uas_coverage_baselines.milp_mpc.model.problem import TourSegment
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_baselines.order import (
-    Beginning,
-    Effort,
-    Order,
-    Task,
-    improved,
-    no_order,
+from uas_coverage_baselines.routing import (
+    Routes,
+    RouteWindow,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD, VX, VY
@@ -52,7 +52,7 @@ class TourShape:
     lead_s: float = 1.0
 
 
-class OrderGuide:
+class RouteGuide:
     """Keeps the swarm's order; searches before take-off and a little at every decision.
 
     The search runs at every decision rather than on events: a lost UAS, a waypoint that opens, a
@@ -72,11 +72,11 @@ class OrderGuide:
         self._names = tuple(uas.name for uas in brief.uas)
         self._radius_m = np.array([w.radius_m for w in brief.waypoints])
         self._weight = np.array([w.weight for w in brief.waypoints], float)
-        self._order: Order | None = None
+        self._order: Routes | None = None
         self._waits = False  # whether blocked waypoints are waited for, once little else is left
 
     @property
-    def order(self) -> Order | None:
+    def order(self) -> Routes | None:
         """The order as it stands."""
         return self._order
 
@@ -85,20 +85,22 @@ class OrderGuide:
         task = self._task(swarm)
         moves = min(_MOVES_PER_WAYPOINT * max(len(task.open_waypoints), 1), _MOVES_AT_MOST)
         orders = [
-            improved(task, no_order(task.n_uas), Effort(moves), seed + attempt)
+            improve_routes(task, empty_routes(task.n_uas), SearchEffort(moves), seed + attempt)
             for attempt in range(_FIRST_SEARCHES)
         ]
         self._order = min(orders, key=lambda order: order.cost_s)
 
     def update(self, swarm: SwarmState) -> None:
         """Bring the order up to date with what is seen now."""
-        previous = self._order or no_order(len(self._names))
+        previous = self._order or empty_routes(len(self._names))
         task = self._task(swarm)
-        effort = Effort(self._moves, hottest_s=1.5, window=24)
-        kept = improved(task, previous, Effort(0), 0)
-        part = Beginning.of(task, kept, _SEARCHED_AGAIN)
-        first = kept if part.task is task else improved(part.task, part.order, Effort(0), 0)
-        better = improved(part.task, first, effort, swarm.step)
+        effort = SearchEffort(self._moves, hottest_s=1.5, window=24)
+        kept = improve_routes(task, previous, SearchEffort(0), 0)
+        part = RouteWindow.of(task, kept, _SEARCHED_AGAIN)
+        first = (
+            kept if part.task is task else improve_routes(part.task, part.order, SearchEffort(0), 0)
+        )
+        better = improve_routes(part.task, first, effort, swarm.step)
         worthwhile = better.cost_s < first.cost_s - _WORTH_CHANGING_S
         self._order = part.joined(better) if worthwhile else kept
 
@@ -106,7 +108,7 @@ class OrderGuide:
         """Per UAS the waypoints (the scenario's rows) that its next decision is about."""
         return [self._ahead(self._names.index(name)) for name in names]
 
-    def tour(self, name: str, rows: NDArray[np.int64]) -> Tour | None:
+    def tour(self, name: str, rows: NDArray[np.int64]) -> TourSegment | None:
         """The tour of a UAS; None where nothing is left for it.
 
         Args:
@@ -127,7 +129,7 @@ class OrderGuide:
             aims = np.vstack([aims, self._legs.starts_m[uas]])
             radius, lead_s = np.append(radius, 0.0), 0.0
         onward = np.append(between[route[: K - 1], route[1:K]], last_s)
-        return Tour(rows, aims, radius, lead_s, onward)
+        return TourSegment(rows, aims, radius, lead_s, onward)
 
     def _ahead(self, uas: int) -> NDArray[np.int64]:
         assert self._order is not None
@@ -138,7 +140,7 @@ class OrderGuide:
         within = until[: len(route)] <= horizon_s
         return route[: min(int(within.sum()), self._shape.most)]
 
-    def _task(self, swarm: SwarmState) -> Task:
+    def _task(self, swarm: SwarmState) -> RoutingTask:
         rows = np.array([swarm.names.index(name) for name in self._names])
         active = np.array([name in swarm.active for name in self._names])
         x = swarm.x[rows]
@@ -160,7 +162,7 @@ class OrderGuide:
         opens[blocked] = _WAIT_S
         self._near_enough_m = 0.5 * self._radius_m
         self._near_enough_m[blocked] = _WAITING_M
-        return Task(
+        return RoutingTask(
             open_waypoints=np.flatnonzero(wanted),
             first_s=first_s,
             between_s=self._legs.between_s,

@@ -4,7 +4,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from uas_coverage_env.cli import outside
+from uas_coverage_env.cli import plugins
 from uas_coverage_env.files.strict_toml import InputError
 
 
@@ -17,12 +17,12 @@ def greet(name: str) -> None:
 def app(monkeypatch) -> typer.Typer:
     """A command line with a command of another package, and one whose package is broken."""
     entries = [
-        EntryPoint("greet", f"{__name__}:greet", outside.GROUP),
-        EntryPoint("broken", "no_such_package_at_all:command", outside.GROUP),
+        EntryPoint("greet", f"{__name__}:greet", plugins.GROUP),
+        EntryPoint("broken", "no_such_package_at_all:command", plugins.GROUP),
     ]
-    monkeypatch.setattr(outside, "entry_points", lambda group: entries)
+    monkeypatch.setattr(plugins, "entry_points", lambda group: entries)
     app = typer.Typer()
-    outside.add_outside_commands(app)
+    plugins.add_plugin_commands(app)
     return app
 
 

@@ -15,7 +15,7 @@ _UAS_SIGNS = "123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _LEGEND = "1.. UAS   x lost   o open   . covered   # obstacle   @ moving obstacle   ^ north"
 
 
-class TextMap:
+class AsciiMap:
     """The scenario from above, north up; the fixed part is drawn once.
 
     Args:
