@@ -58,6 +58,6 @@ def test_the_next_numba_may_be_newer_than_the_bound():
     assert "numba" not in installs[0]
     assert installs[1].endswith(" numba")
     tested = " ".join(steps("numba-next"))
-    for package in ("kernels", "geometry", "vehicle", "world", "env"):
+    for package in ("compiled", "geometry", "vehicle", "world", "env"):
         assert f"tests/{package}" in tested
         assert (ROOT / "tests" / package).is_dir()

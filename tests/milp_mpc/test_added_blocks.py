@@ -54,7 +54,7 @@ def grounded():
 def made(planner, scenario, *added, **options):
     """The planner with blocks added, ready for the mission."""
     options = {"deterministic": True, "horizon": 8, "teams": 1} | options
-    result = planner(planner.MilpMpcOptions(**options), blocks=(*OCP, *added))
+    result = planner(planner.Options(**options), blocks=(*OCP, *added))
     result.reset(MissionBrief.of(scenario), 0)
     return result
 

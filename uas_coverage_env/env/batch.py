@@ -18,7 +18,6 @@ from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
     DISABLED,
     DRAW,
-    LANES,
     NEXT_STEP,
     REST,
     SAME_STEP,
@@ -28,18 +27,18 @@ from uas_coverage_env.env.batch_kernel import (
     step_batch,
     step_batch_in_threads,
 )
+from uas_coverage_env.env.checkpoint import checked
 from uas_coverage_env.env.drawn import DrawnPool, pool_of
 from uas_coverage_env.env.express import joint_action_of, moment_of
 from uas_coverage_env.env.kernel import ACCEPTED, Rules
-from uas_coverage_env.env.memory import LEARNERS, Learners
+from uas_coverage_env.env.memory import Learners
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.state_dict import check_like, check_values
+from uas_coverage_env.env.state_dict import check_like
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
-from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
 """When a mission that has ended begins anew."""
@@ -274,22 +273,8 @@ class CoverageBatch:
         """
         own = self._changing()
         check_like(state, own)
-        scenarios, drawn = list(self.pool.scenarios), []
+        drawn = checked(self.pool, state)
         if isinstance(self.pool, DrawnPool):
-            drawn = self.pool.redrawn(state["drawn_from"], state["mission"] >= 0)
-            for mission in drawn:
-                scenarios[mission.lane] = mission.scenario
-        longest = max(self.settings.limited(scenario).max_steps for scenario in scenarios)
-        of_scenario = np.array([len(scenario.waypoints) for scenario in scenarios])
-        n_waypoints = of_scenario[state["scenario"].clip(0, len(scenarios) - 1)]
-        limits = {
-            **LANES.limits({"S": len(scenarios)}, lanes=False),
-            **STATE.limits({"samples": longest + 1}, lanes=True),
-            **LEARNERS.limits({"W": n_waypoints}, lanes=True),
-        }
-        check_values(state, limits)
-        if isinstance(self.pool, DrawnPool):
-            check_values(state, {"scenario": self.pool.slots_of(state["mission"] >= 0)})
             self.pool.install(drawn)
         for name, array in own.items():
             array[...] = state[name]

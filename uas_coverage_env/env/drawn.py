@@ -101,7 +101,7 @@ class DrawnPool:
         Raises:
             ValueError: A mission does not fit, or the generator returned none. No slot has changed.
         """
-        missions: list[_Mission] = []
+        missions: list[DrawnMission] = []
         for lane in lanes.tolist():
             rng = self._rngs[lane]
             if seeded[lane] or rng is None:
@@ -110,7 +110,7 @@ class DrawnPool:
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             scenario = scenario or self._source.draw(rng)
             fitted_to(self.disturbances, self.settings.disturbances_in(scenario))
-            missions.append(_Mission(lane, scenario, before, rng))
+            missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
 
     def check_drawn(self) -> None:
@@ -126,7 +126,9 @@ class DrawnPool:
                     f"drawn can be put aside"
                 )
 
-    def redrawn(self, drawn_from: NDArray[np.uint64], begun: NDArray[np.bool_]) -> list["_Mission"]:
+    def redrawn(
+        self, drawn_from: NDArray[np.uint64], begun: NDArray[np.bool_]
+    ) -> list["DrawnMission"]:
         """The missions of `drawn_from` once more, for `install`.
 
         Raises:
@@ -134,13 +136,13 @@ class DrawnPool:
         """
         last = np.array([_WORD, _WORD, _WORD, _WORD, 1, 2**32 - 1], dtype=np.uint64)
         check_values({"drawn_from": drawn_from}, {"drawn_from": (0, last)})
-        missions: list[_Mission] = []
+        missions: list[DrawnMission] = []
         for lane in np.flatnonzero(begun).tolist():
             before = drawn_from[lane]
             if not before.any():
                 raise ValueError(f"drawn_from[{lane}] is zero: of a mission that was not drawn")
             rng = _generator_of(before)
-            missions.append(_Mission(lane, self._source.draw(rng), before.copy(), rng))
+            missions.append(DrawnMission(lane, self._source.draw(rng), before.copy(), rng))
         return missions
 
     def slots_of(self, begun: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -148,7 +150,7 @@ class DrawnPool:
         slots = np.where(begun, np.arange(len(self)), 0)
         return slots, slots
 
-    def install(self, missions: Sequence["_Mission"]) -> None:
+    def install(self, missions: Sequence["DrawnMission"]) -> None:
         """Put missions into the slots of their lanes."""
         for lane, scenario, before, rng in missions:
             pool = ScenarioPool(scenario, self.settings, self.disturbances)
@@ -177,7 +179,7 @@ def pool_of(
     return DrawnPool(source, settings, num_envs)
 
 
-class _Mission(NamedTuple):
+class DrawnMission(NamedTuple):
     """What a lane flies."""
 
     lane: int

@@ -38,9 +38,9 @@ LIMITS = (
     Limit("descent", "m/s", "downward velocity"),
     Limit("tilt", "rad", "norm of roll and pitch"),
     Limit("tilt_rate", "rad/s", "norm of the roll and the pitch rate of the body"),
-    Limit("yaw_rate", "rad/s", "size of the rate of the heading"),
+    Limit("yaw_rate", "rad/s", "absolute rate of the heading"),
     Limit("current", "A", "battery current"),
-    Limit("voltage", "V", "battery voltage, which must not be less"),
+    Limit("voltage", "V", "battery voltage (a lower limit)"),
 )
 """The place of a limit is its bit in masks."""
 

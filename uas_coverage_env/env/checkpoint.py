@@ -1,0 +1,51 @@
+"""What a batch goes on from: whether arrays from outside can be those of its missions."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.batch_kernel import LANES
+from uas_coverage_env.env.drawn import DrawnMission, DrawnPool
+from uas_coverage_env.env.memory import LEARNERS
+from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.state_dict import check_values
+from uas_coverage_env.world.state import STATE
+
+
+def checked(
+    pool: ScenarioPool | DrawnPool, state: Mapping[str, NDArray[Any]]
+) -> list[DrawnMission]:
+    """Look for values that no mission of a batch can have.
+
+    Args:
+        pool: Of the batch.
+        state: Its arrays by name, of the right shapes and dtypes.
+
+    Returns:
+        The missions that were drawn, for `DrawnPool.install`.
+
+    Raises:
+        ValueError: There are such values.
+    """
+    scenarios, drawn = list(pool.scenarios), []
+    begun = state["mission"] >= 0
+    if isinstance(pool, DrawnPool):
+        drawn = pool.redrawn(state["drawn_from"], begun)
+        for mission in drawn:
+            scenarios[mission.lane] = mission.scenario
+    longest = max(pool.settings.limited(scenario).max_steps for scenario in scenarios)
+    of_scenario = np.array([len(scenario.waypoints) for scenario in scenarios])
+    n_waypoints = of_scenario[state["scenario"].clip(0, len(scenarios) - 1)]
+    check_values(
+        state,
+        {
+            **LANES.limits({"S": len(scenarios)}, lanes=False),
+            **STATE.limits({"samples": longest + 1}, lanes=True),
+            **LEARNERS.limits({"W": n_waypoints}, lanes=True),
+        },
+    )
+    if isinstance(pool, DrawnPool):
+        check_values(state, {"scenario": pool.slots_of(begun)})
+    return drawn
