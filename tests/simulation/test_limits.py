@@ -141,5 +141,5 @@ def test_the_limits_are_told_in_the_documentation_as_they_are():
         assert f"| {bit} | `{limit.name}` | {limit.unit} | {limit.meaning} |" in text
     assert f"tolerance is {LPV_TOLERANCE:.0%} of the limit" in text.replace(" %", "%")
     assert f'With `dynamics="nonlinear"` it is {NONLINEAR_TOLERANCE:.0%}' in text.replace(" %", "%")
-    disturbed = f"act it is {DISTURBED_TOLERANCE:.0%} in both models"
+    disturbed = f"act, it is {DISTURBED_TOLERANCE:.0%} in both models"
     assert disturbed in text.replace(" %", "%")
