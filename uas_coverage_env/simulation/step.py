@@ -88,21 +88,30 @@ def begin_step(state, commands, outcome):
 
 
 @inlined_kernel
+def _write_inputs(arena, state, i, outcome):
+    """What the inner loop, or a wrench, asks of the motors of a UAS."""
+    event = outcome[i]
+    command_wrench(
+        arena.vehicles[i], state.x[i], state.reference[i], event.applied_command, event.u[:]
+    )
+
+
+@inlined_kernel
 def _fly(arena, state, nonlinear, disturbances, outcome):
     """Fly the commands for one step."""
     dt_h = arena.rules[0].dt_s / 3600.0
     disturbed = arena.rules[0].disturbed
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
-            event = outcome[i]
-            command_wrench(
-                arena.vehicles[i], state.x[i], state.reference[i], event.applied_command, event.u[:]
-            )
     if disturbed:
+        # what acts on one UAS may depend on the inputs of the others
+        for i in range(state.status.shape[0]):
+            if state.status[i] == FLYING:
+                _write_inputs(arena, state, i, outcome)
         disturb(arena, state, disturbances, outcome)
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
             continue
+        if not disturbed:
+            _write_inputs(arena, state, i, outcome)
         x = state.x[i]
         event = outcome[i]
         u = event.u[:]
