@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle.battery import battery_current_A
 from uas_coverage_env.vehicle.derived import steady_current_A
 from uas_coverage_env.vehicle.params import VehicleParams
@@ -91,11 +91,11 @@ def vertical_seconds(speeds: Speeds, up_m: Any, down_m: Any) -> Any:
     return up_m / speeds.climb_mps + down_m / speeds.descent_mps
 
 
-_level_seconds = kernel(level_seconds)
-_vertical_seconds = kernel(vertical_seconds)
+_level_seconds = inlined_kernel(level_seconds)
+_vertical_seconds = inlined_kernel(vertical_seconds)
 
 
-@kernel
+@inlined_kernel
 def flight_seconds(pace, speeds, turn_s, way_m, up_m, down_m):
     """Time of a flight with level and vertical part [s].
 
