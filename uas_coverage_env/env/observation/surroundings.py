@@ -109,7 +109,7 @@ def _rays_to_fence(normals, offsets_m, first, last, x, y, z, free_m):
     return -outermost
 
 
-@kernel
+@inlined_kernel
 def _obstruct(normals, offsets_m, first, last, x, y, z, along_m, half_m, direction, free_m, rays):
     """Shorten two opposite rays at a hull.
 
