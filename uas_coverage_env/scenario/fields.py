@@ -126,7 +126,7 @@ class MovingObstacle(StrictModel):
         height_m: Full height [m].
         safe_distance_m: Kept from the cylinder in addition to the radius of the UAS [m].
         start_m: Centre of the cylinder at t = 0 [m].
-        schedule: Velocities in order of time; the last one holds for ever. Players never see it.
+        schedule: Velocities in order of time; the last one holds for ever. Planners never see it.
     """
 
     name: Name
@@ -229,7 +229,7 @@ class Decoration(StrictModel):
 
 
 class Wind(StrictModel):
-    """Wind that is the same everywhere and at all times; no planner is told of it.
+    """Wind, constant in space and time and unknown to planners.
 
     Attributes:
         mean_mps: Horizontal speed of the air [m/s].

@@ -14,7 +14,7 @@ from uas_coverage_env.scenario.toml_text import toml_text
 
 
 class Scenario(UncheckedScenario):
-    """A mission, complete and checked; immutable, hashable, the same for all players.
+    """A mission, complete and checked; immutable, hashable, the same for every planner and learner.
 
     Attributes:
         schema_version: Version of the file format; `schema` in files.
