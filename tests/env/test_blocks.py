@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -11,6 +12,7 @@ from own_blocks import SLOW, beacon
 from practice_grounds import practice_ground
 
 from uas_coverage_env import load_planner, uas_coverage_v0
+from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.env import (
     OBSERVATION,
     OBSERVATION_SIZE,
@@ -23,6 +25,7 @@ from uas_coverage_env.env import (
     observation_bounds,
     observation_columns,
 )
+from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import VX, VY, X, Y
 
@@ -223,3 +226,10 @@ def test_a_planner_flies_inside_of_an_environment(dynamics):
         towards = away / max(np.linalg.norm(away), limit_mps)
         env.step({agent: np.array([*towards, 0.0]) for agent in env.agents})
     assert np.linalg.norm(env.swarm_state().x[0, :2] - ground.uas[0].start_m[:2]) > 5.0
+
+
+@pytest.mark.parametrize("given", [np.nan, np.inf, "1", True])
+@pytest.mark.parametrize("block", [BEACON, SLOW, VELOCITY, constant_wind(1.0, 0.0)])
+def test_a_kernel_is_handed_finite_parameters(block, given):
+    with pytest.raises(ValueError, match=rf"{block.name}: parameters\[1\] is .*; give a finite"):
+        replace(block, parameters=(1.0, given))

@@ -54,9 +54,6 @@ counting_kernel = _decorator(
 """An `inlined_kernel` that adds floats in any order, several at a time. Only for whole numbers
 below 2⁵³, which have one sum in every order: two compilations of a step must agree to the bit."""
 
-lending_kernel = _decorator(error_model="numpy", _nrt=True, forceinline=True)
-"""Compiles a function that returns borrowed arrays (`borrow.py`), part of its callers."""
-
 allocating_kernel = _decorator(error_model="numpy", _nrt=True)
 """Compiles a function that makes arrays; also what it calls, unless that is a `kernel`. Takes
 numba's other options: `@allocating_kernel(parallel=True)`."""

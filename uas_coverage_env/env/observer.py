@@ -1,13 +1,11 @@
 """The environments' observation from a `SwarmState`, for planners that fly a trained policy."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS
-from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
+from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
@@ -32,9 +30,9 @@ class Observer:
     """
 
     def __init__(
-        self, brief: MissionBrief, observation: Sequence[ObservationBlock] = OBSERVATION
+        self, brief: MissionBrief, observation: tuple[ObservationBlock, ...] = OBSERVATION
     ) -> None:
-        settings = MissionSettings(observation=checked_blocks(observation))
+        settings = MissionSettings(observation=observation)
         scenario = brief.as_scenario()
         self._view = WorldView(brief)
         actions = actions_of(settings.action, scenario)

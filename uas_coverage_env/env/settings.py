@@ -7,11 +7,12 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.blocks import checked_blocks
 from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.actions.kinds import kind_of
-from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, checked_blocks
-from uas_coverage_env.env.rewards import REWARD, RewardTerm, checked_terms, weights_of
+from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
+from uas_coverage_env.env.rewards import REWARD, RewardTerm, weights_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.world.disturbance import checked_disturbances
@@ -63,8 +64,14 @@ class MissionSettings:
         whole = isinstance(cycles, int | np.integer) and not isinstance(cycles, bool)
         if cycles is not None and (not whole or not 1 <= cycles <= _LONGEST):
             raise ValueError(f"max_cycles is {cycles!r}; give a whole number from 1 to {_LONGEST}")
-        object.__setattr__(self, "observation", checked_blocks(self.observation))
-        object.__setattr__(self, "reward", checked_terms(self.reward))
+        object.__setattr__(
+            self,
+            "observation",
+            checked_blocks("observation", "blocks", self.observation, ObservationBlock),
+        )
+        object.__setattr__(
+            self, "reward", checked_blocks("reward", "terms", self.reward, RewardTerm)
+        )
         weights_of(self.reward, self.reward_weights)
         if self.disturbances is not None:
             object.__setattr__(self, "disturbances", checked_disturbances(self.disturbances))

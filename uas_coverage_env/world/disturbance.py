@@ -3,11 +3,12 @@
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from uas_coverage_env.compiled.blocks import check_parameters, checked_blocks
 
 DISTURBANCE_MEMORY = 16
 """Numbers that a disturbance may keep for each UAS from step to step."""
@@ -65,12 +66,7 @@ class Disturbance:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ValueError(f"a disturbance is named {self.name!r}; give it a name")
-        for k, number in enumerate(self.parameters):
-            real = isinstance(number, Real) and not isinstance(number, bool)
-            if not real or not np.isfinite(number):
-                raise ValueError(
-                    f"disturbance {self.name}: parameters[{k}] is {number!r}; give a finite number"
-                )
+        check_parameters(f"disturbance {self.name}", self.parameters)
 
 
 def checked_disturbances(disturbances: Any) -> tuple[Disturbance, ...]:
@@ -79,15 +75,7 @@ def checked_disturbances(disturbances: Any) -> tuple[Disturbance, ...]:
     Raises:
         ValueError: They are no disturbances, or two have one name.
     """
-    if isinstance(disturbances, Disturbance) or not isinstance(disturbances, Sequence):
-        raise ValueError(f"disturbances is {disturbances!r}; give a tuple of disturbances")
-    for disturbance in disturbances:
-        if not isinstance(disturbance, Disturbance):
-            raise ValueError(f"disturbances: {disturbance!r} is no Disturbance")
-    names = [disturbance.name for disturbance in disturbances]
-    if len(set(names)) < len(names):
-        raise ValueError(f"disturbances are named {names}; give each a name of its own")
-    return tuple(disturbances)
+    return checked_blocks("disturbances", "disturbances", disturbances, Disturbance, least=0)
 
 
 def in_slots(

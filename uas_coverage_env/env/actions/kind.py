@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.blocks import check_parameters
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
 
@@ -49,10 +50,11 @@ class ActionKind:
             which the kernel writes a planner's command; plain Python. It raises a ValueError that
             says why where there are none. Unless the kind `goes_to`, a GoTo arrives as the Velocity
             that guidance flies now. None: it expresses nothing.
-        parameters: Numbers that the kernel is handed.
+        parameters: Finite numbers that the kernel is handed.
 
     Raises:
-        ValueError: It has neither numbers with ranges nor choices, or both.
+        ValueError: It has neither numbers with ranges nor choices, or both; or a parameter is not
+            finite.
     """
 
     name: str
@@ -67,6 +69,7 @@ class ActionKind:
     parameters: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        check_parameters(f"action kind {self.name}", self.parameters)
         continuous = bool(self.numbers) and self.ranges is not None
         if self.choices < 0 or continuous == bool(self.choices):
             raise ValueError(f"action kind {self.name!r}: give numbers and ranges, or choices")

@@ -4,7 +4,6 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.layout import (
     OBSERVATION,
     OBSERVATION_SIZE,
-    checked_blocks,
     layout_table,
     observation_bounds,
     observation_columns,
@@ -21,7 +20,6 @@ __all__ = [
     "Feature",
     "Group",
     "ObservationBlock",
-    "checked_blocks",
     "flag",
     "layout_table",
     "observation_bounds",

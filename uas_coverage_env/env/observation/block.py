@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from uas_coverage_env.compiled.blocks import check_parameters
+
 
 @dataclass(frozen=True)
 class Feature:
@@ -76,11 +78,17 @@ class ObservationBlock(Group):
 
     Attributes:
         write: The kernel.
-        parameters: Numbers that it is handed.
+        parameters: Finite numbers that it is handed.
+
+    Raises:
+        ValueError: A parameter is not finite.
     """
 
     write: Any
     parameters: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_parameters(f"observation block {self.name}", self.parameters)
 
 
 def flag(name: str, meaning: str) -> Feature:

@@ -1,12 +1,11 @@
 """What the numbers of an observation mean: the table that spaces and documentation come from."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.observation.block import Group, ObservationBlock
+from uas_coverage_env.env.observation.block import Group
 from uas_coverage_env.env.observation.home import HOME
 from uas_coverage_env.env.observation.moving_obstacles import MOVING_OBSTACLES
 from uas_coverage_env.env.observation.others import OTHERS
@@ -20,23 +19,6 @@ OBSERVATION = (OWN, HOME, REMAINING, SURROUNDINGS, WAYPOINTS, OTHERS, MOVING_OBS
 
 OBSERVATION_SIZE = sum(block.size for block in OBSERVATION)
 """Numbers in the observation of one UAS, the same in every scenario."""
-
-
-def checked_blocks(blocks: Any) -> tuple[ObservationBlock, ...]:
-    """The blocks of an observation.
-
-    Raises:
-        ValueError: They are no blocks, or two have one name.
-    """
-    if isinstance(blocks, ObservationBlock) or not isinstance(blocks, Sequence):
-        raise ValueError(f"observation is {blocks!r}; give a tuple of blocks")
-    for block in blocks:
-        if not isinstance(block, ObservationBlock):
-            raise ValueError(f"observation: {block!r} is no ObservationBlock")
-    names = [block.name for block in blocks]
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"observation: blocks are named {names}; give each a name of its own")
-    return tuple(blocks)
 
 
 def observation_bounds(

@@ -1,13 +1,12 @@
 """What a learner is paid for: named terms, each with a weight."""
 
-from uas_coverage_env.env.rewards.term import RewardTerm, checked_terms, weights_of
+from uas_coverage_env.env.rewards.term import RewardTerm, weights_of
 from uas_coverage_env.env.rewards.terms import REWARD, REWARD_TERMS, rewards_table
 
 __all__ = [
     "REWARD",
     "REWARD_TERMS",
     "RewardTerm",
-    "checked_terms",
     "rewards_table",
     "weights_of",
 ]

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.blocks import check_parameters
+
 LARGEST_WEIGHT = 1e9
 """No reward weight is larger: the sum of a mission stays far from the end of the numbers."""
 
@@ -26,7 +28,10 @@ class RewardTerm:
         weight: Unless `reward_weights` says otherwise.
         meaning: What is multiplied by the weight, per UAS and step.
         value: The kernel.
-        parameters: Numbers that it is handed.
+        parameters: Finite numbers that it is handed.
+
+    Raises:
+        ValueError: A parameter is not finite.
     """
 
     name: str
@@ -35,22 +40,8 @@ class RewardTerm:
     value: Any
     parameters: tuple[float, ...] = ()
 
-
-def checked_terms(terms: Any) -> tuple[RewardTerm, ...]:
-    """The terms of a reward.
-
-    Raises:
-        ValueError: They are no terms, or two have one name.
-    """
-    if isinstance(terms, RewardTerm) or not isinstance(terms, Sequence):
-        raise ValueError(f"reward is {terms!r}; give a tuple of terms")
-    for term in terms:
-        if not isinstance(term, RewardTerm):
-            raise ValueError(f"reward: {term!r} is no RewardTerm")
-    names = [term.name for term in terms]
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"reward: terms are named {names}; give each a name of its own")
-    return tuple(terms)
+    def __post_init__(self) -> None:
+        check_parameters(f"reward term {self.name}", self.parameters)
 
 
 def weights_of(
