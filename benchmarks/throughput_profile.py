@@ -54,7 +54,7 @@ _scratch_of = lane_view(SCRATCH, sized_by=ARENA)
 
 compiled = njit(error_model="numpy")
 
-NOBODY = np.zeros(0, np.int64)
+NO_ASSISTANTS = np.zeros(0, np.int64)
 """No assistants."""
 
 AT = firsts_of(OBSERVATION)
@@ -76,7 +76,7 @@ def _whole(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _world(arena, state, tables, view, rules, spare, row):
-    advance(arena, state, view.scratch.commands, False, NOBODY, None, view.scratch.outcome)
+    advance(arena, state, view.scratch.commands, False, NO_ASSISTANTS, None, view.scratch.outcome)
 
 
 @compiled
@@ -214,7 +214,7 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
     paying = paying_of(REWARD, np.ones(len(REWARD)))
-    rules = Rules(acting_of(VELOCITY), False, NOBODY, None, paying, observing_of(OBSERVATION))
+    rules = Rules(acting_of(VELOCITY), False, NO_ASSISTANTS, None, paying, observing_of(OBSERVATION))
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,
         SCRATCH.zeros(batch.pool.sizes, lanes=n_lanes), rules, np.zeros(14), batch.observation,

@@ -29,7 +29,7 @@ from uas_coverage_agents.waypoint.sub_environments import (
     pool_legs,
     step_lanes,
 )
-from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NOBODY, NOT_HOME, TIME
+from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NO_UAS, NOT_HOME, TIME
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.autopilot import assistants
@@ -73,7 +73,7 @@ def by_greedy_rollout(scenarios: Sequence[Scenario]) -> NDArray:
     # back to seconds / unit_s, see the scales in the layout
     costs = {"total": 2.0, "longest": 2.0, "left": 5.0 * 120.0 / 8.0}
     home_costs = {"home_total": 5.0, "home_longest": 5.0, "home_left": 5.0 * 120.0 / 8.0}
-    while (lanes.decider != NOBODY).any():
+    while (lanes.decider != NO_UAS).any():
         seen = lanes.observation
         rows = seen[:, N_TEAM:].reshape(n, K, -1)
         cost = np.full((n, K + 1), np.inf)

@@ -14,7 +14,7 @@ from uas_coverage_agents.waypoint.sub_environments import (
     pool_legs,
     step_lanes,
 )
-from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NOBODY, TIME
+from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NO_UAS, TIME
 from waypoint_missions import PRIOR, tensors, town, with_something_parked
 
 from uas_coverage_env import rollout
@@ -44,7 +44,7 @@ def in_training(scenario, weights):
         np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape),
         True, assistants(True, True),
     )  # fmt: skip
-    while lanes.decider[0] != NOBODY:
+    while lanes.decider[0] != NO_UAS:
         scores = network(16, PRIOR).forward(weights, lanes.observation)
         choices = np.where(lanes.legal, scores, -np.inf).argmax(axis=1)
         step_lanes(arenas, legs, lanes, states, choices, True, assistants(True, True))

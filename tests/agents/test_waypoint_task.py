@@ -26,7 +26,7 @@ from uas_coverage_agents.waypoint.team import (
     ENERGY,
     LEFT,
     LOST_UAS,
-    NOBODY,
+    NO_UAS,
     NOT_HOME,
     TIME,
 )
@@ -70,7 +70,7 @@ class Teams:
         )
 
     def fly(self, choose):
-        while (self.lanes.decider != NOBODY).any():
+        while (self.lanes.decider != NO_UAS).any():
             self.step(choose(self.lanes))
         return self.lanes.account
 
@@ -91,7 +91,7 @@ def test_masks_and_observations_are_sound_whatever_is_chosen(seed, covered):
     choose = at_random(seed)
 
     def checked(lanes):
-        for lane in np.flatnonzero(lanes.decider != NOBODY):
+        for lane in np.flatnonzero(lanes.decider != NO_UAS):
             legal, candidates = lanes.legal[lane], lanes.candidates[lane]
             uncovered = teams.states.uncovered[lane]
             assert legal.sum() > 1  # otherwise there is nothing to decide
@@ -151,7 +151,7 @@ def test_a_uas_without_charge_for_the_way_is_not_sent():
         np.zeros(states.uncovered.shape, dtype=bool), discharged, True,
         assistants(True, True),
     )  # fmt: skip
-    while lanes.decider[0] != NOBODY:
+    while lanes.decider[0] != NO_UAS:
         assert lanes.decider[0] == 1
         step_lanes(arenas, legs, lanes, states, nearest(lanes), True, assistants(True, True))
     assert lanes.account[0, LOST_UAS] == 0
@@ -164,7 +164,7 @@ def test_what_something_parks_on_comes_last_and_is_covered_once_it_left():
     find_blocked(arena, 0, 0.0, 0.0, 0.0, blocked)
     assert list(np.flatnonzero(blocked)) == [4]
     teams = Teams([3])
-    while teams.lanes.decider[0] != NOBODY:
+    while teams.lanes.decider[0] != NO_UAS:
         free = teams.states.uncovered[0] & ~teams.lanes.blocked[0]
         if teams.lanes.blocked[0, 4] and free.sum() > 3:
             assert 4 not in teams.lanes.candidates[0]

@@ -1,6 +1,7 @@
 """The parameters of a vehicle: read from a file, completed and checked."""
 
 from collections.abc import Mapping
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, Self
@@ -87,13 +88,19 @@ def load_vehicle(name_or_path: str | Path) -> VehicleParams:
     """
     text = str(name_or_path)
     if text in vehicle_names():
-        with resources.as_file(_FILES / f"{text}.toml") as path:
-            return read_toml(path, VehicleParams)
+        return _shipped(text)
     if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text:
         return read_toml(name_or_path, VehicleParams)
     raise InputError(
         f"unknown vehicle {text!r}; allowed: {', '.join(vehicle_names())}, or a path to a file"
     )
+
+
+@cache
+def _shipped(name: str) -> VehicleParams:
+    """Read once: a shipped file does not change, and a mission that is drawn reads it twice."""
+    with resources.as_file(_FILES / f"{name}.toml") as path:
+        return read_toml(path, VehicleParams)
 
 
 def return_threshold(

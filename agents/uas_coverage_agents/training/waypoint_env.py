@@ -22,7 +22,7 @@ from uas_coverage_agents.waypoint.team import (
     FILTERED,
     LEFT,
     LOST_UAS,
-    NOBODY,
+    NO_UAS,
     NOT_HOME,
     TIME,
 )
@@ -107,7 +107,7 @@ class WaypointVecEnv(VecEnv):
         before = lanes.account @ self._prices
         step_lanes(self._worlds, self._legs, lanes, self._states, self._choices, *self._assistants)
         rewards = (before - lanes.account @ self._prices).astype(np.float32)
-        done = lanes.decider == NOBODY
+        done = lanes.decider == NO_UAS
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for lane in np.flatnonzero(done):
             infos[lane] = {
@@ -171,7 +171,7 @@ class WaypointVecEnv(VecEnv):
                 self._worlds, self._legs, self._lanes, self._states,
                 which, scenarios, covered, discharged, *self._assistants,
             )  # fmt: skip
-            which = which[self._lanes.decider[which] == NOBODY]
+            which = which[self._lanes.decider[which] == NO_UAS]
         raise ValueError("the scenarios leave nothing to decide: take larger ones")
 
     def _draw(self, lane: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -22,7 +22,7 @@ from uas_coverage_agents.waypoint.legs import legs_of
 from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_plan, planned
-from uas_coverage_agents.waypoint.team import NOBODY, Choices, choose, next_to_decide
+from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, next_to_decide
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
@@ -139,7 +139,7 @@ class WaypointRunner:
                 arena, self._legs, state, self._assistants.return_mode, self._blocked,
                 self._targets, choices,
             )  # fmt: skip
-            if i == NOBODY:
+            if i == NO_UAS:
                 break
             choice = best_choice(
                 self._weights, choices.observation, choices.legal, self._workspace.scores

@@ -19,7 +19,7 @@ from uas_coverage_agents.waypoint.team import (
     ENERGY,
     LEFT,
     LOST_UAS,
-    NOBODY,
+    NO_UAS,
     NOT_HOME,
     TIME,
     Choices,
@@ -164,7 +164,7 @@ def simulate(
             arena, legs, state, return_mode, assistants, blocked, targets,
             workspace.commands, workspace.outcome, workspace.choices, account,
         )  # fmt: skip
-        if i == NOBODY:
+        if i == NO_UAS:
             break
         choice = -1
         if n <= change_at or keep_on:

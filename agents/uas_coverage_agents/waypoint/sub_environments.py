@@ -12,7 +12,7 @@ from uas_coverage_agents.waypoint.legs import LEGS, legs_of
 from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.team import (
     ACCOUNT_SIZE,
-    NOBODY,
+    NO_UAS,
     Choices,
     choose,
     fly_on,
@@ -47,8 +47,8 @@ class WaypointSubEnvironments(NamedTuple):
 
     scenario: Annotated[NDArray[np.int64], "L", Values(0, "S")]
     """Index in the pool."""
-    decider: Annotated[NDArray[np.int64], "L", Values(NOBODY, "U")]
-    """UAS that decides, NOBODY where the mission is over."""
+    decider: Annotated[NDArray[np.int64], "L", Values(NO_UAS, "U")]
+    """UAS that decides, NO_UAS where the mission is over."""
     targets: Annotated[NDArray[np.int64], "L", "U", Values(NO_TARGET, "W")]
     blocked: Annotated[NDArray[np.bool_], "L", "W"]
     commands: Annotated[NDArray[np.void], COMMAND_DTYPE, "L", "U"]
@@ -66,7 +66,7 @@ LANES = Memory(WaypointSubEnvironments)
 def make_lanes(n_lanes: int, pool: WorldPool) -> tuple[WaypointSubEnvironments, WorldState]:
     """Lanes that fly any scenario of a pool; nothing has begun."""
     lanes = LANES.zeros({**ARENA.largest(pool.arenas), "L": n_lanes})
-    lanes.decider[:] = NOBODY
+    lanes.decider[:] = NO_UAS
     lanes.targets[:] = NO_TARGET
     lanes.candidates[:] = -1
     return lanes, lanes_of(n_lanes, pool.starts)
@@ -171,7 +171,7 @@ def step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants
     for lane in prange(choices.shape[0]):
         given = _take(kept)
         i = given.lanes.decider[lane]
-        if i != NOBODY:
+        if i != NO_UAS:
             choose(given.lanes.targets[lane], given.lanes.candidates[lane], i, choices[lane])
             _fly_lane(
                 given.worlds, given.legs, given.lanes, given.states, lane, return_mode, assistants

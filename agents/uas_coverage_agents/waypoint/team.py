@@ -20,7 +20,7 @@ from uas_coverage_env.simulation import advance
 from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world import FLYING, GO_TO, HOME, VELOCITY
 
-NOBODY = -1
+NO_UAS = -1
 
 ENERGY, TIME, FILTERED, LOST_UAS, NOT_HOME, LEFT = range(6)
 """Columns of an account: energy of all [Wh], time while anybody flew [s], steps of single UAS in
@@ -73,7 +73,7 @@ def next_to_decide(arena, legs, state, return_mode, blocked, targets, choices):
         choices: `Choices`; written.
 
     Returns:
-        Index of the UAS, or NOBODY.
+        Index of the UAS, or NO_UAS.
     """
     if arena.moving.shape[0] > 0:
         find_blocked(arena, state.step[0], 0.0, 0.0, 0.0, blocked)
@@ -95,7 +95,7 @@ def next_to_decide(arena, legs, state, return_mode, blocked, targets, choices):
             if observe(arena, legs, state, blocked, targets, i, candidates, legal, row) > 1:
                 return i
             choose(targets, candidates, i, legal.argmax())
-    return NOBODY
+    return NO_UAS
 
 
 @allocating_kernel
@@ -140,11 +140,11 @@ def fly_on(
         account: (ACCOUNT_SIZE,) what the flight took is added.
 
     Returns:
-        Index of the UAS that decides, or NOBODY where the mission is over.
+        Index of the UAS that decides, or NO_UAS where the mission is over.
     """
     while not is_over(arena, state):
         i = next_to_decide(arena, legs, state, return_mode, blocked, targets, choices)
-        if i != NOBODY:
+        if i != NO_UAS:
             return i
         write_commands(state, targets, commands)
         advance(arena, state, commands, False, assistants, None, outcome)
@@ -155,4 +155,4 @@ def fly_on(
             account[LOST_UAS] += outcome[j].contact != 0
     account[NOT_HOME] = (state.status == FLYING).sum()
     account[LEFT] = state.uncovered.sum()
-    return NOBODY
+    return NO_UAS
