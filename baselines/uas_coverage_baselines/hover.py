@@ -12,7 +12,9 @@ from uas_coverage_env.world import Command, SwarmState, Velocity
 class HoverOptions(PlannerOptions):
     """Options of `Hover`."""
 
-    climb_m: float = Field(default=5.0, ge=0.0, description="height above the start to hold [m]")
+    climb_m: float = Field(
+        default=5.0, ge=0.0, le=1e5, description="height above the start to hold [m]"
+    )
 
 
 class Hover:

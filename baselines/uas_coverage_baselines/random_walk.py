@@ -13,7 +13,9 @@ from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 class RandomWalkOptions(AssistedOptions):
     """Options of `RandomWalk`."""
 
-    hold_s: float = Field(default=8.0, gt=0.0, description="how long a drawn command is held [s]")
+    hold_s: float = Field(
+        default=8.0, gt=0.0, le=1e6, description="how long a drawn command is held [s]"
+    )
     speed: float = Field(default=0.8, gt=0.0, le=1.0, description="part of the largest speed")
 
 

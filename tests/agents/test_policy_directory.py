@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from safetensors.numpy import load, save
 from tiny_policies import describe, weights, write
 from uas_coverage_agents.policy import load_policy, save_policy
-from uas_coverage_agents.policy.directory import write_atomically
 
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 
 

@@ -2,9 +2,12 @@
 
 import io
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
@@ -13,7 +16,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from uas_coverage_env.cli import main
+from uas_coverage_env.cli import main, run
 from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.flight import Decision, Flight, load_planner, rollout
@@ -305,3 +308,58 @@ def test_the_version_is_told_also_to_python_dash_m(capsys):
     wrong = subprocess.run([*command[:-1], "fly"], capture_output=True, text=True)
     assert wrong.returncode == 2
     assert "fly" in wrong.stderr
+
+
+def test_sigterm_ends_a_flight_as_ctrl_c_does_and_keeps_what_was_flown(elsewhere, monkeypatch):
+    @contextmanager
+    def terminating(*_, **__):
+        def on_step(progress):
+            if progress.swarm.step == 4:
+                os.kill(os.getpid(), signal.SIGTERM)
+
+        yield on_step
+
+    handler = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(run, "shown", terminating)
+    assert main(["run", "open_field", "--planner", "hover", "--out", "mine"]) == 1
+    flight = Flight.load("mine")
+    assert flight.ended == "stopped"
+    assert 4 <= flight.steps <= 5
+    assert signal.getsignal(signal.SIGTERM) is handler
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+def test_a_flight_directory_of_somebody_else_overwrites_nothing_outside(elsewhere):
+    precious = elsewhere / "precious.txt"
+    precious.write_text("kept")
+    fly = ["run", "open_field", "--planner", "hover", "--steps", "2", "--out", "mine"]
+    assert main(fly) == 0
+    for name in ("replay.html", "map.pdf", "map.png", "flight.csv", "summary.json"):
+        (elsewhere / "mine" / name).unlink(missing_ok=True)
+        (elsewhere / "mine" / name).symlink_to(precious)
+    assert main([*fly, "--overwrite"]) == 0
+    assert main(["replay", "mine"]) == 0
+    figure = ["figure", "mine", "--kind", "map", "--out", "mine/map.pdf", "--overwrite"]
+    assert main(figure) == 0
+    assert precious.read_text() == "kept"
+    assert Flight.load("mine").steps == 2
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and devices of POSIX")
+@pytest.mark.parametrize("command", ["run", "scenarios check"])
+def test_a_scenario_that_is_a_pipe_or_a_device_is_refused(elsewhere, capsys, command):
+    os.mkfifo(elsewhere / "pipe.toml")
+    (elsewhere / "zeros.toml").symlink_to("/dev/zero")
+    for name in ("pipe.toml", "zeros.toml"):
+        assert main([*command.split(), name]) == 2
+        assert f"error: {name}: is not a plain file" in capsys.readouterr().err
+
+
+def test_the_map_of_a_planner_with_any_name_is_drawn(elsewhere):
+    assert main(["run", "open_field", "--planner", "hover", "--steps", "2", "--out", "mine"]) == 0
+    path = elsewhere / "mine" / "summary.json"
+    summary = json.loads(path.read_text())
+    summary["planner"]["name"] = r"$\frac{x$"
+    path.write_text(json.dumps(summary))
+    assert main(["figure", "mine", "--kind", "map", "--out", "map.png"]) == 0
+    assert (elsewhere / "map.png").stat().st_size > 10_000

@@ -35,17 +35,40 @@ def test_a_folder_that_takes_no_files_is_refused_although_it_is_there(tmp_path, 
 
 def test_files_are_written_all_or_none(tmp_path, monkeypatch):
     write_files(tmp_path, {"one": b"1", "two": b"2"})
-    write_bytes = Path.write_bytes
+    mkstemp = tempfile.mkstemp
 
-    def full_disk(path, content):
-        if "two" in path.name:
+    def full_disk(suffix, prefix, folder):
+        if "two" in prefix:
             raise OSError(28, "No space left on device")
-        return write_bytes(path, content)
+        return mkstemp(suffix, prefix, folder)
 
-    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    monkeypatch.setattr(tempfile, "mkstemp", full_disk)
     with pytest.raises(InputError, match=r"cannot be written \(No space left on device\)"):
         write_files(tmp_path, {"one": b"11", "two": b"22", "three": b"33"})
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {
         "one": b"1",
         "two": b"2",
     }
+
+
+def test_a_kill_between_two_files_leaves_no_mixture_that_is_taken_for_whole(tmp_path, monkeypatch):
+    write_files(tmp_path, {"one": b"1", "two": b"2", "seal": b"s"})
+    replace = Path.replace
+
+    def killed(path, target):
+        if target.name == "two":
+            raise KeyboardInterrupt
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        write_files(tmp_path, {"one": b"11", "two": b"22", "seal": b"ss"})
+    assert (tmp_path / "one").read_bytes() == b"11"
+    assert not (tmp_path / "seal").exists()
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_path):
+    (tmp_path / ".one.x1y2z3.part").touch()
+    (tmp_path / ".notes.part").touch()
+    write_files(tmp_path, {"one": b"1"})
+    assert {path.name for path in tmp_path.iterdir()} == {"one", ".notes.part"}

@@ -1,6 +1,7 @@
 """Every mistake in a file is one line: file, field, value, fix."""
 
 import json
+import time
 from typing import Annotated
 
 import pytest
@@ -252,3 +253,36 @@ def test_whatever_is_given_the_answer_is_a_car_or_one_line(data):
         assert json.loads(car.model_dump_json(by_alias=True))["schema"] == 1
     assert line.startswith("memory: ")
     assert len(line.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a" + ".a" * 100_000 + " = 1\n",
+        "name = 'car'\n[" + '"a" . ' * 50_000 + "a]\n",
+        "engine = {" + "a." * 100_000 + "b = 1}\n",
+    ],
+    ids=["key", "table", "inline"],
+)
+def test_a_row_of_keys_without_end_is_refused_at_once(tmp_path, text):
+    path = tmp_path / "car.toml"
+    path.write_text(text)
+    started = time.process_time()
+    with pytest.raises(InputError, match=r"line \d: names keys more than 32 deep; flatten"):
+        read_toml(path, Car)
+    assert time.process_time() - started < 1.0
+
+
+def test_numbers_and_texts_with_many_points_are_no_keys(tmp_path):
+    path = tmp_path / "car.toml"
+    numbers = "[0.5, " + "1.25," * 200 + "]"
+    path.write_text(f"schema = 1\nname = '{'.' * 500}'\nnumbers = {numbers}\n")
+    with pytest.raises(InputError, match="numbers: unknown key"):
+        read_toml(path, Car)
+
+
+def test_a_file_beyond_16_MiB_is_refused(tmp_path):
+    path = tmp_path / "car.toml"
+    path.write_bytes(b"#" * (2**24 + 1))
+    with pytest.raises(InputError, match=r"car\.toml: is larger than 16\.8 MB"):
+        read_toml(path, Car)

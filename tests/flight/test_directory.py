@@ -1,6 +1,7 @@
 import csv
 import dataclasses
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -213,14 +214,14 @@ def test_a_file_is_no_folder(flight, tmp_path):
 def test_a_write_that_fails_leaves_the_former_flight_whole(flight, yard, tmp_path, monkeypatch):
     former = rollout(yard, _Predicting(), max_steps=1)
     former.save(tmp_path)
-    write_bytes = Path.write_bytes
+    mkstemp = tempfile.mkstemp
 
-    def full_disk(path, content):
-        if "run.json" in path.name:
+    def full_disk(suffix, prefix, folder):
+        if "run.json" in prefix:
             raise OSError(28, "No space left on device")
-        return write_bytes(path, content)
+        return mkstemp(suffix, prefix, folder)
 
-    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    monkeypatch.setattr(tempfile, "mkstemp", full_disk)
     with pytest.raises(InputError, match="No space left"):
         flight.save(tmp_path, overwrite=True)
     assert {path.name for path in tmp_path.iterdir()} == FILES
@@ -360,3 +361,12 @@ def test_a_flight_that_never_began_is_kept_too(yard, listed, tmp_path):
         "p99": None,
         "max": None,
     }
+
+
+def test_files_that_ask_for_more_samples_than_they_hold_are_refused_before_room_is_made(saved):
+    path = saved / "flight.csv"
+    header, first, *_ = path.read_text().splitlines()
+    late = ",".join(["15.0", *first.split(",")[1:]])
+    path.write_text(f"{header}\n{first}\n{late}\n")
+    with pytest.raises(InputError, match=r"it holds 2 rows, too few for 16 samples"):
+        Flight.load(saved)

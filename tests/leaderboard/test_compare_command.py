@@ -266,7 +266,7 @@ MISTAKES = {
     "option twice": (["--option", "hover:x=3", "--option", "hover:x=4"], "twice"),
     "no seeds": (["--seeds", "4:4"], "FIRST < END"),
     "not a range": (["--seeds", "4"], "0:20"),
-    "seeds for ever": (["--seeds", "0:999999999999"], "at most 100000"),
+    "seeds for ever": (["--seeds", "0:999999999999"], "at most 10000"),
     "seeds that no column holds": (["--seeds", f"{2**63}:{2**63 + 1}"], "18 digits"),
     "seeds beyond any number": (["--seeds", f"0:{'9' * 5000}"], "18 digits"),
     "generated beyond any number": (["--scenarios", f"generated:0:{'9' * 5000}"], "18 digits"),

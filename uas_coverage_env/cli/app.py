@@ -11,6 +11,7 @@ import typer
 from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle, warm_up
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.plugins import add_plugin_commands
+from uas_coverage_env.cli.termination import terminated_as_by_hand
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import PlannerError
 
@@ -62,7 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = typer.main.get_command(app)
     _never_stop_at_a_letter()
     try:
-        code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
+        with terminated_as_by_hand():
+            code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
         return _refuse(error.format_message(), error.exit_code)
     except InputError as error:

@@ -42,6 +42,7 @@ from uas_coverage_env.scenario import warnings
 from uas_coverage_env.simulation import Dynamics
 
 _REFERENCE = "nearest-waypoint"
+_MOST_FLIGHTS = 1_000_000
 _SECONDS_BETWEEN_LINES = 5.0
 _NARROWEST_TABLE = 140
 
@@ -111,6 +112,11 @@ def compare(
         dynamics,
         safety_filter,
     )
+    if sweep.size > _MOST_FLIGHTS:
+        raise InputError(
+            f"--scenarios, --planners and --seeds ask for {sweep.size} flights; "
+            f"give fewer, at most {_MOST_FLIGHTS}"
+        )
     reference = _reference(reference, list(sweep.players))
     side_by_side = jobs_of(jobs, backend)
     command = _command(

@@ -69,8 +69,8 @@ def run(
 ) -> None:
     """Fly one mission and write a flight directory.
 
-    Ctrl-C ends the flight early and keeps what was flown. Exits 0 where everything is covered,
-    all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
+    Ctrl-C or SIGTERM ends the flight early and keeps what was flown. Exits 0 where everything is
+    covered, all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
     otherwise.
     """
     mission = loaded(scenario)

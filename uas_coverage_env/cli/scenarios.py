@@ -10,6 +10,7 @@ from rich.table import Table
 
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.draw import picture
+from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, load_scenario, scenario_names
 from uas_coverage_env.simulation import World
@@ -51,7 +52,8 @@ def check(
         raise InputError(f"{path}: exists; give another --picture or add --overwrite")
     pixels = picture(scenario, World(scenario).swarm_state(), size_px=_PICTURE_PX)
     try:
-        Image.fromarray(pixels).save(path, format="PNG")
+        with written_by(path) as place:
+            Image.fromarray(pixels).save(place, format="PNG")
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     out = console()

@@ -8,6 +8,7 @@ import typer
 from rich.table import Table
 
 from uas_coverage_env.cli.output import console
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.vehicle import (
     DataSheet,
@@ -134,7 +135,7 @@ def new(
         "descent_mps": descent_mps,
     }
     made = make_vehicle(parse(known, DataSheet, "vehicle new"))
-    out.write_text(made.file_text(), encoding="utf-8")
+    write_atomically(out, made.file_text().encode())
     screen = console()
     for origin in ("given", "computed", "assumed"):
         screen.print(origin, style="bold")

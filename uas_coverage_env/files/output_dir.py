@@ -1,11 +1,12 @@
 """The output directory of a command: checked before the work, written all or nothing."""
 
-import os
+import glob
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.plain_files import sync_folder, write_beside
 
 
 def prepare_folder(directory: Path) -> set[str]:
@@ -29,21 +30,30 @@ def prepare_folder(directory: Path) -> set[str]:
 
 
 def write_files(directory: Path, contents: Mapping[str, bytes]) -> None:
-    """Write every file beside its place first, then move them all: no half of them stays behind.
+    """Write files that belong together, so that no mixture of old and new is ever taken for whole.
+
+    All are written beside their places first. The last one seals the others: an older one is taken
+    away before any of them is moved, and the new one is moved after them. Links are replaced, not
+    followed.
 
     Raises:
         InputError: One cannot be written.
     """
-    written: list[tuple[Path, Path]] = []
+    *parts, seal = contents
+    written: dict[str, Path] = {}
     try:
         for name, content in contents.items():
-            temporary = directory / f".{name}.{os.getpid()}"
-            written.append((temporary, directory / name))
-            temporary.write_bytes(content)
-        for temporary, final in written:
-            temporary.replace(final)
+            for left in directory.glob(f".{glob.escape(name)}.*.part"):
+                left.unlink(missing_ok=True)  # of a process that was killed
+            written[name] = write_beside(directory / name, content)
+        if parts:
+            (directory / seal).unlink(missing_ok=True)
+            sync_folder(directory)
+        for name, temporary in written.items():
+            temporary.replace(directory / name)
+        sync_folder(directory)
     except OSError as error:
         raise InputError(f"{directory}: cannot be written ({error.strerror})") from error
     finally:
-        for temporary, _ in written:
+        for temporary in written.values():
             temporary.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ import datetime
 import difflib
 import json
 import math
+import re
 import tomllib
 import types
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,9 +13,21 @@ from typing import Any, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.plain_files import read_text
+
+__all__ = ["InputError", "StrictModel", "parse", "read_toml"]
+
 M = TypeVar("M", bound=BaseModel)
 
 _LONGEST_VALUE = 60
+_MOST_BYTES = 2**24
+_MOST_KEYS = 32
+
+# the parser takes a time that grows with the square of the keys in a row; a number has one point
+_KEYS_IN_A_ROW = re.compile(
+    rf"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+\.\s*+){{{_MOST_KEYS},}}"""
+)
 
 # pydantic speaks of JSON where our readers look at TOML
 _PLAIN = {
@@ -28,10 +41,6 @@ _PLAIN = {
     "string_type": "text in quotes",
     "float_type": "a number",
 }
-
-
-class InputError(ValueError):
-    """A mistake in what a person gave us: one line that names file, field, value and fix."""
 
 
 class StrictModel(BaseModel):
@@ -84,12 +93,20 @@ def read_toml(path: str | Path, model: type[M], *, context: Any = None) -> M:
         context: Handed to the model's validators.
 
     Raises:
-        InputError: The file is missing, is not TOML, or does not fit the model; one line.
+        InputError: The file is missing, is not TOML, is larger than 16 MiB, or does not fit the
+            model; one line.
     """
     source = str(path)
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text(Path(path), _MOST_BYTES)
+        if found := _KEYS_IN_A_ROW.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise InputError(
+                f"{source}: line {line}: names keys more than {_MOST_KEYS} deep; flatten the tables"
+            )
         data = tomllib.loads(text)
+    except InputError:
+        raise
     except FileNotFoundError:
         raise _error(source, "no such file; check the path") from None
     except IsADirectoryError:

@@ -1,12 +1,14 @@
 """The picture of a flight: the map at a sample, with everything flown until then."""
 
 from collections.abc import Iterable, Iterator
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import Picture
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.metrics import covered_at
 from uas_coverage_env.flight.record import LANDED, LOST
@@ -67,7 +69,9 @@ def draw_flight(flight: Flight, path: str | Path, step: int | None = None) -> No
     """Write `flight_picture` as a PNG."""
     from PIL import Image
 
-    Image.fromarray(flight_picture(flight, step)).save(path)
+    content = BytesIO()
+    Image.fromarray(flight_picture(flight, step)).save(content, format="png")
+    write_atomically(Path(path), content.getvalue())
 
 
 def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
+from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse
 from uas_coverage_env.flight.directory import (
     FLIGHT_COLUMNS,
@@ -118,6 +119,8 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     index = {uas.name: i for i, uas in enumerate(scenario.uas)}
     modes = {name: number for number, name in enumerate(MODES)}
     shape = (1 + max(_each(rows, lambda row: _step(row[0], scenario))), len(index))
+    if shape[0] > len(rows):
+        raise ValueError(f"it holds {len(rows)} rows, too few for {shape[0]} samples")
     x, u = np.zeros((*shape, N_STATES)), np.zeros((*shape, N_INPUTS))
     voltage_V, current_A = np.zeros(shape), np.zeros(shape)
     mode, covered = np.zeros(shape, np.int8), np.zeros(shape[0], np.int64)
@@ -279,7 +282,9 @@ def _short(value: object) -> str:
 
 def _read(path: Path, reader: Callable[[str], T]) -> T:
     try:
-        return reader(path.read_text(encoding="utf-8"))
+        return reader(read_text(path))
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); is it a flight?") from error
     except (ValueError, RecursionError, csv.Error) as error:

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 # Thinner bodies have no face that separates one side from the other.
 _THINNEST_M = 1e-3
@@ -128,8 +128,11 @@ def _merged(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     # zeros that are exact keep golden files and LP rows free of 1e-17
     normals = np.where(np.abs(normals) < 1e-12, 0.0, normals)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    kept: list[NDArray[np.float64]] = []
-    for normal in normals:
-        if all(np.abs(normal - other).max() > _SAME_NORMAL for other in kept):
-            kept.append(normal)
-    return np.array(kept)
+    # the triangles of a face have the very same normal, mostly; the first of each stays
+    normals = normals[np.sort(np.unique(normals, axis=0, return_index=True)[1])]
+    near = cKDTree(normals).query_pairs(_SAME_NORMAL, p=np.inf, output_type="ndarray")
+    keep = np.ones(len(normals), np.bool_)
+    for first, second in near[np.lexsort((near[:, 0], near[:, 1]))]:
+        if keep[first]:
+            keep[second] = False
+    return normals[keep]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from uas_coverage_env.files.output_dir import write_files
+from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
@@ -104,13 +105,13 @@ def published(directory: Path) -> tuple[list[Row], str]:
 
     flights, table = directory / FLIGHTS, directory / SCORES
     try:
-        frame = polars.read_parquet(flights.read_bytes())
+        frame = polars.read_parquet(read_bytes(flights))
     except (OSError, polars.exceptions.PolarsError) as error:
         raise InputError(f"{flights}: cannot be read ({error})") from error
     if dict(frame.schema) != _schema():
         raise InputError(f"{flights}: has other columns than this version writes; compare again")
     try:
-        reference = json.loads(table.read_bytes())["reference"]
+        reference = json.loads(read_bytes(table))["reference"]
     except (OSError, ValueError, RecursionError, KeyError, TypeError) as error:
         raise InputError(f"{table}: cannot be read, or names no reference ({error})") from error
     try:

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
@@ -12,6 +11,9 @@ from uas_coverage_env.flight import Flight, accomplished, filtered_share, summar
 from uas_coverage_env.leaderboard.sweep import Entry
 
 FLOWN, FAILED = "flown", "failed"
+
+# of anything that is measured; NaN is not below it
+_LARGEST = 1e12
 
 # differ from run to run; everything else of a repeatable flight repeats
 TIMES = ("decision_p50_s", "decision_p95_s", "wall_time_s", "finished_at")
@@ -152,8 +154,8 @@ class Row:
                 value = bool(value)
             elif float in kinds and type(value) is int:
                 value = float(value)
-            finite = not isinstance(value, float) or math.isfinite(value)
-            if type(value) not in kinds or not finite or (type(value) is int and value < 0):
+            bounded = not isinstance(value, float) or abs(value) <= _LARGEST
+            if type(value) not in kinds or not bounded or (type(value) is int and value < 0):
                 raise ValueError(f"{name} of a flight is {repr(value)[:40]}")
             found[name] = value
         row = cls(**found)

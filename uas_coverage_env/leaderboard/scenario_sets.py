@@ -11,7 +11,7 @@ from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
 _GENERATED = "generated"
-_MOST_SEEDS = 100_000
+_MOST_SEEDS = 10_000
 # digits that a column of a store can hold
 _LONGEST_SEED = 18
 

@@ -56,6 +56,11 @@ class Sweep:
     dynamics: Dynamics = "lpv"
     safety_filter: bool = False
 
+    @property
+    def size(self) -> int:
+        """Number of flights."""
+        return len(self.seeds) * len(self.scenarios) * len(self.players)
+
     def entries(self) -> Iterator[Entry]:
         """Every flight; seed by seed, so that a sweep under way compares like with like."""
         common = self._common()

@@ -1,6 +1,7 @@
 """Films of flights from the pictures of `draw`: MP4 (extra `view`) and GIF (Pillow)."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, flight_pictures
 
@@ -40,23 +42,19 @@ def write_video(flights: Sequence[Flight], path: Path, *, fps: int) -> Path:
         raise InputError(
             'a video needs imageio-ffmpeg: pip install "uas-coverage-env[view]" (or take --gif)'
         ) from error
-    try:
-        # ffmpeg would say so only on stderr
-        path.open("wb").close()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     size = (_VIDEO_PX * len(flights), _VIDEO_PX)
-    writer = write_frames(
-        str(path), size, fps=fps, codec="libx264", quality=7, ffmpeg_log_level="quiet"
-    )
-    try:
-        writer.send(None)
-        for picture in _pictures(flights, _VIDEO_PX, round(_LAST_PICTURE_S * fps)):
-            writer.send(picture.tobytes())
-    except OSError as error:
-        raise InputError(f"{path}: ffmpeg stopped before the end of the film") from error
-    finally:
-        writer.close()
+    with _written(path) as place:
+        writer = write_frames(
+            str(place), size, fps=fps, codec="libx264", quality=7, ffmpeg_log_level="quiet"
+        )
+        try:
+            writer.send(None)
+            for picture in _pictures(flights, _VIDEO_PX, round(_LAST_PICTURE_S * fps)):
+                writer.send(picture.tobytes())
+        except OSError as error:
+            raise InputError(f"{path}: ffmpeg stopped before the end of the film") from error
+        finally:
+            writer.close()
     return path
 
 
@@ -80,9 +78,9 @@ def write_gif(flights: Sequence[Flight], path: Path, *, fps: int) -> Path:
         Image.fromarray(picture).quantize(palette=colours_used, dither=Image.Dither.NONE)
         for picture in _pictures(flights, _GIF_PX, held)
     )
-    try:
+    with _written(path) as place:
         next(frames).save(
-            path,
+            place,
             format="GIF",
             save_all=True,
             append_images=frames,
@@ -91,9 +89,16 @@ def write_gif(flights: Sequence[Flight], path: Path, *, fps: int) -> Path:
             # what has not changed is left out, and packs better
             optimize=True,
         )
+    return path
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[Path]:
+    try:
+        with written_by(path) as place:
+            yield place
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    return path
 
 
 def _palette(flights: Sequence[Flight]) -> "Image":

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.flight_data import flight_data
@@ -43,7 +44,7 @@ def write_replay(
     page = replay_page(flights, sources=sources)
     try:
         # a name may hold what is no character (a lone surrogate): it is shown as such
-        path.write_text(page, encoding="utf-8", errors="xmlcharrefreplace", newline="\n")
+        write_atomically(path, page.encode("utf-8", errors="xmlcharrefreplace"))
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     return path

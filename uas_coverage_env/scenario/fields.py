@@ -57,7 +57,7 @@ Velocity_mps = Annotated[tuple[Speed_mps, Speed_mps, Speed_mps], BeforeValidator
 Points_m = Annotated[
     tuple[tuple[Coordinate_m, Coordinate_m, Coordinate_m], ...],
     BeforeValidator(_as_tuple),
-    Field(min_length=4),
+    Field(min_length=4, max_length=1000),
 ]
 Outline_m = Annotated[
     tuple[tuple[Coordinate_m, Coordinate_m], ...],

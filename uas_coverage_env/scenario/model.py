@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.scenario.checks import first_of, problems
 from uas_coverage_env.scenario.fields import UncheckedScenario
 from uas_coverage_env.scenario.toml_text import toml_text
@@ -101,4 +102,4 @@ class Scenario(UncheckedScenario):
     def to_file(self, path: str | Path) -> None:
         """Write a scenario file that `load_scenario` reads back as an equal scenario."""
         data = self.model_dump(mode="json", by_alias=True)
-        Path(path).write_text(toml_text(data), encoding="utf-8")
+        write_atomically(Path(path), toml_text(data).encode())

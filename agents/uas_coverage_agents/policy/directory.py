@@ -2,8 +2,6 @@
 
 import hashlib
 import json
-import os
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ from safetensors import numpy as safetensors
 
 from uas_coverage_agents.policy.description import PolicyDescription
 from uas_coverage_agents.policy.tensors import LARGEST_WEIGHT, Tensors
+from uas_coverage_env.files.plain_files import read_bytes, write_atomically
 from uas_coverage_env.files.strict_toml import InputError, parse
 
 DESCRIPTION = "policy.json"
@@ -111,45 +110,20 @@ def load_policy(directory: str | Path) -> Policy:
     return Policy(description, tensors)
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that it is there in full or, as before, not at all."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with beside.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)  # the new name, too, has to reach the disk
-    finally:
-        os.close(folder)
-
-
 def _bytes(directory: Path, name: str) -> bytes:
     """Read a plain file of the directory that is not larger than a policy can be."""
     path = directory / name
-    most = _MOST_BYTES[name]
     try:
         if not path.resolve(strict=True).is_relative_to(directory.resolve()):
             raise InputError(f"{path}: is a link out of the directory; put the file itself there")
-        # a pipe would be waited for and a device never ends: only plain files are read
-        file = os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb")
-        with file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise InputError(f"{path}: is not a plain file; put the file itself there")
-            content = file.read(most + 1)
+        return read_bytes(path, _MOST_BYTES[name])
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: is missing; a policy is {DESCRIPTION} and {WEIGHTS}") from None
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path}: cannot be read ({reason.lower()}); check its rights") from None
-    if len(content) > most:
-        raise InputError(f"{path}: is larger than {most} bytes; it is no policy of ours")
-    return content
 
 
 def _object(content: bytes, source: str) -> dict[str, object]:

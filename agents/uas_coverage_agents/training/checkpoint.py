@@ -16,7 +16,7 @@ from pydantic import Field
 from safetensors import SafetensorError
 from safetensors import numpy as safetensors
 
-from uas_coverage_agents.policy.directory import write_atomically
+from uas_coverage_env.files.plain_files import read_bytes, write_atomically
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse
 
 KEPT = 2
@@ -123,8 +123,10 @@ def _read(path: Path) -> Checkpoint:
     source = str(path)
     tensors_path = path.with_suffix(".safetensors")
     try:
-        data = json.loads(path.read_bytes())
-        content = tensors_path.read_bytes()
+        data = json.loads(read_bytes(path))
+        content = read_bytes(tensors_path)
+    except InputError:
+        raise
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{source}: cannot be read ({' '.join(str(error).split())})") from None
     if not isinstance(data, dict):

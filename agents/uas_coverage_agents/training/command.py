@@ -15,10 +15,10 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
 from uas_coverage_agents.policy import Policy
-from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.config import load_config, published_names
 from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.files.output_dir import prepare_folder
+from uas_coverage_env.files.plain_files import read_bytes, write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) ->
     if not names or overwrite:
         return
     try:
-        there = json.loads((directory / ORDER).read_bytes())
+        there = json.loads(read_bytes(directory / ORDER))
     except (OSError, ValueError, RecursionError):
         there = None
     if there != json.loads(json.dumps(_record(job))):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from uas_coverage_agents.policy.directory import write_atomically
 from uas_coverage_agents.training.checkpoint import CurvePoint
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.replay.figures import CURVE, png_of, training_figure
 
 TABLE = CURVE

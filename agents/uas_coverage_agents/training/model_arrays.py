@@ -98,6 +98,8 @@ def _from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
             array = arrays[name]
             if array.shape != tuple(tensor.shape):
                 raise ValueError(f"{name} has shape {array.shape}, not {tuple(tensor.shape)}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name} holds a number that is not finite")
             tensor.copy_(torch.from_numpy(array.copy()))
     torch.set_rng_state(torch.from_numpy(arrays["random/torch"].copy()))
     pos, has_gauss = arrays["random/numpy.place"].tolist()

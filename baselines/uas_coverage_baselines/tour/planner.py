@@ -38,8 +38,12 @@ class TourOptions(AssistedOptions):
         default=False,
         description="let the world fly it home; else it flies home itself, by the same rule",
     )
-    moves: int = Field(default=2_000_000, ge=0, description="changes tried by the order search")
-    changes: int = Field(default=700, ge=0, description="changes tried of each flight plan")
+    moves: int = Field(
+        default=2_000_000, ge=0, le=10**9, description="changes tried by the order search"
+    )
+    changes: int = Field(
+        default=700, ge=0, le=10**6, description="changes tried of each flight plan"
+    )
 
 
 class Tour:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.battery import battery_figure, published_battery
@@ -46,10 +47,12 @@ def save_figure(figure: Figure, path: Path) -> Path:
     Raises:
         InputError: The file cannot be written.
     """
+    suffix, content = path.suffix.lower(), BytesIO()
     dates = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}
+    with printed():
+        figure.savefig(content, format=suffix[1:], metadata=dates[suffix])
     try:
-        with printed():
-            figure.savefig(path, metadata=dates[path.suffix.lower()])
+        write_atomically(path, content.getvalue())
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     return path

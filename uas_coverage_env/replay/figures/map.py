@@ -54,7 +54,7 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         _violations(axes, flight, now)
         title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s: "
         title += f"{flight.covered[now]} of {len(flight.scenario.waypoints)} waypoints"
-        axes.set_title(title, fontsize=9)
+        axes.set_title(title, fontsize=9, parse_math=False)
         figure.legend(
             handles=_legend(flight), loc="outside lower center", ncols=6, columnspacing=1.2
         )

@@ -1,6 +1,7 @@
 """How policies got better while they were trained, from the tables that trainings leave."""
 
 import csv
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.replay.figures.style import WIDTH_IN, line_style, printed, uas_colour
 
@@ -71,8 +73,7 @@ def learning_curve(directory: Path) -> dict[str, NDArray[np.float64]]:
     path = directory / CURVE
     wanted = [_STEPS, *(column for column, _, _ in _PANELS)]
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file, strict=True))
+        rows = list(csv.DictReader(io.StringIO(read_text(path)), strict=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read ({error})") from error
     if not rows:
