@@ -58,7 +58,10 @@ def write_beside(path: Path, content: bytes) -> Path:
     Raises:
         OSError: It cannot be written; nothing is left.
     """
-    descriptor, name = tempfile.mkstemp(".part", f".{path.name}.", path.parent)
+    try:
+        descriptor, name = tempfile.mkstemp(".part", f".{path.name}.", path.parent)
+    except OSError as error:  # the name of the file that was asked for, not of the one beside it
+        raise OSError(error.errno, error.strerror, str(path)) from None
     written = Path(name)
     try:
         with os.fdopen(descriptor, "wb") as file:

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import ConvexHull, KDTree, QhullError
 
 # Thinner bodies have no face that separates one side from the other.
 _THINNEST_M = 1e-3
@@ -130,7 +130,7 @@ def _merged(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     # the triangles of a face have the very same normal, mostly; the first of each stays
     normals = normals[np.sort(np.unique(normals, axis=0, return_index=True)[1])]
-    near = cKDTree(normals).query_pairs(_SAME_NORMAL, p=np.inf, output_type="ndarray")
+    near = KDTree(normals).query_pairs(_SAME_NORMAL, p=np.inf, output_type="ndarray")
     keep = np.ones(len(normals), np.bool_)
     for first, second in near[np.lexsort((near[:, 0], near[:, 1]))]:
         if keep[first]:
