@@ -24,6 +24,7 @@ from uas_coverage_env.scenario import (
     Geofence,
     MovingObstacle,
     Obstacle,
+    Place,
     Scenario,
     ScheduledVelocity,
     Uas,
@@ -42,7 +43,7 @@ PUBLIC = {
     Scenario: {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
         *("landing_speed_mps", "uas_safe_distance_m", "geofence", "obstacles"),
-        *("moving_obstacles", "uas", "waypoints", "decorations"),
+        *("moving_obstacles", "uas", "waypoints", "decorations", "place"),
     },
     MovingObstacle: {"name", "kind", "radius_m", "height_m", "safe_distance_m", "start_m"},
     # these are handed over as they are
@@ -51,6 +52,7 @@ PUBLIC = {
     Uas: {"name", "vehicle", "start_m", "soc_0", "radius_m", "dod_max"},
     Waypoint: {"kind", "position_m", "radius_m", "weight"},
     Decoration: {"name", "kind", "polygon_m"},
+    Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
 HIDDEN = {Scenario: {"wind", "disturbances"}, MovingObstacle: {"schedule"}}
 

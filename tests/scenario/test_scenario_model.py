@@ -16,6 +16,7 @@ from uas_coverage_env.scenario import (
     Geofence,
     MovingObstacle,
     Obstacle,
+    Place,
     Scenario,
     ScheduledVelocity,
     Uas,
@@ -275,3 +276,22 @@ def test_a_generated_scenario_is_a_scenario_like_any_other(tmp_path):
     scenario = generate_scenario(3, n_waypoints=9)
     scenario.to_file(tmp_path / "generated.toml")
     assert load_scenario(tmp_path / "generated.toml") == scenario
+
+
+def test_a_place_on_the_earth_is_kept_in_the_file_and_absent_where_there_is_none(tmp_path):
+    nowhere = small()
+    assert "place" not in nowhere.content()
+    there = nowhere.model_copy(update={"place": Place(latitude_deg=60.5, longitude_deg=-180)})
+    there.to_file(tmp_path / "there.toml")
+    assert "\n[place]\nlatitude_deg = 60.5\nlongitude_deg = -180.0\nheight_m = 0.0\n" in (
+        tmp_path / "there.toml"
+    ).read_text(encoding="utf-8")
+    assert load_scenario(tmp_path / "there.toml") == there
+    assert there != nowhere
+
+
+@pytest.mark.parametrize("wrong", [{"latitude_deg": 90.1}, {"longitude_deg": -181}, {"x": 1}])
+def test_a_place_that_is_none_is_refused(wrong):
+    good = {"latitude_deg": 1.0, "longitude_deg": 2.0}
+    with pytest.raises(ValueError, match="place"):
+        parse(small().model_dump(mode="json", by_alias=True) | {"place": good | wrong}, Scenario, "")

@@ -12,6 +12,7 @@ from uas_coverage_env.scenario import (
     Geofence,
     MovingObstacle,
     Obstacle,
+    Place,
     Scenario,
     ScheduledVelocity,
     Uas,
@@ -63,6 +64,7 @@ class MissionBrief(StrictModel):
         vehicles: The vehicle of each UAS, in their order.
         waypoints: What is to be covered.
         decorations: Drawn only.
+        place: Where on the Earth it is; None where the scenario does not say.
     """
 
     schema_version: int
@@ -79,6 +81,7 @@ class MissionBrief(StrictModel):
     vehicles: tuple[VehicleParams, ...]
     waypoints: tuple[Waypoint, ...]
     decorations: tuple[Decoration, ...]
+    place: Place | None = None
 
     if not TYPE_CHECKING:
 

@@ -243,6 +243,22 @@ class Wind(StrictModel):
     up_mps: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
 
 
+class Place(StrictModel):
+    """Where the origin of the local metres lies on the Earth (WGS 84); nothing in flight uses it.
+
+    The metres are those of an azimuthal equidistant map about the origin (`operations.LocalFrame`).
+
+    Attributes:
+        latitude_deg: Of the origin, positive north [degrees].
+        longitude_deg: Of the origin, positive east [degrees].
+        height_m: Of the ground at the origin, z = 0, above mean sea level [m].
+    """
+
+    latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)]
+    height_m: Annotated[float, Field(ge=-1_000.0, le=10_000.0)] = 0.0
+
+
 class UncheckedScenario(StrictModel):
     """The fields of a `Scenario`, each allowed by itself; what checks and estimates read."""
 
@@ -259,6 +275,7 @@ class UncheckedScenario(StrictModel):
     uas: Annotated[tuple[Uas, ...], Strict(False), Field(min_length=1)]
     waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
     decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
+    place: Place | None = None
     wind: Wind | None = None
     disturbances: DisturbanceTables = ()
 
@@ -266,7 +283,7 @@ class UncheckedScenario(StrictModel):
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # files, and what is computed from their content, are those of scenarios before the table
         data = serialise(self)
-        for name in ("wind", "disturbances"):
+        for name in ("place", "wind", "disturbances"):
             if not getattr(self, name):
                 data.pop(name, None)
         return data

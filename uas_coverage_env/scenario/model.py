@@ -31,6 +31,7 @@ class Scenario(UncheckedScenario):
         uas: The fleet.
         waypoints: What is to be covered.
         decorations: Drawn only.
+        place: Where on the Earth it is; without it, nowhere in particular.
         wind: Wind; without it, the air is still.
         disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
             are those of the package that installed NAME.

@@ -11,6 +11,7 @@ from uas_coverage_env.scenario.fields import (
     Geofence,
     MovingObstacle,
     Obstacle,
+    Place,
     ScheduledVelocity,
     Uas,
     Waypoint,
@@ -18,7 +19,10 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.model import Scenario
 
-_TABLES = (Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration, Wind)
+_TABLES = (
+    *(Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
+    *(Place, Wind),
+)
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
