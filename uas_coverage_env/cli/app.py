@@ -8,7 +8,17 @@ from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli import compare, figure, planners, replay, run, scenarios, vehicle, warm_up
+from uas_coverage_env.cli import (
+    compare,
+    figure,
+    operations,
+    planners,
+    replay,
+    run,
+    scenarios,
+    vehicle,
+    warm_up,
+)
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.plugins import add_plugin_commands
 from uas_coverage_env.cli.termination import terminated_as_by_hand
@@ -53,6 +63,7 @@ app.command("warm-up")(warm_up.warm_up)
 app.command("planners")(planners.planners)
 app.command("replay")(replay.replay)
 app.command("figure")(figure.figure)
+app.command("import")(operations.import_area)
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(vehicle.app, name="vehicle")
 add_plugin_commands(app)

@@ -1,0 +1,109 @@
+"""`uas-coverage import` and `export`: from a drawn area to a mission, from a flight to files."""
+
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.scenario import warnings
+
+_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml"}
+
+
+@contextmanager
+def _extra() -> Iterator[None]:
+    """Say which extra is missing, where it is."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        name = (error.name or "").partition(".")[0]
+        if name not in _LIBRARIES:
+            raise
+        raise InputError(
+            f'places on the Earth need {name}: pip install "uas-coverage-env[ops]"'
+        ) from error
+
+
+def import_area(
+    areas: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="AREA...",
+            help="What was drawn: .geojson, .kml, .kmz, .shp or a QGroundControl .plan; or the "
+            "shipped example, `karhula`.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Scenario file to write.")],
+    town: Annotated[
+        Path | None, typer.Option(help="Buildings of OpenStreetMap as .geojson; or `karhula`.")
+    ] = None,
+    fleet: Annotated[
+        str, typer.Option(metavar="VEHICLE:COUNT,...", help="Shipped vehicles or vehicle files.")
+    ] = "s500_v2:2",
+    camera: Annotated[
+        str, typer.Option(help="Name of a camera (see the docs), or a .toml file with one.")
+    ] = "sony-a6000",
+    height: Annotated[float, typer.Option(help="Of the waypoints above the ground, m.")] = 40.0,
+    radius: Annotated[float, typer.Option(help="Of a waypoint's sphere, m.")] = 6.0,
+    overlap: Annotated[
+        float, typer.Option(help="Share of a picture that the next one shows again.")
+    ] = 0.1,
+    ceiling: Annotated[
+        float | None,
+        typer.Option(help="Top of the fence, m; default: 30 m above --height.", show_default=False),
+    ] = None,
+    home: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LAT,LON", help="Take-off place, instead of those drawn; may be repeated."
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the file where it exists.")
+    ] = False,
+) -> None:
+    """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
+    with _extra():
+        from uas_coverage_env.operations import ImportOptions, make_scenario, read_drawings
+    if out.suffix != ".toml":
+        raise InputError(f"--out {out}: should end in .toml")
+    if out.exists() and not overwrite:
+        raise InputError(f"{out}: exists; give another --out or add --overwrite")
+    options = ImportOptions(
+        fleet=fleet,
+        camera=camera,
+        height_m=height,
+        radius_m=radius,
+        overlap=overlap,
+        ceiling_m=height + 30.0 if ceiling is None else ceiling,
+        homes=tuple(_place("--home", text) for text in home or ()),
+        town=town,
+    )
+    name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
+    made = make_scenario(read_drawings(areas), name, options)
+    made.scenario.to_file(out)
+    if made.credit:
+        text = out.read_text(encoding="utf-8")
+        out.write_text(f"# Buildings: {made.credit}\n{text}", encoding="utf-8")
+    screen = console()
+    for line in (*made.notes, f"scenario in {out}"):
+        screen.print(line, markup=False)
+    for warning in warnings(made.scenario):
+        sys.stderr.write(f"warning: {one_line(warning)}\n")
+
+
+def _place(option: str, text: str) -> tuple[float, float]:
+    """Latitude and longitude as an option gives them."""
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"{option} {text[:60]!r}: should be LAT,LON, as in 60.52,26.94") from None
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise InputError(f"{option} {text[:60]!r}: is no latitude and longitude in degrees")
+    return latitude, longitude

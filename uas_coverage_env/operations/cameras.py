@@ -1,0 +1,90 @@
+"""Cameras: what they show of the ground, and how far apart pictures may be."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, RootModel
+
+from uas_coverage_env.files.strict_toml import InputError, StrictModel, read_toml
+
+_SHIPPED = Path(__file__).with_name("cameras.toml")
+
+_Length_mm = Annotated[float, Field(gt=0.0, le=1_000.0)]
+_Pixels = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class Camera(StrictModel):
+    """A camera that looks straight down, the wide side of its picture from west to east.
+
+    Attributes:
+        sensor_mm: Width and height of the sensor [mm].
+        focal_mm: Focal length [mm].
+        picture_px: Width and height of a picture [pixels].
+    """
+
+    sensor_mm: tuple[_Length_mm, _Length_mm]
+    focal_mm: _Length_mm
+    picture_px: tuple[_Pixels, _Pixels]
+
+    def footprint_m(self, height_m: float) -> tuple[float, float]:
+        """West to east and south to north [m], what a picture shows from a height above ground."""
+        width_mm, height_mm = self.sensor_mm
+        return height_m * width_mm / self.focal_mm, height_m * height_mm / self.focal_mm
+
+    def ground_sample_m(self, height_m: float) -> float:
+        """Size of a pixel on the ground [m]."""
+        return self.footprint_m(height_m)[0] / self.picture_px[0]
+
+    def pitch_m(self, height_m: float, radius_m: float, overlap: float) -> tuple[float, float]:
+        """How far apart waypoints may be so that all between them is seen; (east, north) [m].
+
+        A waypoint counts as covered from anywhere in its sphere: from the edge, and from its
+        lowest point, where a picture shows least. The cell of ground that belongs to the waypoint
+        has to be in the picture all the same.
+
+        Args:
+            height_m: Of the waypoint above the ground [m].
+            radius_m: Of its sphere [m].
+            overlap: Share of a cell that the next one shows again [-].
+
+        Raises:
+            InputError: From this height nothing is left.
+        """
+        lowest = self.footprint_m(height_m - radius_m)
+        east_m, north_m = ((side - 2.0 * radius_m) * (1.0 - overlap) for side in lowest)
+        if min(east_m, north_m) <= 0.0:
+            enough_m = radius_m * (1.0 + 2.0 * self.focal_mm / min(self.sensor_mm))
+            raise InputError(
+                f"--height {height_m:g}: too low for a picture around a sphere of {radius_m:g} m; "
+                f"fly higher than {enough_m:.1f} m, or take a smaller --radius"
+            )
+        return east_m, north_m
+
+
+class _Cameras(RootModel[dict[str, Camera]]):
+    """A file of cameras by name."""
+
+
+def camera_names() -> tuple[str, ...]:
+    """The names of the shipped cameras."""
+    return tuple(read_toml(_SHIPPED, _Cameras).root)
+
+
+def load_camera(name_or_path: str) -> Camera:
+    """A shipped camera, or the only one of a file of the same form as `cameras.toml`.
+
+    Raises:
+        InputError: There is no such camera, or its file is wrong.
+    """
+    shipped = read_toml(_SHIPPED, _Cameras).root
+    if name_or_path in shipped:
+        return shipped[name_or_path]
+    if not name_or_path.endswith(".toml"):
+        known = ", ".join(shipped)
+        raise InputError(
+            f"unknown camera {name_or_path[:80]!r}; take {known} or the path of a .toml file"
+        )
+    own = list(read_toml(name_or_path, _Cameras).root.values())
+    if len(own) != 1:
+        raise InputError(f"{name_or_path}: has {len(own)} cameras; keep one table [NAME]")
+    return own[0]

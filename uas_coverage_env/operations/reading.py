@@ -1,0 +1,67 @@
+"""Drawings from files of any known format."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.operations.drawing import MOST_BYTES, Drawn, DrawnPolygon, limited
+from uas_coverage_env.operations.geojson import read_geojson
+from uas_coverage_env.operations.kml import read_kml, read_kmz
+from uas_coverage_env.operations.qgc_plan import read_plan
+from uas_coverage_env.operations.shapefiles import read_shapefile
+
+_EXAMPLES = Path(__file__).with_name("examples")
+
+READERS: dict[str, Callable[[Path], Iterator[Drawn]]] = {
+    ".geojson": read_geojson,
+    ".json": read_geojson,
+    ".kml": read_kml,
+    ".kmz": read_kmz,
+    ".shp": read_shapefile,
+    ".plan": read_plan,
+}
+"""Ending of a file -> what reads it; a new format is a line here."""
+
+
+def read_drawings(paths: Sequence[Path]) -> list[Drawn]:
+    """All polygons and take-off places of some files, in their order.
+
+    Args:
+        paths: Files, or names of shipped examples (`karhula`).
+
+    Raises:
+        InputError: A file cannot be used, or there is nothing to search in them.
+    """
+    found = [thing for path in paths for thing in _read(or_example(path, ".geojson"))]
+    if not any(isinstance(thing, DrawnPolygon) and thing.role == "search" for thing in found):
+        names = ", ".join(map(str, paths))
+        raise InputError(f"{names}: no area to search; draw it as a closed polygon")
+    return found
+
+
+def _read(path: Path) -> list[Drawn]:
+    check_size(path)
+    if path.suffix.lower() not in READERS:
+        known = ", ".join(READERS)
+        raise InputError(f"{path}: unknown kind of file; save the area as {known}")
+    return list(limited(str(path), READERS[path.suffix.lower()](path)))
+
+
+def or_example(path: Path, ending: str) -> Path:
+    """The file of a shipped example where its name is given, otherwise the path itself."""
+    file = _EXAMPLES / f"{path.name}{ending}"
+    is_name = len(path.parts) == 1 and not path.suffix and not path.exists()
+    return file if is_name and file.is_file() else path
+
+
+def check_size(path: Path) -> None:
+    """Refuse what is no file, or too large to be meant.
+
+    Raises:
+        InputError: It is.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; check the path")
+    if path.stat().st_size > MOST_BYTES:
+        megabytes = MOST_BYTES // 1_000_000
+        raise InputError(f"{path}: is larger than {megabytes} MB; save the area alone")

@@ -1,0 +1,168 @@
+"""The site of a mission in local metres: what is searched, the fence, what stands in the way."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import shapely
+from shapely.geometry import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.operations.convex import convex_pieces, hull_of
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
+from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.local import frame_around, local_place, local_polygon
+from uas_coverage_env.operations.town import Building, prisms
+
+SAFE_DISTANCE_M = 3.0
+"""Kept from buildings and no-fly zones: as much as satellite navigation may be off."""
+
+FENCE_MARGIN_M = 0.5
+FENCE_AROUND_M = 25.0
+"""Between areas or take-off places and a fence that was not drawn."""
+
+LARGEST_UAS_M = 0.5
+"""Radius for which gaps between buildings are judged."""
+
+_FENCE_DETAIL_M = 3.0
+_ABOVE_CEILING_M = 5.0
+_SLIVER_M, _EDGE_M = 0.25, 0.1
+_NO_FLY_SLACK, _BUILDING_GAP_M = 1.02, 2.0 * (SAFE_DISTANCE_M + LARGEST_UAS_M)
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """An upright convex prism from the ground.
+
+    Attributes:
+        kind: Of the obstacle that it becomes.
+        footprint: x east, y north [m].
+        top_m: Above the ground [m].
+        safe_distance_m: Kept from it in addition to the radius of a UAS [m].
+    """
+
+    kind: str
+    footprint: Polygon
+    top_m: float
+    safe_distance_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A site in local metres, x east, y north.
+
+    Attributes:
+        frame: Where on the Earth it is.
+        areas: What is searched, each with its weight; they do not overlap.
+        homes_m: East and north of the take-off places.
+        fence: Convex; what lies in it but outside the drawn fence is walled off.
+        no_fly: Walls that reach beyond the ceiling.
+    """
+
+    frame: LocalFrame
+    areas: tuple[tuple[float, BaseGeometry], ...]
+    homes_m: tuple[tuple[float, float], ...]
+    fence: Polygon
+    no_fly: tuple[Wall, ...]
+
+
+def make_site(
+    things: Sequence[Drawn], homes: Sequence[tuple[float, float]], ceiling_m: float
+) -> Site:
+    """The site that was drawn.
+
+    Args:
+        things: Polygons and take-off places.
+        homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
+        ceiling_m: Top of the fence above the ground [m].
+
+    Raises:
+        InputError: Something in it cannot be meant.
+    """
+    frame = _with_height(frame_around(list(things)), things)
+    polygons = [
+        (thing, local_polygon(frame, thing)) for thing in things if isinstance(thing, DrawnPolygon)
+    ]
+    homes_m = _homes_m(frame, things, homes)
+    areas = _apart([(t.weight, area) for t, area in polygons if t.role == "search"])
+    drawn_fence = shapely.union_all([area for t, area in polygons if t.role == "fence"])
+    fence = _fence(drawn_fence, areas, homes_m)
+    for thing, area in polygons:
+        if thing.role == "search" and area.difference(fence.buffer(1.0)).area > 1.0:
+            raise InputError(f"{thing.source} reaches beyond the fence; enlarge the fence")
+    top_m = ceiling_m + _ABOVE_CEILING_M
+    walls = [
+        Wall("no_fly", piece, top_m, SAFE_DISTANCE_M)
+        for thing, area in polygons
+        if thing.role == "no_fly"
+        for piece in convex_pieces(area, _NO_FLY_SLACK)
+    ]
+    if not drawn_fence.is_empty:
+        walls += [
+            Wall("outside_fence", piece, top_m, FENCE_MARGIN_M)
+            for part in shapely.get_parts(fence.difference(drawn_fence))
+            if isinstance(part, Polygon) and not part.buffer(-_SLIVER_M).is_empty
+            for piece in convex_pieces(part, 1.0 + 1e-9)
+        ]
+    return Site(
+        frame, areas, homes_m, fence, tuple(w for w in walls if w.footprint.intersects(fence))
+    )
+
+
+def building_walls(buildings: Sequence[Building], fence: Polygon) -> list[Wall]:
+    """Walls that hold all buildings within a fence."""
+    return [
+        Wall("building", prism.footprint, prism.height_m, SAFE_DISTANCE_M)
+        for prism in prisms(buildings, _BUILDING_GAP_M)
+        if prism.footprint.intersects(fence)
+    ]
+
+
+def _with_height(frame: LocalFrame, things: Sequence[Drawn]) -> LocalFrame:
+    """The height of the ground that a file tells with a take-off place."""
+    for thing in things:
+        if isinstance(thing, TakeOff) and thing.height_m is not None:
+            if not -1_000.0 <= thing.height_m <= 10_000.0:
+                raise InputError(f"{thing.source}: height {thing.height_m:g} m is on no ground")
+            return LocalFrame(frame.place.model_copy(update={"height_m": thing.height_m}))
+    return frame
+
+
+def _homes_m(
+    frame: LocalFrame, things: Sequence[Drawn], homes: Sequence[tuple[float, float]]
+) -> tuple[tuple[float, float], ...]:
+    places = [TakeOff("--home", *home) for home in homes] or [
+        thing for thing in things if isinstance(thing, TakeOff)
+    ]
+    if not places:
+        raise InputError("no take-off place: draw a point, or give --home LAT,LON")
+    return tuple(local_place(frame, place) for place in places)
+
+
+def _apart(
+    areas: list[tuple[float, Polygon]],
+) -> tuple[tuple[float, BaseGeometry], ...]:
+    """The areas without what a heavier one holds already."""
+    result: list[tuple[float, BaseGeometry]] = []
+    taken: BaseGeometry = Polygon()
+    for weight, area in sorted(areas, key=lambda entry: -entry[0]):
+        left = area if taken.is_empty else area.difference(taken)
+        if left is not area:  # what is thinner than can be drawn is where two edges nearly agree
+            left = left.buffer(-_EDGE_M, join_style="mitre").buffer(_EDGE_M, join_style="mitre")
+        result.append((weight, left))
+        taken = taken.union(area)
+    return tuple(result)
+
+
+def _fence(
+    drawn: BaseGeometry,
+    areas: tuple[tuple[float, BaseGeometry], ...],
+    homes_m: tuple[tuple[float, float], ...],
+) -> Polygon:
+    if drawn.is_empty:
+        around = shapely.union_all([*(area for _, area in areas), *map(Point, homes_m)])
+        hull = around.convex_hull.buffer(FENCE_AROUND_M, quad_segs=2)
+    else:
+        hull = drawn.convex_hull
+    # some of the corners of something convex: never larger than it
+    return hull_of(hull.simplify(_FENCE_DETAIL_M))
