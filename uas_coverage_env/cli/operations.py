@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.table import Table
 
 from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import warnings
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.scenario import Place, warnings
 
 _LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml"}
 
@@ -96,6 +99,73 @@ def import_area(
         screen.print(line, markup=False)
     for warning in warnings(made.scenario):
         sys.stderr.write(f"warning: {one_line(warning)}\n")
+
+
+def export(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+    kind: Annotated[
+        str,
+        typer.Option("--format", help="qgc (.plan), ardupilot (.waypoints), kml, geojson or csv."),
+    ],
+    out: Annotated[Path, typer.Option(help="Directory for one file per UAS and the report.")],
+    min_slack: Annotated[
+        float,
+        typer.Option(
+            help="Seconds that any UAS may be late before two come too close; files that allow "
+            "less are refused."
+        ),
+    ] = 20.0,
+    tolerance: Annotated[float, typer.Option(help="How far legs may be from the flight, m.")] = 2.0,
+    corner: Annotated[
+        float, typer.Option(help="How far from a corner an autopilot may leave a leg, m.")
+    ] = 2.0,
+    autopilot: Annotated[
+        str, typer.Option(help="Whose plans `qgc` writes: ardupilot or px4.")
+    ] = "ardupilot",
+    place: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LAT,LON",
+            help="Of the origin, for a scenario without [place].",
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Write into a directory that is not empty.")
+    ] = False,
+) -> None:
+    """Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`)."""
+    with _extra():
+        from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
+    if out.is_dir() and any(out.iterdir()) and not overwrite:
+        raise InputError(f"--out {out}: is not empty; give another or add --overwrite")
+    latitude, longitude = _place("--place", place) if place else (0.0, 0.0)
+    options = ExportOptions(
+        kind=kind,
+        min_slack_s=min_slack,
+        tolerances=Tolerances(path_m=tolerance, corner_m=corner),
+        autopilot=autopilot,
+        place=Place(latitude_deg=latitude, longitude_deg=longitude) if place else None,
+    )
+    made = make_export(Flight.load(directory), options)
+    prepare_folder(out)
+    write_files(out, {name: text.encode() for name, text in made.files.items()})
+    screen = console()
+    table = Table("UAS", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None)
+    for uas in made.data["uas"]:
+        table.add_row(
+            uas["name"],
+            str(len(uas["legs"])),
+            f"{uas['duration_s']:.0f}",
+            f"{uas['planned_s']:.0f}",
+            f"{uas['soc_landed']:.1%}",
+            f"{uas['least_spare']['spare']:.1%}",
+        )
+    screen.print(table)
+    for name in made.grounded:
+        screen.print(f"{name} stays on the ground and has no file", markup=False)
+    screen.print(f"{len(made.files)} files in {out}, see report.html", markup=False)
+    for note in made.notes:
+        sys.stderr.write(f"warning: {one_line(note)}\n")
 
 
 def _place(option: str, text: str) -> tuple[float, float]:

@@ -5,20 +5,29 @@ Needs the extra `ops`.
 
 from uas_coverage_env.operations.cameras import Camera, camera_names, load_camera
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
+from uas_coverage_env.operations.export import Export, ExportOptions, make_export
+from uas_coverage_env.operations.formats import FIRMWARE, FORMATS
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.make import Imported, ImportOptions, make_scenario
 from uas_coverage_env.operations.reading import read_drawings
+from uas_coverage_env.operations.tracks import Tolerances
 
 __all__ = [
+    "FIRMWARE",
+    "FORMATS",
     "Camera",
     "Drawn",
     "DrawnPolygon",
+    "Export",
+    "ExportOptions",
     "ImportOptions",
     "Imported",
     "LocalFrame",
     "TakeOff",
+    "Tolerances",
     "camera_names",
     "load_camera",
+    "make_export",
     "make_scenario",
     "read_drawings",
 ]

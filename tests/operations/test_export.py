@@ -1,0 +1,298 @@
+"""Exports are read back by parsers that are not ours, their metres by geodesics that are not."""
+
+import json
+import math
+import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pyproj")
+from geographiclib.geodesic import Geodesic
+from pymavlink import mavwp
+from qgc_loader import problems
+
+from uas_coverage_env import generate_scenario, load_planner, rollout
+from uas_coverage_env.cli import main
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
+from uas_coverage_env.operations.exported import return_height_m
+from uas_coverage_env.operations.tracks import cut_path, distances_m, make_track
+from uas_coverage_env.scenario import Place, load_scenario
+
+TOLERANCES = Tolerances(2.0, 2.0)
+WITH_PLACE = (16, 21, 22)
+MOST_OFF_M = 0.01
+FLIGHTS = 6
+PLACES = [(89.9999, 20.0), (-90.0, 0.0), (12.0, 180.0), (-45.0, -179.9999)]
+
+
+def random_flight(seed):
+    rng = np.random.default_rng(seed)
+    scenario = generate_scenario(
+        seed=seed,
+        n_uas=int(rng.integers(1, 4)),
+        n_waypoints=int(rng.integers(4, 9)),
+        n_obstacles=int(rng.integers(0, 6)),
+    )
+    return rollout(scenario, load_planner("nearest-waypoint"), 0)
+
+
+@pytest.fixture(scope="module", params=range(FLIGHTS))
+def number(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def flight(number):
+    return random_flight(number)
+
+
+@pytest.fixture(scope="module")
+def place(number):
+    rng = np.random.default_rng(number)
+    anywhere = rng.uniform((-85.0, -180.0), (85.0, 180.0), (FLIGHTS, 2))
+    latitude, longitude = [*PLACES, *anywhere][number]
+    return Place(latitude_deg=latitude, longitude_deg=longitude, height_m=rng.uniform(0, 3000))
+
+
+def exported(flight, place, kind, **changes):
+    options = {"min_slack_s": 0.0, "tolerances": TOLERANCES, "place": place} | changes
+    return make_export(flight, ExportOptions(kind, **options))
+
+
+def metres(latitude, longitude, height, origin):
+    """North, east, down by geodesics: the export is by a map projection."""
+    line = Geodesic.WGS84.Inverse(origin.latitude_deg, origin.longitude_deg, latitude, longitude)
+    azimuth = math.radians(line["azi1"])
+    return np.array([line["s12"] * math.cos(azimuth), line["s12"] * math.sin(azimuth), -height])
+
+
+def tracks_of(flight):
+    tracks = [make_track(flight, i, TOLERANCES) for i in range(len(flight.names))]
+    return {track.name: track for track in tracks if track is not None}
+
+
+def wanted_places(track):
+    ground = np.array([*track.home_m[:2], 0.0])
+    return [*track.corners_m, ground]
+
+
+def test_every_corner_of_a_waypoint_file_is_where_it_was_planned(flight, place, tmp_path):
+    made = exported(flight, place, "ardupilot")
+    tracks = tracks_of(flight)
+    assert {name for name in made.files if name.endswith(".waypoints")} == {
+        f"{name}.waypoints" for name in tracks
+    }
+    for name, track in tracks.items():
+        (tmp_path / name).write_text(made.files[f"{name}.waypoints"])
+        loader = mavwp.MAVWPLoader()
+        assert loader.load(str(tmp_path / name)) == loader.count()
+        items = [loader.wp(n) for n in range(1, loader.count())]
+        places = [item for item in items if item.command in WITH_PLACE]
+        for item, wanted in zip(places, wanted_places(track), strict=True):
+            found = metres(item.x, item.y, item.z, place)
+            assert np.linalg.norm(found - wanted) < MOST_OFF_M
+        assert [item.command for item in (items[0], items[-1])] == [22, 21]
+        assert loader.wp(0).z == pytest.approx(place.height_m, abs=1e-3)
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(
+    flight, place, autopilot
+):
+    made = exported(flight, place, "qgc", autopilot=autopilot)
+    for name, track in tracks_of(flight).items():
+        text = made.files[f"{name}.plan"]
+        assert problems(text) == []
+        plan = json.loads(text)
+        items = [i for i in plan["mission"]["items"] if i["command"] in WITH_PLACE]
+        for item, wanted in zip(items, wanted_places(track), strict=True):
+            # what MAVLink keeps: whole 1e-7 degrees and 32-bit floats
+            latitude, longitude = (round(value * 1e7) / 1e7 for value in item["params"][4:6])
+            found = metres(latitude, longitude, float(np.float32(item["params"][6])), place)
+            assert np.abs(found - wanted).max() < MOST_OFF_M
+        (inside,) = [p for p in plan["geoFence"]["polygons"] if p["inclusion"]]
+        for corner in inside["polygon"]:
+            fence_m = flight.scenario.fence.vertices_m[:, :2]
+            away = np.linalg.norm(fence_m - metres(*corner, 0.0, place)[:2], axis=1)
+            assert away.min() < MOST_OFF_M
+        assert plan["mission"]["firmwareType"] == {"ardupilot": 3, "px4": 12}[autopilot]
+        assert len(plan["rallyPoints"]["points"]) == 1
+
+
+def test_tracks_for_maps_and_tables_hold_the_flown_samples(flight, place):
+    files = {k: exported(flight, place, k).files for k in ("kml", "geojson", "csv")}
+    for name, track in tracks_of(flight).items():
+        flown, legs = json.loads(files["geojson"][f"{name}.geojson"])["features"]
+        of_geojson = [(b, a, c) for a, b, c in flown["geometry"]["coordinates"]]
+        assert len(legs["geometry"]["coordinates"]) == len(track.corners_m)
+        root = ElementTree.fromstring(files["kml"][f"{name}.kml"])
+        text = root.findall(".//{*}coordinates")[0].text
+        of_kml = [[float(v) for v in line.split(",")] for line in text.split()]
+        of_kml = [(b, a, c) for a, b, c in of_kml]
+        rows = files["csv"][f"{name}.csv"].splitlines()[1:]
+        of_csv = [[float(v) for v in row.split(",")[2:]] for row in rows]
+        for found in (of_geojson, of_kml, of_csv):
+            assert len(found) == len(track.flown_m)
+            for sample in (0, len(found) // 2, -1):
+                off = metres(*found[sample], place) - track.flown_m[sample]
+                assert np.linalg.norm(off) < MOST_OFF_M
+
+
+def test_legs_are_few_close_to_the_flight_and_clear_also_where_corners_are_cut(flight):
+    scenario = flight.scenario
+    for track in tracks_of(flight).values():
+        corners, radius_m = track.corners_m, scenario.uas[track.uas].radius_m
+        assert len(corners) < 0.6 * len(track.flown_m)
+        high = track.flown_m[-track.flown_m[:, 2] >= 3.0]
+        off_m = np.min([distances_m(high, a, b) for a, b in pairwise(corners)], axis=0)
+        assert off_m.max() <= TOLERANCES.path_m + 1e-9
+        stops = [leg.stop for leg in track.legs]
+        path = cut_path(corners, stops, TOLERANCES.corner_m)
+        dense = np.concatenate(
+            [
+                a + np.linspace(0, 1, 40)[:, None] * (b - a)
+                for a, b in [*pairwise(path), *pairwise(corners)]
+            ]
+        )
+        assert scenario.fence.signed_distance(dense).max() < 0.0
+        for hull in scenario.hulls:
+            assert hull.signed_distance(dense).min() > radius_m
+
+
+def test_what_a_uas_covered_is_covered_by_its_legs(flight):
+    scenario = flight.scenario
+    covered = set()
+    for track in tracks_of(flight).values():
+        stops = [leg.stop for leg in track.legs]
+        path = cut_path(track.corners_m, stops, TOLERANCES.corner_m)
+        for w, passed_m in zip(track.waypoints, track.passed_m, strict=True):
+            centre = np.array([scenario.waypoints[w].position_m])
+            away_m = min(distances_m(centre, a, b)[0] for a, b in pairwise(path))
+            assert away_m == pytest.approx(passed_m)
+            if away_m <= scenario.waypoints[w].radius_m:
+                covered.add(w)
+    assert len(covered) == flight.covered[-1]
+
+
+def test_a_smaller_tolerance_keeps_closer_with_more_legs(flight):
+    for i in range(len(flight.names)):
+        near, far = (make_track(flight, i, Tolerances(t, 2.0)) for t in (0.5, 5.0))
+        if near is not None and far is not None:
+            assert near.off_m <= 0.5 + 1e-9
+            assert len(near.legs) >= len(far.legs)
+
+
+def test_the_report_counts_charge_down_and_says_what_home_takes(flight, place):
+    data = exported(flight, place, "csv").data
+    assert data["waypoints_passed"] == flight.covered[-1]
+    for uas in data["uas"]:
+        socs = [leg["soc"] for leg in uas["legs"]]
+        assert all(later <= earlier for earlier, later in pairwise(socs))
+        assert uas["soc_landed"] < socs[-1]
+        for leg in uas["legs"]:
+            reserve = uas["soc_reserve"]
+            assert leg["spare"] == pytest.approx(leg["soc"] - reserve - leg["home"], abs=3e-4)
+        least = min(leg["spare"] for leg in uas["legs"])
+        assert uas["least_spare"]["spare"] == least
+        assert (uas["point_of_no_return"] is None) == (least >= 0.0)
+
+
+def test_the_charge_of_a_file_is_estimated_with_care(flight, place):
+    # per second it takes about what the flight took: level flight at full speed is most of that
+    for uas in exported(flight, place, "csv").data["uas"]:
+        soc_0 = next(u.soc_0 for u in flight.scenario.uas if u.name == uas["name"])
+        per_s = (uas["legs"][0]["soc"] - uas["soc_landed"]) / (
+            uas["duration_s"] - uas["legs"][0]["time_s"]
+        )
+        planned = (soc_0 - uas["planned_soc_landed"]) / uas["planned_s"]
+        assert 0.95 * planned < per_s < 1.3 * planned
+
+
+def test_flying_home_at_the_return_height_is_clear_from_everywhere(flight):
+    scenario = flight.scenario
+    for track in tracks_of(flight).values():
+        height_m = return_height_m(scenario, track)
+        if height_m is None:
+            continue
+        for place_m in track.flown_m[-track.flown_m[:, 2] >= 3.0][::5]:
+            top = min(place_m[2], -height_m)
+            turns = [place_m, [*place_m[:2], top], [*track.home_m[:2], top]]
+            way = np.concatenate([np.linspace(a, b, 60) for a, b in pairwise(np.array(turns))])
+            assert all(hull.signed_distance(way).min() > 0.0 for hull in scenario.hulls)
+
+
+def test_the_page_shows_every_uas_and_needs_no_network(flight, place):
+    page = exported(flight, place, "csv").files["report.html"]
+    assert page.count("<polyline") == len(tracks_of(flight))
+    assert "http" not in page
+    ElementTree.fromstring(page[page.index("<svg") : page.index("</svg>") + 6])
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory):
+    """A flight whose scenario has no place."""
+    folder = tmp_path_factory.mktemp("flights") / "flight"
+    random_flight(1).save(folder)
+    return str(folder)
+
+
+def refused(capsys, *arguments):
+    assert main(["export", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    return err
+
+
+HERE = ("--place", "47.5,19.05", "--min-slack", "0")
+
+
+def test_the_command_writes_one_file_per_uas_and_the_report(directory, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["export", directory, "--format", "qgc", "--out", str(out), *HERE]) == 0
+    names = {path.name for path in out.iterdir()}
+    assert {"uas_1.plan", "uas_1.param", "report.html", "report.json"} <= names
+    report = json.loads((out / "report.json").read_text())
+    assert report["place"] == {"latitude_deg": 47.5, "longitude_deg": 19.05, "height_m": 0.0}
+    assert "see report.html" in capsys.readouterr().out
+
+
+MISTAKES = {
+    "an unknown format": (("--format", "pdf", *HERE), "take qgc, ardupilot, kml, geojson, csv"),
+    "an unknown autopilot": (("--format", "qgc", "--autopilot", "cat", *HERE), "ardupilot, px4"),
+    "no place": (("--format", "qgc"), "has no [place] on the Earth; give --place"),
+    "no tolerance": (("--format", "qgc", "--tolerance", "0", *HERE), "--tolerance 0"),
+    "no corner": (("--format", "qgc", "--corner", "nan", *HERE), "--corner nan"),
+    "no slack": (("--format", "qgc", *HERE, "--min-slack", "-1"), "--min-slack -1"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_is_refused_in_one_line(case, directory, tmp_path, capsys):
+    arguments, said = MISTAKES[case]
+    assert said in refused(capsys, directory, "--out", str(tmp_path / "no"), *arguments)
+    assert not (tmp_path / "no").exists()
+
+
+def test_what_is_no_flight_and_a_full_folder_are_refused(directory, tmp_path, capsys):
+    assert "nowhere" in refused(capsys, "nowhere", "--format", "qgc", "--out", "no", *HERE)
+    (tmp_path / "mine.txt").write_text("mine")
+    err = refused(capsys, directory, "--format", "qgc", "--out", str(tmp_path), *HERE)
+    assert "is not empty" in err
+
+
+def test_a_flight_that_is_not_home_is_refused():
+    scenario = load_scenario("open_field")
+    flight = rollout(scenario, load_planner("nearest-waypoint"), 0, max_steps=5)
+    with pytest.raises(InputError, match="uas_1 is still in the air"):
+        exported(flight, Place(latitude_deg=0, longitude_deg=0), "csv")
+
+
+def test_a_place_is_given_once(flight, place):
+    there = flight.scenario.model_copy(update={"place": place})
+    placed = type(flight)(**{**vars(flight), "scenario": there})
+    with pytest.raises(InputError, match=r"has a \[place\] already"):
+        exported(placed, place, "csv")
+    assert exported(placed, None, "csv").files == exported(flight, place, "csv").files

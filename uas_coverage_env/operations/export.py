@@ -1,0 +1,175 @@
+"""Files for autopilots and maps from a flight, checked before any of them is written."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.record import LANDED, LIMIT
+from uas_coverage_env.operations.exported import Exported, exported
+from uas_coverage_env.operations.formats import FIRMWARE, FORMATS
+from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.lateness import Pair, pairs_of
+from uas_coverage_env.operations.report import report
+from uas_coverage_env.operations.report_page import report_page
+from uas_coverage_env.operations.tracks import Tolerances, make_track
+from uas_coverage_env.scenario import Place
+
+MOST_TOLERANCE_M = 50.0
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """How a flight is exported.
+
+    Attributes:
+        kind: Key of `FORMATS`.
+        min_slack_s: How late any UAS has to be able to be [s].
+        tolerances: How far an autopilot may be from the flight.
+        autopilot: Whose plans `qgc` writes, key of `FIRMWARE`.
+        place: Where on the Earth it is, for a scenario that does not say.
+    """
+
+    kind: str
+    min_slack_s: float = 20.0
+    tolerances: Tolerances = field(default_factory=Tolerances)
+    autopilot: str = "ardupilot"
+    place: Place | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Export:
+    """What an export consists of.
+
+    Attributes:
+        files: Name -> text.
+        data: The report.
+        grounded: UAS that stay on the ground: they get no file.
+        notes: What the files cannot keep.
+    """
+
+    files: dict[str, str]
+    data: dict[str, Any]
+    grounded: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def make_export(flight: Flight, options: ExportOptions) -> Export:
+    """The files of a flight.
+
+    Args:
+        flight: In which all UAS have landed, without a contact.
+        options: How.
+
+    Raises:
+        InputError: The flight cannot be exported, or two UAS would come too close if one of them
+            were late by less than asked.
+    """
+    _check(options)
+    frame = LocalFrame(_place(flight, options))
+    _check_flight(flight)
+    exports, grounded = [], []
+    for i, uas in enumerate(flight.scenario.uas):
+        track = make_track(flight, i, options.tolerances)
+        if track is None:
+            grounded.append(uas.name)
+        else:
+            exports.append(exported(flight, track, frame, options.tolerances))
+    if not exports:
+        raise InputError("no UAS flies in this flight; there is nothing to export")
+    pairs = pairs_of(flight.scenario, [(one.track.uas, one.followed) for one in exports])
+    _check_slack(pairs, frame, options.min_slack_s)
+    data = report(flight, exports, pairs, frame, options.tolerances)
+    files = {
+        f"{one.track.name}{ending}": text
+        for one in exports
+        for ending, text in FORMATS[options.kind](
+            flight.scenario, one, options.tolerances, options.autopilot
+        ).items()
+    }
+    files["report.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
+    files["report.html"] = report_page(flight.scenario, exports, data)
+    return Export(files, data, tuple(grounded), tuple(_notes(flight, exports)))
+
+
+def _check(options: ExportOptions) -> None:
+    for name, value, known in (
+        ("--format", options.kind, FORMATS),
+        ("--autopilot", options.autopilot, FIRMWARE),
+    ):
+        if value not in known:
+            raise InputError(f"{name} {value[:40]!r}: take {', '.join(known)}")
+    for name, value in (
+        ("--tolerance", options.tolerances.path_m),
+        ("--corner", options.tolerances.corner_m),
+    ):
+        if not 0.1 <= value <= MOST_TOLERANCE_M:
+            raise InputError(f"{name} {value:g}: should be between 0.1 and {MOST_TOLERANCE_M:g}")
+    if not 0.0 <= options.min_slack_s <= 3_600.0:
+        raise InputError(f"--min-slack {options.min_slack_s:g}: should be between 0 and 3600")
+
+
+def _place(flight: Flight, options: ExportOptions) -> Place:
+    place = flight.scenario.place
+    if place is None and options.place is None:
+        raise InputError(
+            f"scenario {flight.scenario.name!r} has no [place] on the Earth; give --place LAT,LON"
+        )
+    if place is not None and options.place is not None:
+        raise InputError(
+            f"--place: scenario {flight.scenario.name!r} has a [place] already; leave it out"
+        )
+    place = place or options.place
+    assert place is not None
+    return place
+
+
+def _check_flight(flight: Flight) -> None:
+    for name, mode in zip(flight.names, flight.mode[-1], strict=True):
+        if mode != LANDED:
+            state = MODES[mode]
+            state = "lost" if state == "lost" else "still in the air"
+            raise InputError(f"{name} is {state} at the end of the flight; export one that is home")
+    contacts = [violation for violation in flight.violations if violation.kind != LIMIT]
+    if contacts:
+        raise InputError(f"the flight has a contact ({contacts[0]}); export one without")
+
+
+def _check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) -> None:
+    short = [p for p in pairs if p.slack_s is not None and p.slack_s < min_slack_s]
+    if not short:
+        return
+    worst = min(short, key=lambda pair: pair.slack_s or 0.0)
+    latitude, longitude, height = frame.to_geodetic(worst.place_m).tolist()
+    more = f" (+{len(short) - 1} more pairs)" if len(short) > 1 else ""
+    raise InputError(
+        f"{worst.names[0]} and {worst.names[1]} come closer than {worst.kept_m:.1f} m at "
+        f"{latitude:.6f}, {longitude:.6f}, {height:.0f} m high, if one is {worst.slack_s:.1f} s "
+        f"late, less than --min-slack {min_slack_s:g}{more}; plan them further apart, or accept "
+        f"it with a smaller --min-slack"
+    )
+
+
+def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
+    scenario = flight.scenario
+    notes = []
+    if scenario.moving_obstacles:
+        notes.append("files of legs carry no time: moving obstacles are not avoided")
+    if scenario.wind is not None or scenario.disturbances:
+        notes.append("the report holds for still air")
+    for one in exports:
+        lost = one.point_of_no_return
+        if lost is not None:
+            notes.append(
+                f"{one.track.name}: as an autopilot flies it, the charge does not suffice to come "
+                f"home for sure after leg {lost + 1}, {one.charges[lost].time_s:.0f} s after "
+                f"take-off"
+            )
+        at_risk = (
+            one.track.passed_m > [scenario.waypoints[w].radius_m for w in one.track.waypoints]
+        ).sum()
+        if at_risk:
+            notes.append(f"{one.track.name}: {at_risk} waypoints may be missed")
+    return notes

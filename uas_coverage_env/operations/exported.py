@@ -1,0 +1,193 @@
+"""One UAS of an export: its legs, how they are flown, and what that takes of its battery."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.mission import MissionBrief, Range
+from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.leg_model import Autopilot, Followed, follow
+from uas_coverage_env.operations.room import Surroundings
+from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle import DOD, VehicleParams
+from uas_coverage_env.vehicle.range import dod_per_s
+
+_SLOWEST_MPS = 0.5
+_SAME_SPEED_MPS = 0.5
+_LEAST_RETURN_M = 15.0
+_ABOVE_ROOFS_M = 1.0
+_EVERY = 5
+
+
+@dataclass(frozen=True)
+class LegCharge:
+    """What the battery holds at the end of a leg, as an autopilot flies it.
+
+    Attributes:
+        time_s: Since the command to take off [s].
+        planned_s: The same in the flight that was planned [s].
+        soc: State of charge [-].
+        planned_soc: The same in the planned flight [-].
+        home: What flying home from there and landing takes, with margin (`mission.Range`) [-].
+        spare: What is left beyond that and the reserve that `dod_max` leaves [-].
+        spare_s: How long it can fly on before it has to turn home [s].
+    """
+
+    time_s: float
+    planned_s: float
+    soc: float
+    planned_soc: float
+    home: float
+    spare: float
+    spare_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """One UAS of an export.
+
+    Attributes:
+        track: Its legs.
+        speeds_mps: (legs,) as the file sets them [m/s].
+        followed: How an autopilot flies them.
+        charges: One entry per leg.
+        soc_landed: State of charge after landing [-].
+        return_m: Height at which flying straight home is clear from everywhere on the path [m];
+            None where there is none below the fence's top.
+        vehicle: Its vehicle.
+        frame: Where it is on the Earth.
+    """
+
+    track: Track
+    speeds_mps: tuple[float, ...]
+    followed: Followed
+    charges: tuple[LegCharge, ...]
+    soc_landed: float
+    return_m: float | None
+    vehicle: VehicleParams
+    frame: LocalFrame
+
+    @property
+    def point_of_no_return(self) -> int | None:
+        """The first leg after which the charge does not suffice to come home for sure."""
+        return next((n for n, c in enumerate(self.charges) if c.spare < 0.0), None)
+
+    def geodetic(self, places_m: Any) -> NDArray[np.float64]:
+        """(..., 3) latitude, longitude [degrees], altitude above the ground of home [m]."""
+        return self.frame.to_geodetic(places_m)
+
+
+def autopilot_of(vehicle: VehicleParams, tolerances: Tolerances) -> Autopilot:
+    """An ArduCopter that is set to the limits of a vehicle."""
+    limits = vehicle.limits
+    return Autopilot(
+        speed_mps=limits.v_xy_max_mps,
+        up_mps=limits.v_up_max_mps,
+        down_mps=limits.v_down_max_mps,
+        corner_m=tolerances.corner_m,
+    )
+
+
+def exported(flight: Flight, track: Track, frame: LocalFrame, tolerances: Tolerances) -> Exported:
+    """What there is to say about a track."""
+    scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
+    speeds = file_speeds(track)
+    holds = [STOP_S * leg.stop for leg in track.legs]
+    followed = follow(track.corners_m, speeds, holds, autopilot_of(vehicle, tolerances))
+    charges, soc_landed = _charges(flight, track, followed)
+    return Exported(
+        track=track,
+        speeds_mps=speeds,
+        followed=followed,
+        charges=charges,
+        soc_landed=soc_landed,
+        return_m=return_height_m(scenario, track),
+        vehicle=vehicle,
+        frame=frame,
+    )
+
+
+def file_speeds(track: Track) -> tuple[float, ...]:
+    """Speed of each leg [m/s]: changed only where it matters, each change is an item of its own."""
+    speeds: list[float] = []
+    for leg in track.legs:
+        wanted = round(max(leg.speed_mps, _SLOWEST_MPS), 1)
+        changed = not speeds or abs(wanted - speeds[-1]) > _SAME_SPEED_MPS
+        speeds.append(wanted if changed else speeds[-1])
+    return tuple(speeds)
+
+
+def return_height_m(scenario: Scenario, track: Track) -> float | None:
+    """A height at which climbing and flying straight home is clear from everywhere on a path.
+
+    "Return to launch" of an autopilot flies like this. Where no height is clear, the way back that
+    is known to be is the way there.
+    """
+    around = Surroundings(scenario, track.uas)
+    top_m = -float(scenario.fence.vertices_m[:, 2].min()) - scenario.geofence.margin_m
+    roofs_m = {
+        -float(hull.vertices_m[:, 2].min()) + obstacle.safe_distance_m + _ABOVE_ROOFS_M
+        for hull, obstacle in zip(scenario.hulls, scenario.obstacles, strict=True)
+    }
+    places = track.flown_m[-track.flown_m[:, 2] >= LIFT_M][::_EVERY]
+    for height_m in sorted({_LEAST_RETURN_M, *roofs_m}):
+        if _LEAST_RETURN_M <= height_m <= top_m and all(
+            _returns(around, place, track.home_m, height_m) for place in places
+        ):
+            return height_m
+    return None
+
+
+def _returns(
+    around: Surroundings,
+    place: NDArray[np.float64],
+    home_m: NDArray[np.float64],
+    height_m: float,
+) -> bool:
+    up = np.array([*place[:2], min(float(place[2]), -height_m)])
+    above = np.array([*home_m[:2], up[2]])
+    ways = ((place, up), (up, above), (above, home_m - (0.0, 0.0, LIFT_M)))
+    return all(around.room(a, b, 1.0).contact_m > 0.0 for a, b in ways)
+
+
+def _charges(
+    flight: Flight, track: Track, followed: Followed
+) -> tuple[tuple[LegCharge, ...], float]:
+    """Charge after each leg, of level flight at full speed all the time: a careful estimate."""
+    scenario, i = flight.scenario, track.uas
+    uas, vehicle = scenario.uas[i], scenario.vehicles[i]
+    ways_home = Range(MissionBrief.of(scenario))
+    ends = followed.corner_s
+    dod, charges = 1.0 - uas.soc_0 + dod_per_s(vehicle, 1.0 - uas.soc_0) * ends[0], []
+    for leg, start_s, end_s in zip(track.legs, ends, ends[1:], strict=False):
+        dod += dod_per_s(vehicle, min(dod, 1.0)) * (end_s - start_s)
+        x = flight.x[leg.sample, i].copy()
+        x[:] = 0.0
+        x[:3], x[DOD] = leg.end_m, min(dod, 1.0)
+        home = ways_home.home(i, x)
+        needed = home.dod + home.dod_margin
+        spare = uas.dod_max - dod - needed
+        charges.append(
+            LegCharge(
+                time_s=float(end_s),
+                planned_s=leg.sample * scenario.dt_s,
+                soc=1.0 - dod,
+                planned_soc=float(flight.soc[leg.sample, i]),
+                home=needed,
+                spare=spare,
+                spare_s=spare / dod_per_s(vehicle, min(dod, 1.0)),
+            )
+        )
+    landing_s = followed.duration_s - float(ends[-1])
+    return tuple(charges), 1.0 - dod - dod_per_s(vehicle, min(dod, 1.0)) * landing_s
+
+
+def waypoint_margins(scenario: Scenario, one: Exported) -> Sequence[float]:
+    """How much closer than its radius the legs pass each waypoint that they cover [m]."""
+    radii = [scenario.waypoints[w].radius_m for w in one.track.waypoints]
+    return [r - away for r, away in zip(radii, one.track.passed_m.tolist(), strict=True)]

@@ -1,0 +1,54 @@
+"""Mission items of MAVLink: what files for autopilots are made of."""
+
+import math
+from dataclasses import dataclass
+
+from uas_coverage_env.operations.exported import Exported
+from uas_coverage_env.operations.tracks import STOP_S
+
+WAYPOINT, LAND, TAKE_OFF, CHANGE_SPEED = 16, 21, 22, 178
+"""MAV_CMD."""
+
+MISSION_FRAME, RELATIVE_FRAME = 2, 3
+"""MAV_FRAME: no place; altitude relative to home."""
+
+_NORTH_DEG = 0.0
+"""Heading at waypoints, as the world flies: cameras keep their wide side from west to east."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One mission item.
+
+    Attributes:
+        command: MAV_CMD.
+        frame: MAV_FRAME.
+        params: Seven; NaN: as it is. Of a place the last three are latitude, longitude, altitude.
+    """
+
+    command: int
+    frame: int
+    params: tuple[float, ...]
+
+
+def items_of(one: Exported, corner_m: float) -> list[Item]:
+    """Take-off, legs with their speeds, and landing.
+
+    Args:
+        one: The UAS.
+        corner_m: How far from a corner it may be left [m].
+    """
+    latitude, longitude, height = one.geodetic(one.track.take_off_m)
+    ground = float(latitude), float(longitude)
+    anyhow = (0.0, 0.0, 0.0, math.nan)
+    items = [Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height)))]
+    set_mps = None
+    for leg, speed_mps in zip(one.track.legs, one.speeds_mps, strict=True):
+        if speed_mps != set_mps:
+            items.append(Item(CHANGE_SPEED, MISSION_FRAME, (1.0, speed_mps, -1.0, 0, 0, 0, 0)))
+            set_mps = speed_mps
+        place = (float(number) for number in one.geodetic(leg.end_m))
+        first = (STOP_S * leg.stop, corner_m, 0.0, _NORTH_DEG)
+        items.append(Item(WAYPOINT, RELATIVE_FRAME, (*first, *place)))
+    items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, *ground, 0.0)))
+    return items

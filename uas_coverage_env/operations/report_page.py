@@ -1,0 +1,172 @@
+"""The report of an export as a page: one file, without anything from a network."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import shapely
+
+from uas_coverage_env.operations.convex import hull_of
+from uas_coverage_env.operations.exported import Exported
+from uas_coverage_env.scenario import Scenario
+
+_COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
+_STYLE = """
+body{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#26282c}
+table{border-collapse:collapse;margin:1rem 0}
+th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
+th:first-child,td:first-child{text-align:left}
+svg{width:100%;max-height:80vh;background:#eaebe0}
+.bad{color:#c81e2d;font-weight:600}
+summary{cursor:pointer}
+"""
+_NOTE = (
+    "Times, charges and delays are those of a model of how ArduCopter flies the files, in still "
+    "air; they differ from the planned flight. Charge is counted as in level flight at full speed."
+)
+
+
+def report_page(scenario: Scenario, exports: Sequence[Exported], data: dict[str, Any]) -> str:
+    """The page.
+
+    Args:
+        scenario: The mission.
+        exports: The UAS that fly.
+        data: What `report` says of them.
+    """
+    title = f"{escape(scenario.name)}, flown by {escape(data['planner'])}"
+    parts = [
+        f"<h1>{title}</h1>",
+        f"<p>{data['waypoints_passed']} of {data['waypoints']} waypoints are passed; files are "
+        f"within {data['path_tolerance_m']:g} m of the flight. {_NOTE}</p>",
+        _map(scenario, exports),
+        _fleet(data["uas"]),
+        _pairs(data["pairs"]),
+        *(_legs(uas) for uas in data["uas"]),
+    ]
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+    return f"{head}<style>{_STYLE}</style><body>{''.join(parts)}</body></html>\n"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    cells = "".join(f"<th>{name}</th>" for name in head)
+    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table><tr>{cells}</tr>{body}</table>"
+
+
+def _fleet(fleet: Sequence[dict[str, Any]]) -> str:
+    rows = []
+    for uas in fleet:
+        lost, least = uas["point_of_no_return"], uas["least_spare"]
+        comes_home = (
+            f"{least['spare']:.1%} at {least['time_s']:.0f} s, {least['spare_s']:.0f} s of flight"
+            if lost is None
+            else f'<span class="bad">point of no return before leg {lost["leg"]} ends, at '
+            f"{lost['time_s']:.0f} s</span>"
+        )
+        height = uas["return_height_m"]
+        rows.append(
+            [
+                escape(uas["name"]),
+                f"{uas['duration_s']:.0f} ({uas['planned_s']:.0f})",
+                f"{uas['soc_landed']:.1%} ({uas['planned_soc_landed']:.1%})",
+                f"{uas['soc_reserve']:.0%}",
+                comes_home,
+                f"{uas['off_path_m']:.1f}",
+                f"{uas['spare_room_m']:.1f}",
+                "none is clear" if height is None else f"{height:g}",
+            ]
+        )
+    head = [
+        *("UAS", "flight (planned), s", "charge landed (planned)", "reserve"),
+        *("least spare on the way", "off the path, m", "spare room, m", "return height, m"),
+    ]
+    return "<h2>Fleet</h2>" + _table(head, rows)
+
+
+def _pairs(pairs: Sequence[dict[str, Any]]) -> str:
+    if not pairs:
+        return ""
+    rows = [
+        [
+            escape(" and ".join(pair["uas"])),
+            f"{pair['least_distance_m']:.1f}",
+            f"{pair['kept_m']:.1f}",
+            "any delay" if pair["slack_s"] is None else f"{pair['slack_s']:.0f} s",
+            "" if pair["place"] is None else _degrees(pair["place"]),
+        ]
+        for pair in pairs
+    ]
+    head = ["pair", "least distance, m", "to be kept, m", "either may be late by", "else close at"]
+    return "<h2>Delays</h2>" + _table(head, rows)
+
+
+def _legs(uas: dict[str, Any]) -> str:
+    rows = [
+        [
+            f"{n} (stop)" if leg["stop"] else str(n),
+            _degrees(leg),
+            f"{leg['height_m']:.1f}",
+            f"{leg['speed_mps']:g}",
+            f"{leg['time_s']:.0f}",
+            f"{leg['soc']:.1%}",
+            f"{leg['home']:.1%}",
+            f'<span class="bad">{leg["spare"]:.1%}</span>'
+            if leg["spare"] < 0.0
+            else f"{leg['spare']:.1%}",
+        ]
+        for n, leg in enumerate(uas["legs"], 1)
+    ]
+    head = [
+        *("leg", "to", "height, m", "m/s", "at, s"),
+        *("charge", "way home takes", "spare"),
+    ]
+    summary = f"<summary>{escape(uas['name'])}, {len(rows)} legs</summary>"
+    return f"<details>{summary}{_table(head, rows)}</details>"
+
+
+def _degrees(place: dict[str, float]) -> str:
+    return f"{place['latitude_deg']:.6f}, {place['longitude_deg']:.6f}"
+
+
+def _map(scenario: Scenario, exports: Sequence[Exported]) -> str:
+    """The mission from above, north up: x is east, y is minus north."""
+    corners_m = scenario.fence.vertices_m[:, :2]
+    low, high = corners_m.min(axis=0), corners_m.max(axis=0)
+    span_m = float((high - low).max())
+    pen = span_m / 400.0
+    shapes = [
+        _outline(scenario.fence.vertices_m, f'fill="#fff" stroke="#888" stroke-width="{pen}"')
+    ]
+    shapes += [_outline(hull.vertices_m, 'fill="#bbb8b0"') for hull in scenario.hulls]
+    shapes += [
+        f'<circle cx="{w.position_m[1]:.1f}" cy="{-w.position_m[0]:.1f}" r="{w.radius_m:g}" '
+        f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
+        for w in scenario.waypoints
+    ]
+    for n, one in enumerate(exports):
+        colour = _COLOURS[n % len(_COLOURS)]
+        line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
+        shapes.append(
+            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="{1.5 * pen}"/>'
+        )
+        x, y, _ = one.track.home_m
+        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
+        lost = one.point_of_no_return
+        if lost is not None:
+            x, y, _ = one.track.legs[lost].end_m
+            shapes.append(
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" fill="none" stroke="#c81e2d" '
+                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: point of no return'
+                f"</title></circle>"
+            )
+    around = 0.02 * span_m
+    height, width = high - low + 2.0 * around
+    box = f"{low[1] - around:.1f} {-high[0] - around:.1f} {width:.1f} {height:.1f}"
+    return f'<svg viewBox="{box}" role="img" aria-label="map">{"".join(shapes)}</svg>'
+
+
+def _outline(vertices_m: Any, style: str) -> str:
+    ring = hull_of(shapely.MultiPoint(vertices_m[:, :2])).exterior.coords[:-1]
+    points = " ".join(f"{east:.1f},{-north:.1f}" for north, east in ring)
+    return f'<polygon points="{points}" {style}/>'

@@ -1,0 +1,285 @@
+"""A flight as few straight legs that an autopilot can fly, every one of them checked.
+
+An autopilot takes corners, not samples. A leg may stand for a part of the flight where
+
+* all samples lie within a tolerance of it,
+* it leaves as much room to obstacles and fence as the flight did, or a full safe distance less what
+  of it may be spent, and is never in contact,
+* it passes what the UAS covered on the way within its radius.
+
+Legs are made as long as that allows, one after the other. At a corner that must not be cut,
+because the cut would be too close to something or miss a waypoint, the autopilot stops.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Flight, covered_at
+from uas_coverage_env.flight.record import LANDED
+from uas_coverage_env.operations.room import Room, Surroundings
+
+FloatArray = NDArray[np.float64]
+
+LIFT_M = 3.0
+"""Height at which a take-off ends and a landing begins."""
+
+SPENT_M = 1.0
+"""Of a safe distance, what a leg may use: the rest is the autopilot's."""
+
+STOP_S = 1.0
+_PATIENCE = 6
+_CUTS = (0.25, 0.5, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A straight leg.
+
+    Attributes:
+        end_m: (3,) where it ends [m].
+        sample: Of the flight, at its end.
+        speed_mps: Mean of the flight on it [m/s].
+        room: On the leg, and on what cuts the corner at its end.
+        stop: Whether the autopilot stops at its end.
+    """
+
+    end_m: FloatArray
+    sample: int
+    speed_mps: float
+    room: Room
+    stop: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The legs of one UAS, from above its start to above it again.
+
+    Attributes:
+        uas: Index of the UAS.
+        name: Its name.
+        home_m: (3,) its start on the ground [m].
+        take_off_m: (3,) where the first leg begins, above the start [m].
+        legs: One or more.
+        off_m: Largest distance of a sample from its leg [m].
+        waypoints: Which this UAS covers.
+        passed_m: (len(waypoints),) how close the legs, corners cut, come to each centre [m].
+        flown_m: (T, 3) the samples that the legs stand for [m].
+    """
+
+    uas: int
+    name: str
+    home_m: FloatArray
+    take_off_m: FloatArray
+    legs: tuple[Leg, ...]
+    off_m: float
+    waypoints: tuple[int, ...]
+    passed_m: FloatArray
+    flown_m: FloatArray
+
+    @property
+    def corners_m(self) -> FloatArray:
+        """(len(legs) + 1, 3) [m]."""
+        return np.array([self.take_off_m, *(leg.end_m for leg in self.legs)])
+
+    @property
+    def room(self) -> Room:
+        """The least on all legs."""
+        least = self.legs[0].room
+        for leg in self.legs:
+            least = least.least(leg.room)
+        return least
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How far an autopilot may be from the flight.
+
+    Attributes:
+        path_m: Of a sample from its leg [m].
+        corner_m: How far from a corner it may be left [m].
+    """
+
+    path_m: float = 2.0
+    corner_m: float = 2.0
+
+
+def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None:
+    """The legs of a UAS; None where it stays on the ground.
+
+    Args:
+        flight: In which the UAS has landed.
+        uas: Index of the UAS.
+        tolerances: How far legs may be from the flight.
+
+    Raises:
+        InputError: No legs could be found that are free of contact.
+    """
+    scenario = flight.scenario
+    flying = np.flatnonzero(flight.mode[:, uas] < LANDED)
+    path = flight.x[: flying[-1] + 1, uas, 0:3] if len(flying) else np.empty((0, 3))
+    high = np.flatnonzero(-path[:, 2] >= LIFT_M)
+    if not len(high):
+        return None
+    first, last = int(high[0]), int(high[-1])
+    home_m = np.array(scenario.uas[uas].start_m) * (1.0, 1.0, 0.0)
+    builder = _Builder(flight, uas, path, tolerances)
+    take_off_m = np.array([*home_m[:2], path[first, 2]])
+    above_m = np.array([*home_m[:2], path[last, 2]])
+    points = [(take_off_m, first), (path[first], first), *builder.legs(first, last)]
+    if np.linalg.norm(points[0][0] - points[1][0]) <= 0.1:
+        del points[1]
+    if len(points) == 1 or np.linalg.norm(points[-1][0] - above_m) > 0.1:
+        points.append((above_m, last))
+    legs = tuple(
+        Leg(end_m, j, builder.speed_mps(i, j), builder.around.room(start_m, end_m))
+        for (start_m, i), (end_m, j) in pairwise(points)
+    )
+    corners = np.array([point for point, _ in points])
+    legs = builder.with_stops(corners, legs)
+    off_m = max(
+        float(distances_m(path[i : j + 1], a, b).max()) for (a, i), (b, j) in pairwise(points)
+    )
+    passed_m = builder.passed_m(corners, [leg.stop for leg in legs])
+    track = Track(
+        uas=uas,
+        name=scenario.uas[uas].name,
+        home_m=home_m,
+        take_off_m=take_off_m,
+        legs=legs,
+        off_m=off_m,
+        waypoints=tuple(builder.waypoints),
+        passed_m=passed_m,
+        flown_m=path,
+    )
+    ups = builder.around.path_room(np.array([take_off_m, home_m - (0.0, 0.0, LIFT_M)]))
+    if min(track.room.contact_m, ups.contact_m) <= 0.0:
+        raise InputError(
+            f"{track.name}: no legs are free of contact within --tolerance {tolerances.path_m:g}; "
+            f"make it smaller"
+        )
+    return track
+
+
+def distances_m(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """(N,) distances of points (N, 3) from a straight line between two places [m]."""
+    way = b - a
+    share = np.clip((points - a) @ way / max(way @ way, 1e-12), 0.0, 1.0)
+    return np.linalg.norm(points - a - share[:, None] * way, axis=1)
+
+
+def cut_path(corners: FloatArray, stops: list[bool], corner_m: float) -> FloatArray:
+    """(N, 3) the path when every corner without a stop is cut as far as it may be.
+
+    Args:
+        corners: (C, 3) [m].
+        stops: (C - 1,) whether the autopilot stops at the end of each leg.
+        corner_m: How far from a corner it may be left [m].
+    """
+    path = [corners[0]]
+    for before, corner, after, stop in zip(corners, corners[1:], corners[2:], stops, strict=False):
+        path += [corner] if stop else _cut(before, corner, after, corner_m)
+    return np.array([*path, corners[-1]])
+
+
+def _cut(
+    before: FloatArray, corner: FloatArray, after: FloatArray, corner_m: float
+) -> list[FloatArray]:
+    ends = []
+    for other in (before, after):
+        way = other - corner
+        length = float(np.linalg.norm(way))
+        ends.append(corner + way / max(length, 1e-9) * min(corner_m, 0.5 * length))
+    return ends
+
+
+class _Builder:
+    """Finds the legs of one UAS."""
+
+    def __init__(self, flight: Flight, uas: int, path: FloatArray, tolerances: Tolerances) -> None:
+        self.path, self.tolerances, self.dt_s = path, tolerances, flight.scenario.dt_s
+        self.around = Surroundings(flight.scenario, uas)
+        self.steps = [self.around.room(a, b) for a, b in pairwise(path)]
+        first_at = covered_at(flight)
+        x = flight.x[:, :, 0:3]
+        self.waypoints: list[int] = []
+        self._covered: dict[int, list[int]] = {}
+        centres = np.array([w.position_m for w in flight.scenario.waypoints])
+        self._centres = centres
+        self._radii = np.array([w.radius_m for w in flight.scenario.waypoints])
+        for w, sample in enumerate(first_at):
+            if sample < len(path) and (
+                np.linalg.norm(x[sample, uas] - centres[w]) <= self._radii[w]
+            ):
+                self.waypoints.append(w)
+                self._covered.setdefault(int(sample), []).append(w)
+
+    def legs(self, first: int, last: int) -> list[tuple[FloatArray, int]]:
+        """Ends of legs from one sample to another, each with its sample."""
+        ends = []
+        k = first
+        while k < last:
+            best = k + 1
+            for j in range(k + 2, last + 1):
+                if self._fits(k, j):
+                    best = j
+                elif j > best + _PATIENCE:  # a leg may not fit for a moment, and fit again
+                    break
+            ends.append((self.path[best], best))
+            k = best
+        return ends
+
+    def _fits(self, k: int, j: int) -> bool:
+        a, b = self.path[k], self.path[j]
+        if distances_m(self.path[k : j + 1], a, b).max() > self.tolerances.path_m:
+            return False
+        for sample in range(k + 1, j + 1):
+            for w in self._covered.get(sample, ()):
+                away_m = distances_m(self._centres[[w]], a, b)[0]
+                wanted_m = self._radii[w] - self.tolerances.path_m
+                if away_m > max(wanted_m, np.linalg.norm(self.path[sample] - self._centres[w])):
+                    return False
+        flown = self.steps[k]
+        for step in self.steps[k + 1 : j]:
+            flown = flown.least(step)
+        room = self.around.room(a, b)
+        spent_m = min(SPENT_M, self.tolerances.path_m)
+        enough = room.spare_m >= min(-spent_m, flown.spare_m)
+        return enough and room.contact_m > 0.0
+
+    def speed_mps(self, i: int, j: int) -> float:
+        """Mean speed of the flight between two samples."""
+        if j <= i:
+            return 1.0
+        way_m = np.linalg.norm(np.diff(self.path[i : j + 1], axis=0), axis=1).sum()
+        return float(way_m) / ((j - i) * self.dt_s)
+
+    def with_stops(self, corners: FloatArray, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
+        """The legs with stops at the corners that must not be cut."""
+        result = list(legs)
+        for n in range(len(legs) - 1):
+            room = legs[n].room
+            least = room.least(legs[n + 1].room)
+            for share in _CUTS:
+                a, b = _cut(*corners[n : n + 3], share * self.tolerances.corner_m)
+                room = room.least(self.around.room(a, b))
+            allowed_m = min(-min(SPENT_M, self.tolerances.path_m), least.spare_m)
+            stop = room.contact_m <= 0.0 or room.spare_m < allowed_m
+            result[n] = replace(legs[n], stop=stop, room=least if stop else room)
+        stops = [leg.stop for leg in result]
+        missed = self.passed_m(corners, stops) > self._radii[self.waypoints]
+        for w in np.array(self.waypoints, int)[missed] if len(legs) > 1 else ():
+            # the corner whose cutting costs most: that nearest to the waypoint
+            n = int(np.linalg.norm(corners[1:-1] - self._centres[w], axis=1).argmin())
+            result[n] = replace(result[n], stop=True)
+        return tuple(result)
+
+    def passed_m(self, corners: FloatArray, stops: list[bool]) -> FloatArray:
+        """How close the path with cut corners comes to the waypoints [m]."""
+        path = cut_path(corners, stops, self.tolerances.corner_m)
+        centres = self._centres[self.waypoints]
+        away = [distances_m(centres, a, b) for a, b in pairwise(path)]
+        return np.min(away, axis=0) if len(centres) else np.empty(0)
