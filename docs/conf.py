@@ -27,7 +27,10 @@ autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_mock_imports = [
     name
-    for name in ("torch", "stable_baselines3", "sb3_contrib", "matplotlib", "imageio_ffmpeg")
+    for name in (
+        *("torch", "stable_baselines3", "sb3_contrib", "matplotlib", "imageio_ffmpeg"),
+        *("pyproj", "shapely", "shapefile", "defusedxml"),
+    )
     if find_spec(name) is None  # extras that a site is built without
 ]
 napoleon_numpy_docstring = False

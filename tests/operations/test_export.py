@@ -116,7 +116,7 @@ def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(
         (inside,) = [p for p in plan["geoFence"]["polygons"] if p["inclusion"]]
         for corner in inside["polygon"]:
             fence_m = flight.scenario.fence.vertices_m[:, :2]
-            away = np.linalg.norm(fence_m - metres(*corner, 0.0, place)[:2], axis=1)
+            away = np.linalg.norm(fence_m - metres(corner[0], corner[1], 0.0, place)[:2], axis=1)
             assert away.min() < MOST_OFF_M
         assert plan["mission"]["firmwareType"] == {"ardupilot": 3, "px4": 12}[autopilot]
         assert len(plan["rallyPoints"]["points"]) == 1
@@ -137,7 +137,8 @@ def test_tracks_for_maps_and_tables_hold_the_flown_samples(flight, place):
         for found in (of_geojson, of_kml, of_csv):
             assert len(found) == len(track.flown_m)
             for sample in (0, len(found) // 2, -1):
-                off = metres(*found[sample], place) - track.flown_m[sample]
+                latitude, longitude, height = found[sample]
+                off = metres(latitude, longitude, height, place) - track.flown_m[sample]
                 assert np.linalg.norm(off) < MOST_OFF_M
 
 

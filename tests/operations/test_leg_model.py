@@ -1,18 +1,20 @@
 """The model of how an autopilot flies a file is held against flights of a real one."""
 
 import csv
-import itertools
+import math
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.leg_model import DT_S, Autopilot, follow
+from uas_coverage_env.operations.tracks import cut_path, distances_m
 from uas_coverage_env.scenario import Place
 
 RECORDED = Path(__file__).parent / "recorded"
@@ -94,7 +96,7 @@ def test_a_vehicle_that_stops_at_corners_is_on_the_legs_and_reaches_them(corners
         assert np.linalg.norm(place - corner) < 0.1
     off_m = np.full(len(followed.places_m), np.inf)
     ground = (*corners[0][:2], 0.0), (*corners[-1][:2], 0.0)
-    for a, b in itertools.pairwise([ground[0], *corners, ground[1]]):
+    for a, b in pairwise([ground[0], *corners, ground[1]]):
         a, way = np.array(a), np.subtract(b, a)
         share = np.clip((followed.places_m - a) @ way / max(way @ way, 1e-12), 0.0, 1.0)
         away = np.linalg.norm(followed.places_m - a - share[:, None] * way, axis=1)
@@ -107,7 +109,24 @@ def test_a_corner_is_cut_by_no_more_than_the_waypoint_radius():
     for corner_m in (1.0, 2.0, 5.0):
         followed = follow(corners, [10.0] * 2, [0.0] * 2, Autopilot(corner_m=corner_m))
         nearest_m = np.linalg.norm(followed.places_m - np.array(corners[1]), axis=1).min()
-        assert 0.1 < nearest_m <= corner_m + 0.1
+        assert 0.1 < nearest_m <= 1.05 * corner_m
+
+
+@EXAMPLES
+@given(CORNERS, st.floats(0.5, 10.0), st.floats(1.0, 5.0))
+def test_a_vehicle_that_does_not_stop_is_inside_the_corners_that_were_checked(
+    corners, speed, corner_m
+):
+    assume(all(math.dist(a, b) > 1.0 for a, b in pairwise(corners)))
+    n = len(corners) - 1
+    followed = follow(corners, [speed] * n, [0.0] * n, Autopilot(corner_m=corner_m))
+    first, last = (round(s / DT_S) for s in followed.corner_s[[0, -1]])
+    path = cut_path(np.array(corners), [False] * n, corner_m)
+    around = [*pairwise(np.array(corners)), *pairwise(path)]
+    places = followed.places_m[first : last + 1]
+    # between the legs and their cuts; half the depth of a cut is the farthest from both
+    off_m = np.min([distances_m(places, a, b) for a, b in around], axis=0)
+    assert off_m.max() <= 0.55 * corner_m
 
 
 def test_short_legs_are_slow_and_a_stop_takes_time():

@@ -117,7 +117,7 @@ def export(
     ] = 20.0,
     tolerance: Annotated[float, typer.Option(help="How far legs may be from the flight, m.")] = 2.0,
     corner: Annotated[
-        float, typer.Option(help="How far from a corner an autopilot may leave a leg, m.")
+        float, typer.Option(help="How far from a corner an autopilot may pass, m.")
     ] = 2.0,
     autopilot: Annotated[
         str, typer.Option(help="Whose plans `qgc` writes: ardupilot or px4.")

@@ -6,7 +6,8 @@ Needs the extra `ops`.
 from uas_coverage_env.operations.cameras import Camera, camera_names, load_camera
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.export import Export, ExportOptions, make_export
-from uas_coverage_env.operations.formats import FIRMWARE, FORMATS
+from uas_coverage_env.operations.formats import FORMATS
+from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.make import Imported, ImportOptions, make_scenario
 from uas_coverage_env.operations.reading import read_drawings

@@ -9,7 +9,8 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.operations.exported import Exported, exported
-from uas_coverage_env.operations.formats import FIRMWARE, FORMATS
+from uas_coverage_env.operations.formats import FORMATS
+from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.lateness import Pair, pairs_of
 from uas_coverage_env.operations.report import report
@@ -142,6 +143,7 @@ def _check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) -
     if not short:
         return
     worst = min(short, key=lambda pair: pair.slack_s or 0.0)
+    assert worst.place_m is not None
     latitude, longitude, height = frame.to_geodetic(worst.place_m).tolist()
     more = f" (+{len(short) - 1} more pairs)" if len(short) > 1 else ""
     raise InputError(

@@ -40,7 +40,7 @@ class Autopilot:
         acceleration_mps2: Horizontal, WPNAV_ACCEL [m/s²].
         vertical_mps2: WPNAV_ACCEL_Z [m/s²].
         jerk_mps3: WPNAV_JERK 1 with its soft onset, fitted to recorded flights [m/s³].
-        corner_m: How far from a corner it may be left, WPNAV_RADIUS [m].
+        corner_m: How far from a corner it may pass, WPNAV_RADIUS [m].
         corner_mps2: Acceleration in a corner: twice the horizontal one [m/s²].
     """
 
@@ -162,7 +162,9 @@ def follow(
             places += [places[-1]] * round(holds_s[last] / DT_S)
             first = last + 1
     _land(corners[-1], by, places)
-    return Followed(DT_S * np.arange(len(places)), np.array(places), np.array(corner_s))
+    return Followed(
+        DT_S * np.arange(len(places), dtype=np.float64), np.array(places), np.array(corner_s)
+    )
 
 
 def _legs(

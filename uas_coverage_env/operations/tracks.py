@@ -100,7 +100,7 @@ class Tolerances:
 
     Attributes:
         path_m: Of a sample from its leg [m].
-        corner_m: How far from a corner it may be left [m].
+        corner_m: How far from a corner it may pass [m].
     """
 
     path_m: float = 2.0
@@ -177,7 +177,7 @@ def cut_path(corners: FloatArray, stops: list[bool], corner_m: float) -> FloatAr
     Args:
         corners: (C, 3) [m].
         stops: (C - 1,) whether the autopilot stops at the end of each leg.
-        corner_m: How far from a corner it may be left [m].
+        corner_m: How far from a corner it may pass [m].
     """
     path = [corners[0]]
     for before, corner, after, stop in zip(corners, corners[1:], corners[2:], stops, strict=False):
@@ -188,12 +188,18 @@ def cut_path(corners: FloatArray, stops: list[bool], corner_m: float) -> FloatAr
 def _cut(
     before: FloatArray, corner: FloatArray, after: FloatArray, corner_m: float
 ) -> list[FloatArray]:
-    ends = []
-    for other in (before, after):
-        way = other - corner
-        length = float(np.linalg.norm(way))
-        ends.append(corner + way / max(length, 1e-9) * min(corner_m, 0.5 * length))
-    return ends
+    """Where a straight cut that comes no closer to a corner than `corner_m` leaves both legs.
+
+    Half a leg is left in any case: an autopilot turns while it brakes and while it accelerates.
+    """
+    ways = [before - corner, after - corner]
+    lengths = [max(float(np.linalg.norm(way)), 1e-9) for way in ways]
+    units = [way / length for way, length in zip(ways, lengths, strict=True)]
+    depth = 0.5 * float(np.linalg.norm(units[0] + units[1]))  # of a cut of 1 m on both legs
+    return [
+        corner + unit * min(corner_m / max(depth, 1e-9), 0.5 * length)
+        for unit, length in zip(units, lengths, strict=True)
+    ]
 
 
 class _Builder:
@@ -264,7 +270,8 @@ class _Builder:
             room = legs[n].room
             least = room.least(legs[n + 1].room)
             for share in _CUTS:
-                a, b = _cut(*corners[n : n + 3], share * self.tolerances.corner_m)
+                before, corner, after = corners[n : n + 3]
+                a, b = _cut(before, corner, after, share * self.tolerances.corner_m)
                 room = room.least(self.around.room(a, b))
             allowed_m = min(-min(SPENT_M, self.tolerances.path_m), least.spare_m)
             stop = room.contact_m <= 0.0 or room.spare_m < allowed_m

@@ -4,12 +4,10 @@ from collections.abc import Callable, Mapping
 
 from uas_coverage_env.operations.exported import Exported
 from uas_coverage_env.operations.formats.ardupilot import parameters_text, waypoints_text
-from uas_coverage_env.operations.formats.qgc import FIRMWARE, plan_text
+from uas_coverage_env.operations.formats.qgc import plan_text
 from uas_coverage_env.operations.formats.tracks import csv_text, geojson_text, kml_text
 from uas_coverage_env.operations.tracks import Tolerances
 from uas_coverage_env.scenario import Scenario
-
-__all__ = ["FIRMWARE", "FORMATS", "Writer"]
 
 Writer = Callable[[Scenario, Exported, Tolerances, str], Mapping[str, str]]
 """Scenario, UAS, tolerances, autopilot -> ending of a file and its text."""

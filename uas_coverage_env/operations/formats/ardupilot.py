@@ -17,7 +17,7 @@ def waypoints_text(one: Exported, tolerances: Tolerances) -> str:
 
     Args:
         one: The UAS.
-        tolerances: How far from a corner it may be left.
+        tolerances: How far from a corner it may pass.
     """
     latitude, longitude, _ = one.geodetic(one.track.home_m).tolist()
     place = f"{latitude:.8f}\t{longitude:.8f}\t{one.frame.place.height_m:.3f}"
@@ -36,7 +36,7 @@ def parameters_text(scenario: Scenario, one: Exported, tolerances: Tolerances) -
     Args:
         scenario: The mission.
         one: The UAS.
-        tolerances: How far from a corner it may be left.
+        tolerances: How far from a corner it may pass.
     """
     limits = one.vehicle.limits
     values = {

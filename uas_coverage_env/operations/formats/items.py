@@ -36,7 +36,7 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
 
     Args:
         one: The UAS.
-        corner_m: How far from a corner it may be left [m].
+        corner_m: How far from a corner it may pass [m].
     """
     latitude, longitude, height = one.geodetic(one.track.take_off_m)
     ground = float(latitude), float(longitude)

@@ -29,7 +29,7 @@ def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, autopil
     Args:
         scenario: The mission, with its fence and no-fly zones.
         one: The UAS.
-        tolerances: How far from a corner it may be left.
+        tolerances: How far from a corner it may pass.
         autopilot: Key of `FIRMWARE`.
     """
     latitude, longitude, _ = one.geodetic(one.track.home_m).tolist()
