@@ -86,6 +86,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
         "violations": [_entry(violation) for violation in flight.violations],
         "breaches": flight.breaches,
+        # without the rule the file is as it was before there was one
+        **({"height_breaches": flight.height_breaches} if flight.scenario.min_height_m else {}),
         "wall_time_s": flight.wall_time_s,
         "decision_time_s": decision_time_s(flight),
         "fallbacks": sum(decision.fallback for decision in flight.decisions),
