@@ -1,6 +1,6 @@
 """What a least height costs each planner: the same towns flown without and with it.
 
-    python benchmarks/min_height.py                          # docs/min_height.md, half an hour
+    python benchmarks/min_height.py                          # all planners, half an hour
     python benchmarks/min_height.py --planners tour --towns 12
 
 Towns are those of `generate_scenario(..., min_height_m=)`, whose waypoints can be covered from

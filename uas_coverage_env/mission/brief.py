@@ -57,6 +57,7 @@ class MissionBrief(StrictModel):
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
         min_height_m: Least height above the ground and above roofs; 0: no such rule [m].
+        from_ground: Whether charge is drawn for take-off before t = 0, and for landing at the end.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
         moving_obstacles: Moving obstacles, without their schedules.
@@ -74,6 +75,7 @@ class MissionBrief(StrictModel):
     landing_speed_mps: float
     uas_safe_distance_m: float
     min_height_m: float
+    from_ground: bool
     geofence: Geofence
     obstacles: tuple[Obstacle, ...]
     moving_obstacles: tuple[MovingObstacleBrief, ...]

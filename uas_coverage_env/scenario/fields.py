@@ -257,6 +257,7 @@ class UncheckedScenario(StrictModel):
     landing_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)]
     uas_safe_distance_m: Distance_m
     min_height_m: Distance_m = 0.0
+    from_ground: bool = False
     geofence: Geofence
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = ()
     moving_obstacles: Annotated[tuple[MovingObstacle, ...], Strict(False)] = ()
@@ -270,7 +271,7 @@ class UncheckedScenario(StrictModel):
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
-        for name in ("min_height_m", "wind", "disturbances"):
+        for name in ("min_height_m", "from_ground", "wind", "disturbances"):
             if not getattr(self, name):
                 data.pop(name, None)
         return data
