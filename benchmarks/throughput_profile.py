@@ -214,7 +214,9 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
     paying = paying_of(REWARD, np.ones(len(REWARD)))
-    rules = Rules(acting_of(VELOCITY), False, NO_ASSISTANTS, None, paying, observing_of(OBSERVATION))
+    rules = Rules(
+        acting_of(VELOCITY), False, NO_ASSISTANTS, None, paying, observing_of(OBSERVATION)
+    )
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,
         SCRATCH.zeros(batch.pool.sizes, lanes=n_lanes), rules, np.zeros(14), batch.observation,

@@ -11,7 +11,7 @@ from uas_coverage_env.scenario.ground_phases import height_above_ground_m, take_
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, U_TH, load_vehicle
 from uas_coverage_env.vehicle.vertical_flight import vertical_flight
-from uas_coverage_env.world import GoTo
+from uas_coverage_env.world import GoTo, Velocity
 
 S500 = load_vehicle("s500_v2")
 
@@ -78,7 +78,11 @@ def test_the_record_says_what_take_off_and_landing_take(tmp_path):
 
 
 def test_a_uas_in_the_air_has_not_landed_on_the_ground():
-    flight = rollout(from_ground(meadow([(50.0, 50.0, -6.0)])), HomeAtOnce(), max_steps=1)
+    class Hover(HomeAtOnce):
+        def act(self, swarm):
+            return {name: Velocity(0.0, 0.0, 6.0) for name in swarm.active}
+
+    flight = rollout(from_ground(meadow([(50.0, 50.0, -6.0)])), Hover(), max_steps=2)
     (phases,) = summary(flight)["ground_phases"]
     assert phases["landing_s"] is phases["soc_on_ground"] is None
 
