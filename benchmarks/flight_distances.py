@@ -125,6 +125,21 @@ def partners_of(record: FlightRecord, row: int) -> Iterator[Partner]:
     yield Partner("geofence", None, lambda p: -inside(p), 0.0, margin, still)
 
 
+def too_low(scenario: dict[str, Any], track: Track) -> NDArray[np.int64]:
+    """Steps after which a UAS is below the least height and not near its start."""
+    least = scenario.get("min_height_m", 0.0)
+    position = track.position_m[1:]
+    low = -position[:, 2] < least - 1e-9
+    for obstacle in scenario["obstacles"] if least else ():
+        points = np.array(obstacle["vertices_m"], float)
+        centre = points.mean(axis=0)
+        faces = ConvexHull(points - centre).equations
+        pushed_up = faces[:, 3] - least * np.maximum(0.0, -faces[:, 2])
+        low |= ((position - centre) @ faces[:, :3].T + pushed_up).max(axis=1) < -1e-9
+    away = np.hypot(*(position - np.array(track.entry["start_m"]))[:, :2].T)
+    return np.flatnonzero(low & (away > scenario["landing_distance_m"] + 2.0 * least))
+
+
 def on_segments(partner: Partner, track: Track) -> FloatArray:
     """(steps,) smallest distance from a partner on each straight segment that both fly."""
     relative = relative_m(partner, track)

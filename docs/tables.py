@@ -219,7 +219,12 @@ def _type(entry: dict[str, Any]) -> str:
         return f"{of}{least}"
     if entry["type"] == "object":
         return "tables by name"
-    word = {"number": "number", "integer": "whole number", "string": "text"}[entry["type"]]
+    word = {
+        "number": "number",
+        "integer": "whole number",
+        "string": "text",
+        "boolean": "true or false",
+    }[entry["type"]]
     limits = [f"{sign} {entry[key]:g}" for key, sign in _LIMITS.items() if key in entry]
     return ", ".join([word, *limits])
 

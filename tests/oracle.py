@@ -70,6 +70,7 @@ class Expected:
     covered: list[int] = field(default_factory=list)
     contacts: set[str] = field(default_factory=set)
     breaches: int = 0
+    too_low: bool = False
     limits: set[str] = field(default_factory=set)
     obstacle_clearance_m: float = math.inf
     separation_m: float = math.inf
@@ -194,4 +195,20 @@ def _count_breaches(scenario, step, whole, end, results):
                 both = uas.radius_m + scenario.uas[j].radius_m
                 kept.append((max(math.hypot(x, y), abs(z)), both + scenario.uas_safe_distance_m))
         kept.append((-float(scenario.fence.signed_distance(end[i])), scenario.geofence.margin_m))
-        results[i].breaches = sum(distance < required for distance, required in kept)
+        results[i].too_low = too_low(scenario, i, end[i])
+        near = sum(distance < required for distance, required in kept)
+        results[i].breaches = near + results[i].too_low
+
+
+def too_low(scenario, i, position):
+    """Whether UAS i is below the least height, and not near its start."""
+    x, y = (position - np.array(scenario.uas[i].start_m))[:2]
+    least = scenario.min_height_m
+    if not least or math.hypot(x, y) <= scenario.landing_distance_m + 2.0 * least:
+        return False
+    # over a roof: inside of all of its faces once they are pushed up
+    over_roofs = [
+        (hull.face_distances(position) < least * np.maximum(0.0, -hull.normals[:, 2])).all()
+        for hull in scenario.hulls
+    ]
+    return bool(-position[2] < least or any(over_roofs))

@@ -38,6 +38,7 @@ def meadow(
     dod_max=0.75,
     max_steps=300,
     dt_s=1.0,
+    min_height_m=0.0,
 ):
     """A square of 200 m with a ceiling at 50 m, and what is put into it."""
     return Scenario.model_validate(
@@ -49,6 +50,7 @@ def meadow(
             "landing_distance_m": 2.0,
             "landing_speed_mps": 0.5,
             "uas_safe_distance_m": 5.0,
+            "min_height_m": min_height_m,
             "geofence": {
                 "margin_m": 0.5,
                 "vertices_m": box("fence", (0.0, 0.0, -50.0), (200.0, 200.0, 0.0))["vertices_m"],

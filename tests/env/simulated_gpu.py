@@ -72,4 +72,6 @@ def limits_exceeded():
 if __name__ == "__main__":
     still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
-    print(json.dumps({"still": compare(still), "windy": compare(windy)}))
+    high = still.model_copy(update={"min_height_m": 6.0})
+    flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}
+    print(json.dumps(flown))

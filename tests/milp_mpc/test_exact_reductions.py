@@ -266,6 +266,8 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         tours=(None, TourSegment(np.array([1]), np.eye(3)[:2], np.ones(2), 0.5, np.array([6.0]))),
         weights=Weights(lift=0.3, return_home=1.0),
         dt_s=0.5,
+        min_height_m=2.0,
+        landing_zone_m=6.0,
         physical_sides=12,
         obstacle_sides=6,
         limit_sides=12,

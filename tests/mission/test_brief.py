@@ -42,7 +42,8 @@ LEAVES_S, SPEED_MPS = 37.25, 1.8125
 PUBLIC = {
     Scenario: {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
-        *("landing_speed_mps", "uas_safe_distance_m", "geofence", "obstacles"),
+        *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
+        *("geofence", "obstacles"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place"),
     },
     MovingObstacle: {"name", "kind", "radius_m", "height_m", "safe_distance_m", "start_m"},

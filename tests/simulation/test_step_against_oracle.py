@@ -15,7 +15,7 @@ from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NA
 VELOCITY, ACCELERATION, WRENCH = map(KIND_NAMES.index, ("velocity", "acceleration", "wrench"))
 
 
-def crowded():
+def crowded(**rules):
     """Everything that can be hit, close together: random flights end in every kind of contact."""
     return meadow(
         [(60.0, 60.0, -8.0), (66.0, 60.0, -8.0), (60.0, 66.0, -8.0)],
@@ -29,12 +29,14 @@ def crowded():
         ],
         waypoints=[waypoint((60.0 + 3 * w, 57.0 + 6 * w, -8.0), 6.0, 1.0 + w) for w in range(9)],
         soc_0=0.27,
+        **rules,
     )
 
 
 SCENARIOS = {
     "village": lambda: load_scenario("village"),
     "crowded": crowded,
+    "crowded_high": lambda: crowded(min_height_m=6.5),
     "generated": lambda: generate_scenario(3, n_uas=4, n_waypoints=25, n_obstacles=8),
     "generated_open": lambda: generate_scenario(4, n_uas=1, n_waypoints=12, n_obstacles=0),
 }
@@ -85,6 +87,7 @@ def assert_same(world, before, outcome, returning):
         assert contact in want.contacts if want.contacts else contact == "none"
         assert (want.status == LOST) == (bool(want.contacts) or before.status[i] == LOST)
         assert got["breaches"] == want.breaches
+        assert got["too_low"] == want.too_low
         assert set(limit_names(got["limits_exceeded"])) == want.limits
         for field in ("obstacle_clearance_m", "separation_m"):
             assert got[field] == pytest.approx(getattr(want, field), abs=1e-9), field

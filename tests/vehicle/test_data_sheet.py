@@ -218,3 +218,14 @@ def test_a_made_vehicle_hovers_alike_in_both_dynamics_or_is_refused_in_a_line(
         hover_energy_Wh(record, step, min(hover_minutes, 5.0)) for step in (lpv_step, plant_step)
     )
     assert linear_Wh == pytest.approx(exact_Wh, rel=HOVER_TOLERANCE)
+
+
+@pytest.mark.parametrize("name", ["s500_v2", "hexacopter"])
+def test_slow_flight_takes_less_power_than_a_hover_and_the_limit_leads_farthest(name):
+    vehicle = load(name)
+    flown = endurance(vehicle)
+    assert flown.longest.power_W < 0.95 * vehicle.power.hover_W
+    assert 0.3 < flown.longest.speed_mps / vehicle.limits.v_xy_max_mps < 0.8
+    # the best range lies beyond the limit
+    assert flown.farthest.speed_mps == pytest.approx(vehicle.limits.v_xy_max_mps)
+    assert flown.farthest.power_W > flown.longest.power_W

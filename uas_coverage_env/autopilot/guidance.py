@@ -9,6 +9,7 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY
+from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
 from uas_coverage_env.world.state import FLYING
 
@@ -95,13 +96,14 @@ def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
 
 
 @kernel
-def _altitude(arena, x, altitude1_m, way_m, needed_m):
+def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     """Altitude to hold [m]: descend along a glide slope, but stay over what has to be passed."""
     rules = arena.rules[0]
     glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - 15.0)
     cruise_m = max(-x[Z], rules.floor_m + CRUISE_ALTITUDE_M)
     altitude_m = max(altitude1_m, min(cruise_m, glide_m), needed_m)
-    return min(max(altitude_m, rules.floor_m), max(rules.ceiling_m, altitude1_m))
+    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
 
 
 @kernel
@@ -141,7 +143,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
     approach_mps = _approach_speed(arena, i, x, target, stop, distance_m, leg, -z1)
     speed_mps = min(speed_mps, approach_mps)
-    altitude_m = _altitude(arena, x, -z1, way_m, needed_m)
+    altitude_m = _altitude(arena, i, x, -z1, way_m, needed_m)
     north_mps = 0.0
     east_mps = 0.0
     if distance_m > 1e-9:

@@ -24,6 +24,7 @@ from uas_coverage_env.vehicle import (
 )
 from uas_coverage_env.world.commands import WRENCH
 from uas_coverage_env.world.contacts import face_between, moving_clearance
+from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
 
@@ -159,9 +160,21 @@ def _fence_slack(arena, path_m, n_flown, low, high, slack_m):
     return slack_m
 
 
+@kernel
+def _height_slack(arena, i, path_m, n_flown, slack_m):
+    """The smaller of slack_m and the height to spare along a path, roofs not counted."""
+    required_m = arena.rules[0].min_height_m
+    if not in_landing_zone(arena, i, path_m[0, 0], path_m[0, 1]):
+        required_m = _kept_m(required_m, -path_m[0, 2])
+    for k in range(1, n_flown + 1):
+        if not in_landing_zone(arena, i, path_m[k, 0], path_m[k, 1]):
+            slack_m = min(slack_m, -path_m[k, 2] - required_m)
+    return slack_m
+
+
 @inlined_kernel
 def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
-    """Least distance to spare from the geofence and fixed obstacles along a path.
+    """Least distance to spare from geofence, fixed obstacles and least height along a path.
 
     Args:
         arena: The arena.
@@ -178,14 +191,16 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     high = stack_array(3)
     _box_of(path_m, n_flown, low, high)
     slack_m = _fence_slack(arena, path_m, n_flown, low, high, slack_m)
+    if arena.rules[0].min_height_m > 0.0:
+        slack_m = _height_slack(arena, i, path_m, n_flown, slack_m)
     normals = arena.normals
     offsets_m = arena.offsets_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         if box_apart(obstacle, low[0], low[1], low[2], high[0], high[1], high[2]):
             continue
-        first = obstacle.first_face
-        last = obstacle.last_face
+        first = obstacle.first_kept
+        last = obstacle.last_kept
         required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
         for k in range(n_flown):
             x0 = path_m[k, 0]

@@ -140,12 +140,13 @@ def _report(screen: Console, flight: Flight, directory: Path) -> None:
     screen.print(table)
     for violation in flight.violations:
         screen.print(f"violation: {violation}", markup=False)
+    low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
     ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
     screen.print(
         f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "
         f"{'all home' if result['all_home'] else 'not all home'}; "
         f"{result['energy_Wh']:.2f} Wh; {len(flight.violations)} violations, "
-        f"{flight.breaches} breaches",
+        f"{flight.breaches} breaches{low}",
         markup=False,
     )
     if flight.decisions:

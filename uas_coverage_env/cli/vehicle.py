@@ -183,4 +183,14 @@ def _lines(params: VehicleParams) -> list[str]:
             f"cruise     {params.limits.v_cruise_mps:.3g} m/s, {dynamics}: {cruise.power_W:.4g} W, "
             f"{cruise.time_min:.1f} min and {cruise.range_km:.1f} km to {left}"
         )
+    hover_W, cruise = power.hover_W, flown.cruise_nonlinear
+    longest, farthest = flown.longest, flown.farthest
+    per_m = cruise.power_W / params.limits.v_cruise_mps
+    lines += [
+        f"longest    {longest.speed_mps:.3g} m/s, nonlinear: {longest.power_W:.4g} W, "
+        f"{1.0 - longest.power_W / hover_W:.1%} less than a hover",
+        f"farthest   {farthest.speed_mps:.3g} m/s, nonlinear: "
+        f"{farthest.power_W / farthest.speed_mps:.4g} J/m, "
+        f"{1.0 - farthest.power_W / farthest.speed_mps / per_m:.1%} less than cruising",
+    ]
     return lines

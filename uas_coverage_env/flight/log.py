@@ -116,6 +116,7 @@ class FlightLog:
             "decisions": tuple(step.decision for step in self._steps),
             "violations": tuple(self._violations()),
             "breaches": sum(int(step.outcome["breaches"].sum()) for step in self._steps),
+            "height_breaches": sum(int(step.outcome["too_low"].sum()) for step in self._steps),
             "min_separation_m": self._smallest("separation_m"),
             "min_obstacle_clearance_m": self._smallest("obstacle_clearance_m"),
         }

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, FlightRecord, Violation
+from uas_coverage_env.scenario.ground_phases import landing, take_off
+from uas_coverage_env.vehicle import DOD, U_TH
 
 _J_PER_WH = 3600.0
 
@@ -67,6 +69,31 @@ def filtered_share(flight: FlightRecord) -> float:
     return sum(decision.filtered for decision in flight.decisions) / max(commands, 1)
 
 
+def ground_phases(flight: FlightRecord) -> list[dict[str, Any]]:
+    """Take-off and landing of each UAS, which lie outside of the samples.
+
+    Returns:
+        One entry per UAS: seconds and Wh of both, and the charge on the ground afterwards. Landing
+        and charge are None of a UAS that has not come home.
+    """
+    entries = []
+    for i, name in enumerate(flight.names):
+        up = take_off(flight.scenario, i)
+        entry: dict[str, Any] = {
+            "uas": name,
+            "take_off_s": up.time_s,
+            "take_off_Wh": up.energy_Wh,
+            **dict.fromkeys(("landing_s", "landing_Wh", "soc_on_ground")),
+        }
+        if flight.mode[-1, i] == LANDED:
+            x = flight.x[-1, i]
+            down = landing(flight.scenario, i, x[:3].tolist(), float(x[DOD]), float(x[U_TH]))
+            entry |= {"landing_s": down.time_s, "landing_Wh": down.energy_Wh}
+            entry["soc_on_ground"] = 1.0 - down.dod
+        entries.append(entry)
+    return entries
+
+
 def fallback_reasons(flight: FlightRecord) -> dict[str, int]:
     """Why there were fallbacks, and how many: the most frequent reason first."""
     reasons = Counter(
@@ -81,11 +108,14 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "coverage": coverage(flight),
         "steps": flight.steps,
         "energy_Wh": float(energy_Wh(flight).sum()),
+        **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
         "all_home": bool(home(flight).all()),
         "min_separation_m": flight.min_separation_m,
         "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
         "violations": [_entry(violation) for violation in flight.violations],
         "breaches": flight.breaches,
+        # without the rule the file is as it was before there was one
+        **({"height_breaches": flight.height_breaches} if flight.scenario.min_height_m else {}),
         "wall_time_s": flight.wall_time_s,
         "decision_time_s": decision_time_s(flight),
         "fallbacks": sum(decision.fallback for decision in flight.decisions),

@@ -65,6 +65,7 @@ class _Summary(StrictModel):
 
     violations: tuple[_Violation, ...]
     breaches: Count
+    height_breaches: Count = 0
     min_separation_m: float | None
     min_obstacle_clearance_m: float | None
     wall_time_s: Seconds

@@ -109,11 +109,12 @@ class FlightRecord:
         plan: PLAN_DTYPE rows of what the planner predicted; empty where it does not predict.
         decisions: One entry per step.
         violations: Contacts and limits exceeded, in order of time.
-        breaches: Count of samples closer than the safe distances.
+        breaches: Count of samples closer than the safe distances, or below the least height.
         min_separation_m: Smallest distance between two flying UAS [m]; None: never two.
         min_obstacle_clearance_m: Smallest clearance from any obstacle [m]; None: no obstacle.
         wall_time_s: Time the flight took to compute [s], compilation apart.
         versions: Package -> version.
+        height_breaches: How many of the breaches are below the least height.
     """
 
     scenario: Scenario
@@ -140,6 +141,7 @@ class FlightRecord:
     min_obstacle_clearance_m: float | None
     wall_time_s: float
     versions: Mapping[str, str]
+    height_breaches: int = 0
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""

@@ -1,6 +1,6 @@
 """Convex hulls, the paper's round shapes, and exact tests of straight segments against them."""
 
-from uas_coverage_env.geometry.polytope import ConvexPolytope
+from uas_coverage_env.geometry.polytope import ConvexPolytope, corners_of
 from uas_coverage_env.geometry.round_shapes import (
     closed_cylinder_faces,
     cylinder_faces,
@@ -20,6 +20,7 @@ from uas_coverage_env.geometry.segments import (
 __all__ = [
     "ConvexPolytope",
     "closed_cylinder_faces",
+    "corners_of",
     "cylinder_clearance",
     "cylinder_faces",
     "cylinder_gap",

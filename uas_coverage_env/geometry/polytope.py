@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, KDTree, QhullError
+from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
 # Thinner bodies have no face that separates one side from the other.
 _THINNEST_M = 1e-3
@@ -98,6 +98,44 @@ class ConvexPolytope:
             (...) [m].
         """
         return self.face_distances(points_m).max(axis=-1)
+
+    def raised(self, height_m: float, kept_m: float = 0.0) -> Self:
+        """The body with its upper faces raised straight up; what stands upright stays.
+
+        A point over the roof lies in it where it is less than `height_m` above the roof. A roof
+        that slopes down to the edge of the body goes on beyond the edge as it slopes.
+
+        Args:
+            height_m: By how much the upper faces are raised [m].
+            kept_m: Distance that is kept from every face anyway [m]: a face is moved outward by
+                no more than what is missing to that.
+
+        Returns:
+            The raised body with the same faces in the same order; this one where none is raised.
+        """
+        out_m = height_m * np.maximum(-self.normals[:, 2], 0.0) - kept_m
+        if not (out_m > 0.0).any():
+            return self
+        offsets_m = self.offsets_m - np.maximum(out_m, 0.0)
+        corners_m = corners_of(self.normals, offsets_m, self.vertices_m.mean(axis=0))
+        return type(self)(self.normals, offsets_m, np.unique(corners_m.round(9), axis=0))
+
+
+def corners_of(
+    normals: NDArray[np.float64], offsets_m: NDArray[np.float64], inside_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Corners of {p : normals · p + offsets_m ≤ 0}, some of them several times.
+
+    Args:
+        normals: (F, 3) [-] outward.
+        offsets_m: (F,) [m].
+        inside_m: (3,) [m] a point inside the body.
+
+    Returns:
+        (V, 3) [m].
+    """
+    planes = np.column_stack([normals, offsets_m + normals @ inside_m])
+    return HalfspaceIntersection(planes, np.zeros(3)).intersections + inside_m
 
 
 def _checked_points(points_m: ArrayLike) -> NDArray[np.float64]:

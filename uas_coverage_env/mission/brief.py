@@ -57,6 +57,8 @@ class MissionBrief(StrictModel):
         landing_distance_m: A UAS this close to its start can land [m].
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
+        min_height_m: Least height above the ground and above roofs; 0: no such rule [m].
+        from_ground: Whether charge is drawn for take-off before t = 0, and for landing at the end.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
         moving_obstacles: Moving obstacles, without their schedules.
@@ -74,6 +76,8 @@ class MissionBrief(StrictModel):
     landing_distance_m: float
     landing_speed_mps: float
     uas_safe_distance_m: float
+    min_height_m: float
+    from_ground: bool
     geofence: Geofence
     obstacles: tuple[Obstacle, ...]
     moving_obstacles: tuple[MovingObstacleBrief, ...]
@@ -114,6 +118,16 @@ class MissionBrief(StrictModel):
     def hulls(self) -> tuple[ConvexPolytope, ...]:
         """One hull per fixed obstacle, in their order."""
         return tuple(obstacle.hull for obstacle in self.obstacles)
+
+    @property
+    def kept_hulls(self) -> tuple[ConvexPolytope, ...]:
+        """See `Scenario.kept_hulls`."""
+        return self._motionless.kept_hulls
+
+    @property
+    def landing_zone_m(self) -> float:
+        """See `Scenario.landing_zone_m`."""
+        return self._motionless.landing_zone_m
 
     def as_scenario(self) -> Scenario:
         """A scenario to simulate: that of the brief, in which moving obstacles never move.

@@ -118,6 +118,12 @@ def _starts_and_fixed_things(scenario: UncheckedScenario) -> Iterator[str]:
             distance_m = float(hull.signed_distance(uas.start_m))
             named = f"obstacle {obstacle.name!r}"
             yield from _too_close(start, distance_m, named, uas.radius_m, obstacle.safe_distance_m)
+            over_roof = hull.raised(scenario.min_height_m).signed_distance(uas.start_m) < 0.0
+            if over_roof and distance_m >= uas.radius_m + obstacle.safe_distance_m:
+                yield (
+                    f"{start} is lower than min_height_m {scenario.min_height_m:g} above the roof "
+                    f"of {named}, where no planner can start; move it higher or away"
+                )
 
 
 def _starts_and_moving_obstacles(scenario: UncheckedScenario) -> Iterator[str]:
@@ -172,14 +178,34 @@ def _waypoints_out_of_reach(scenario: UncheckedScenario) -> Iterator[str]:
     for index, waypoint in enumerate(scenario.waypoints):
         points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
         free = scenario.fence.signed_distance(points) <= -scenario.geofence.margin_m
+        high = _is_high_enough(scenario, points)
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
             free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m
+        if free.any() and not (free & high).any():
+            yield (
+                f"waypoints[{index}].position_m: the sphere around {_point(waypoint.position_m)} "
+                f"can be covered only from below min_height_m {scenario.min_height_m:g}, so no "
+                f"planner will cover it; move it up or enlarge radius_m"
+            )
         if not free.any():
             yield (
                 f"waypoints[{index}].position_m: no part of the sphere around "
                 f"{_point(waypoint.position_m)} keeps all safe distances, so no planner will "
                 f"cover it; move it or enlarge radius_m"
             )
+
+
+def _is_high_enough(
+    scenario: UncheckedScenario, points_m: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(P,) Whether the least height allows points (P, 3) to some UAS."""
+    high = -points_m[:, 2] >= scenario.min_height_m
+    for hull in scenario.hulls:
+        high &= hull.raised(scenario.min_height_m).signed_distance(points_m) >= 0.0
+    for uas in scenario.uas:
+        away_m = np.hypot(*(points_m[:, :2] - uas.start_m[:2]).T)
+        high |= away_m <= scenario.landing_zone_m
+    return high
 
 
 def _mission_too_long(scenario: UncheckedScenario) -> Iterator[str]:

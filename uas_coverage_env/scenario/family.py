@@ -14,6 +14,9 @@ Range = tuple[int, int]
 N_UAS, N_WAYPOINTS, N_OBSTACLES = (1, 4), (20, 60), (5, 20)
 """The ranges of the benchmarks and of the leaderboard's sets."""
 
+MIN_HEIGHT_M = 0.0
+"""The least height of the benchmarks, of the family and of the leaderboard's sets [m]: none yet."""
+
 # above the seeds of every set that players are compared on: nothing is trained on those
 _SEEDS = (2**31, 2**32)
 
@@ -23,6 +26,7 @@ def sample_scenario(
     n_uas: Range = N_UAS,
     n_waypoints: Range = N_WAYPOINTS,
     n_obstacles: Range = N_OBSTACLES,
+    min_height_m: float = MIN_HEIGHT_M,
 ) -> Scenario:
     """The generated scenario of a seed, with counts that the seed draws.
 
@@ -31,6 +35,7 @@ def sample_scenario(
         n_uas: Least and most.
         n_waypoints: Least and most.
         n_obstacles: Least and most.
+        min_height_m: See `generate_scenario`.
 
     Raises:
         ValueError: See `generate_scenario`.
@@ -39,7 +44,13 @@ def sample_scenario(
     uas, waypoints, obstacles = (
         int(lots.integers(least, most + 1)) for least, most in (n_uas, n_waypoints, n_obstacles)
     )
-    return generate_scenario(seed, n_uas=uas, n_waypoints=waypoints, n_obstacles=obstacles)
+    return generate_scenario(
+        seed,
+        n_uas=uas,
+        n_waypoints=waypoints,
+        n_obstacles=obstacles,
+        min_height_m=min_height_m,
+    )
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,7 @@ class GeneratedScenarios:
         n_uas: Least and most.
         n_waypoints: Least and most.
         n_obstacles: Least and most.
+        min_height_m: See `generate_scenario`.
 
     Raises:
         ValueError: A range is not two whole numbers, the least first.
@@ -61,9 +73,11 @@ class GeneratedScenarios:
     n_uas: Range = N_UAS
     n_waypoints: Range = N_WAYPOINTS
     n_obstacles: Range = N_OBSTACLES
+    min_height_m: float = MIN_HEIGHT_M
 
     def __post_init__(self) -> None:
-        for name, given in vars(self).items():
+        for name in ("n_uas", "n_waypoints", "n_obstacles"):
+            given = getattr(self, name)
             pair = isinstance(given, tuple | list) and len(given) == 2
             if not pair or not all(type(count) is int for count in given) or given[0] > given[1]:
                 raise ValueError(f"{name} is {given!r}; give least and most, as in (2, 4)")
@@ -71,9 +85,8 @@ class GeneratedScenarios:
 
     def __call__(self, rng: np.random.Generator) -> Scenario:
         """Draw a scenario."""
-        return sample_scenario(
-            int(rng.integers(*_SEEDS)), self.n_uas, self.n_waypoints, self.n_obstacles
-        )
+        seed = int(rng.integers(*_SEEDS))
+        return sample_scenario(seed, **vars(self))
 
 
 FAMILIES: Mapping[str, GeneratedScenarios] = {"generated": GeneratedScenarios()}

@@ -29,6 +29,9 @@ from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
 _NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 _LONGEST_NAME = 64
 
+GLIDE = 2.0
+"""Way over height of the flattest descent from the least height to a start, and of the climb."""
+
 
 def _checked_name(name: str) -> str:
     # names are columns of CSV files, keys of dictionaries and parts of file names
@@ -269,6 +272,8 @@ class UncheckedScenario(StrictModel):
     landing_distance_m: Length_m
     landing_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)]
     uas_safe_distance_m: Distance_m
+    min_height_m: Distance_m = 0.0
+    from_ground: bool = False
     geofence: Geofence
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = ()
     moving_obstacles: Annotated[tuple[MovingObstacle, ...], Strict(False)] = ()
@@ -281,9 +286,9 @@ class UncheckedScenario(StrictModel):
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # files, and what is computed from their content, are those of scenarios before the table
+        # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
-        for name in ("place", "wind", "disturbances"):
+        for name in ("place", "min_height_m", "from_ground", "wind", "disturbances"):
             if not getattr(self, name):
                 data.pop(name, None)
         return data
@@ -297,6 +302,24 @@ class UncheckedScenario(StrictModel):
     def hulls(self) -> tuple[ConvexPolytope, ...]:
         """One hull per fixed obstacle, in their order."""
         return tuple(obstacle.hull for obstacle in self.obstacles)
+
+    @property
+    def kept_hulls(self) -> tuple[ConvexPolytope, ...]:
+        """What commands keep the safe distance from: the hulls, raised where that is not enough.
+
+        Beyond a face of a raised hull by radius and safe distance, the least height above the
+        roof is kept as well.
+        """
+        radius_m = min(uas.radius_m for uas in self.uas)
+        return tuple(
+            hull.raised(self.min_height_m, radius_m + obstacle.safe_distance_m)
+            for obstacle, hull in zip(self.obstacles, self.hulls, strict=True)
+        )
+
+    @property
+    def landing_zone_m(self) -> float:
+        """Horizontal distance from its start within which a UAS may fly low [m]."""
+        return self.landing_distance_m + GLIDE * self.min_height_m
 
     @cached_property
     def vehicles(self) -> tuple[VehicleParams, ...]:

@@ -46,6 +46,8 @@ _SMALLEST_PITCH_M = 15.0
 _JITTER = 0.12
 _ALTITUDE_M = 14.0
 _ABOVE_ROOF_M = 10.0
+# The centres of waypoints are this much above the least height.
+_ABOVE_LEAST_M = 1.0
 # Roofs up to this height are covered from above; higher blocks from the street beside them.
 _COVERED_ROOF_M = 22.0
 _BETWEEN_STARTS_M = 20.0
@@ -55,6 +57,7 @@ _LOWEST_SOC = 0.6
 _ATTEMPTS = 8
 _ATTEMPTS_TO_FULL = 4
 _LARGEST = {"n_uas": 64, "n_waypoints": 2000, "n_obstacles": 400}
+_LARGEST_MIN_HEIGHT_M = 10.0  # there is as much room between the highest roof and the ceiling
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,8 @@ def generate_scenario(
     n_waypoints: int = 25,
     n_obstacles: int = 6,
     size_m: float | None = None,
+    *,
+    min_height_m: float = 0.0,
 ) -> Scenario:
     """A town that can always be flown; the same arguments give the same scenario.
 
@@ -110,6 +115,8 @@ def generate_scenario(
         n_obstacles: Number of blocks.
         size_m: Side of the square area [m]; by default as large as the waypoints need at a pitch
             of 68 m, or the blocks at one per 55 m x 55 m.
+        min_height_m: Least height above ground and roofs but for take-off and landing, at most 10
+            [m]. The town is the same whatever it is; waypoints that are too low for it are lifted.
 
     Raises:
         ValueError: An argument is wrong, or no such scenario can be flown; the line names the
@@ -121,10 +128,13 @@ def generate_scenario(
         _check_count(name, value, 0 if name == "n_obstacles" else 1, _LARGEST[name])
     if size_m is not None:
         _check_size(size_m)
+    _check_height(min_height_m)
     town = _town(n_uas, n_waypoints, n_obstacles, size_m)
     name = f"town-s{seed}-u{n_uas}-w{n_waypoints}-o{n_obstacles}"
     if size_m is not None:
         name += f"-{round(size_m)}m"
+    if min_height_m:
+        name += f"-h{round(100 * min_height_m)}cm"
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([seed, n_uas, n_waypoints, n_obstacles, attempt])
         fullness = min(1.0, attempt / _ATTEMPTS_TO_FULL)
@@ -138,10 +148,11 @@ def generate_scenario(
             landing_distance_m=2.0,
             landing_speed_mps=0.5,
             uas_safe_distance_m=_UAS_SAFE_DISTANCE_M,
+            min_height_m=float(min_height_m),
             geofence=Geofence(margin_m=0.5, vertices_m=_fence_corners(town)),
             obstacles=tuple(_obstacles(blocks)),
             uas=tuple(_fleet(rng, town, n_uas, lowest_soc)),
-            waypoints=tuple(_waypoints(rng, town, blocks, n_waypoints)),
+            waypoints=tuple(_waypoints(rng, town, blocks, n_waypoints, min_height_m)),
         )
         plan = back_and_forth(draft, spare=_SPARE)
         if plan.complete:
@@ -168,6 +179,17 @@ def _check_size(size_m: Any) -> None:
         raise ValueError(f"size_m is {size_m!r}; it should be a length in metres, or None")
     if not 0.0 < size_m <= 10_000.0:
         raise ValueError(f"size_m is {size_m:g}; it should be above 0 and at most 10000")
+
+
+def _check_height(min_height_m: Any) -> None:
+    number = isinstance(min_height_m, int | float | np.integer | np.floating)
+    if isinstance(min_height_m, bool) or not number:
+        raise ValueError(f"min_height_m is {min_height_m!r}; it should be a height in metres")
+    if not 0.0 <= min_height_m <= _LARGEST_MIN_HEIGHT_M:
+        raise ValueError(
+            f"min_height_m is {min_height_m:g}; it should be between 0 and "
+            f"{_LARGEST_MIN_HEIGHT_M:g}"
+        )
 
 
 def _town(n_uas: int, n_waypoints: int, n_obstacles: int, size_m: float | None) -> _Town:
@@ -291,7 +313,11 @@ def _obstacles(blocks: list[_Block]) -> list[Obstacle]:
 
 
 def _waypoints(
-    rng: np.random.Generator, town: _Town, blocks: list[_Block], n_waypoints: int
+    rng: np.random.Generator,
+    town: _Town,
+    blocks: list[_Block],
+    n_waypoints: int,
+    min_height_m: float,
 ) -> list[Waypoint]:
     """A jittered grid, lifted above low roofs and moved from high blocks into the street."""
     rows_m = (town.north_m - 2.0 * _WAYPOINT_INSET_M) / town.rows
@@ -302,16 +328,18 @@ def _waypoints(
         row, column = divmod(index, town.columns)
         north_m = _WAYPOINT_INSET_M + rows_m * (row + jitter[index, 0])
         east_m = town.west_m + _WAYPOINT_INSET_M + columns_m * (column + jitter[index, 1])
-        waypoints.append(_waypoint(north_m, east_m, blocks))
+        waypoints.append(_waypoint(north_m, east_m, blocks, min_height_m + _ABOVE_LEAST_M))
     return waypoints
 
 
-def _waypoint(north_m: float, east_m: float, blocks: list[_Block]) -> Waypoint:
-    altitude_m, kind = _ALTITUDE_M, "field"
+def _waypoint(north_m: float, east_m: float, blocks: list[_Block], lowest_m: float) -> Waypoint:
+    """A waypoint at a place or beside it, no lower than lowest_m above ground and roof."""
+    altitude_m, kind = max(_ALTITUDE_M, lowest_m), "field"
     # streets are wide: no place is this near two blocks
     near = [block for block in blocks if block.is_near(north_m, east_m, _CLEARANCE_M + 1.0)]
     if near and near[0].height_m <= _COVERED_ROOF_M:
-        altitude_m, kind = max(_ALTITUDE_M, near[0].height_m + _ABOVE_ROOF_M), "residential"
+        above_m = max(_ABOVE_ROOF_M, lowest_m)
+        altitude_m, kind = max(_ALTITUDE_M, near[0].height_m + above_m), "residential"
     elif near:
         beside_m = _CLEARANCE_M + 1.5
         block = near[0]

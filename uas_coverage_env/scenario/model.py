@@ -25,6 +25,10 @@ class Scenario(UncheckedScenario):
         landing_distance_m: A UAS this close to its start can land [m].
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
+        min_height_m: Least height of a UAS above the ground (z = 0) and above roofs, but for
+            take-off and landing; without it, or at 0, there is no such rule [m].
+        from_ground: Whether UAS climb from the ground to their starts before t = 0, and descend to
+            it after the last sample; without it missions begin and end in the air.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
         moving_obstacles: Moving obstacles.

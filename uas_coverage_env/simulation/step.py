@@ -72,6 +72,7 @@ def begin_step(state, commands, outcome):
         event.contact = NONE
         event.contact_with = -1
         event.breaches = 0
+        event.too_low = False
         event.limits_exceeded = 0
         event.landed = False
         event.obstacle_clearance_m = math.inf

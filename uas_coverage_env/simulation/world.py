@@ -13,8 +13,9 @@ from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.disturbances.act import begin_random, disturbance_code
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.ground_phases import take_off
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, U_TH
 from uas_coverage_env.world.arena import build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.disturbance import checked_disturbances
@@ -27,11 +28,15 @@ _OUTCOMES_IN_BLOCK = 256
 
 
 def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
-    """All UAS at rest at their starts, batteries rested, nothing covered."""
+    """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off."""
     sizes = {"U": len(scenario.uas), "W": len(scenario.waypoints), "D": n_disturbances}
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
     state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
+    if scenario.from_ground:
+        for i, x in enumerate(state.x):
+            flown = take_off(scenario, i)
+            x[DOD], x[U_TH] = flown.dod, flown.u_th_V
     state.status[:] = FLYING
     state.uncovered[:] = True
     return state

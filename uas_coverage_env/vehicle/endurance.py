@@ -20,6 +20,13 @@ class Cruise(NamedTuple):
     range_km: float
 
 
+class SteadySpeed(NamedTuple):
+    """A level speed and the exact power there."""
+
+    speed_mps: float
+    power_W: float
+
+
 class Endurance(NamedTuple):
     """What follows from a vehicle's parts, to be compared with what is known of it."""
 
@@ -33,6 +40,10 @@ class Endurance(NamedTuple):
     cruise_lpv: Cruise
     """With the power of the LPV model, which is never below that of a hover."""
     cruise_nonlinear: Cruise
+    longest: SteadySpeed
+    """At which it stays in the air the longest."""
+    farthest: SteadySpeed
+    """At which a charge leads the farthest, within v_xy_max_mps."""
 
 
 def endurance(vehicle: VehicleParams) -> Endurance:
@@ -52,7 +63,21 @@ def endurance(vehicle: VehicleParams) -> Endurance:
         hover_usable_min=flight_time_s(vehicle, power.hover_W, battery.dod_max) / 60.0,
         cruise_lpv=cruise(power.hover_W + power.slope_W_per_N * extra_N),
         cruise_nonlinear=cruise(derived.power_W(vehicle, exact_N)),
+        longest=_best_speed(vehicle, lambda flown: flown.power_W),
+        farthest=_best_speed(vehicle, lambda flown: flown.power_W / flown.speed_mps),
     )
+
+
+def _best_speed(vehicle: VehicleParams, cost: Callable[[SteadySpeed], float]) -> SteadySpeed:
+    """The speed up to v_xy_max_mps with the least cost, in steps of a hundredth of that."""
+    speeds = [0.01 * n * vehicle.limits.v_xy_max_mps for n in range(1, 101)]
+    flown = [
+        SteadySpeed(
+            speed, derived.power_W(vehicle, vehicle.weight_N + level_flight_N(vehicle, speed))
+        )
+        for speed in speeds
+    ]
+    return min(flown, key=cost)
 
 
 def flight_time_s(vehicle: VehicleParams, power_W: float, dod_end: float) -> float:

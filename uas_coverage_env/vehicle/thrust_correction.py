@@ -155,6 +155,16 @@ def level_flight_N(vehicle: Parts, speed_mps: float) -> float:
     return _level_N(SimpleNamespace(**vehicle.kernel_scalars()), speed_mps)
 
 
+def vertical_flight_N(vehicle: Parts, down_mps: float) -> float:
+    """The exact thrust correction of level attitude, straight up or down [N].
+
+    Args:
+        vehicle: parameters; thrust correction, power and battery are not read.
+        down_mps: [m/s] positive down.
+    """
+    return _extra_N(SimpleNamespace(**vehicle.kernel_scalars()), 0.0, 0.0, 0.0, down_mps)
+
+
 def _level_N(rotors: SimpleNamespace, speed_mps: float) -> float:
     tilt_rad = math.atan(rotors.drag_kgps / rotors.weight_N * speed_mps)
     return _extra_N(rotors, 0.0, -tilt_rad, speed_mps, 0.0)

@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, HalfspaceIntersection
+from scipy.spatial import ConvexHull
 
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry import ConvexPolytope, corners_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
@@ -67,6 +67,9 @@ OBSTACLE_DTYPE = _record(
         # rows of `normals`: the hull, and the walls of its footprint widened by wall_m
         ("first_face", "i8"),
         ("last_face", "i8"),
+        # what commands keep clear of: the hull again, or with its upper faces raised
+        ("first_kept", "i8"),
+        ("last_kept", "i8"),
         ("first_side", "i8"),
         ("last_side", "i8"),
         ("safe_distance_m", "f8"),
@@ -108,6 +111,10 @@ RULES_DTYPE = _record(
         ("landing_speed_mps", "f8"),
         ("uas_safe_distance_m", "f8"),
         ("fence_margin_m", "f8"),
+        # above ground and roofs, 0 without such a rule; and how far from its start a UAS may be
+        # lower, horizontally
+        ("min_height_m", "f8"),
+        ("landing_zone_m", "f8"),
         # the largest safe distance of all obstacles
         ("safe_distance_max_m", "f8"),
         # clearances and separations are exact up to here and infinite beyond
@@ -297,6 +304,8 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     rules["landing_speed_mps"] = scenario.landing_speed_mps
     rules["uas_safe_distance_m"] = scenario.uas_safe_distance_m
     rules["fence_margin_m"] = scenario.geofence.margin_m
+    rules["min_height_m"] = scenario.min_height_m
+    rules["landing_zone_m"] = scenario.landing_zone_m
     rules["safe_distance_max_m"] = max(
         (o.safe_distance_m for o in (*scenario.obstacles, *scenario.moving_obstacles)), default=0.0
     )
@@ -328,10 +337,8 @@ def _widened(hull: ConvexPolytope, distance_m: float) -> NDArray[np.float64]:
     Returns:
         (V, 3) [m].
     """
-    inside = hull.vertices_m.mean(axis=0)
-    offsets_m = hull.offsets_m - distance_m + hull.normals @ inside
-    corners = HalfspaceIntersection(np.column_stack([hull.normals, offsets_m]), np.zeros(3))
-    return corners.intersections + inside
+    inside_m = hull.vertices_m.mean(axis=0)
+    return corners_of(hull.normals, hull.offsets_m - distance_m, inside_m)
 
 
 def _footprint(corners_m: NDArray[np.float64]) -> ConvexHull:
@@ -351,10 +358,12 @@ def _obstacles(
     planes = []
     corners = []
     first = 0
-    for record, obstacle, hull in zip(records, scenario.obstacles, scenario.hulls, strict=True):
+    for record, obstacle, hull, kept in zip(
+        records, scenario.obstacles, scenario.hulls, scenario.kept_hulls, strict=True
+    ):
         wall_m = radius_m + obstacle.safe_distance_m + ROUTE_MARGIN_M
         near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M)
-        widened_m = _widened(hull, wall_m)
+        widened_m = _widened(kept, wall_m)
         footprint = _footprint(widened_m)
         sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
         planes.append((hull.normals, hull.offsets_m))
@@ -362,11 +371,17 @@ def _obstacles(
         low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
         record["hull_middle_m"] = (low_m + high_m) / 2
         record["hull_half_m"] = (high_m - low_m) / 2 + EPS_M
-        near = _widened(hull, near_m)
+        near = _widened(kept, near_m)
         record["first_face"] = first
         record["last_face"] = record["first_side"] = first + hull.n_faces
         first += hull.n_faces + len(sides)
         record["last_side"] = first
+        record["first_kept"], record["last_kept"] = record["first_face"], record["last_face"]
+        if kept is not hull:
+            planes.append((kept.normals, kept.offsets_m))
+            record["first_kept"] = first
+            first += kept.n_faces
+            record["last_kept"] = first
         record["safe_distance_m"] = obstacle.safe_distance_m
         record["near_m"] = near_m
         # the corners are rounded in the last digits: widen the box rather than miss a contact
@@ -379,7 +394,7 @@ def _obstacles(
         record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m
         if record["tall"]:
-            outline = _footprint(_widened(hull, wall_m + NODE_MARGIN_M))
+            outline = _footprint(_widened(kept, wall_m + NODE_MARGIN_M))
             corners.append(outline.points[outline.vertices])
     return records, planes, corners
 

@@ -19,6 +19,7 @@ from uas_coverage_env.world.broad_phase import (
     write_lower_bounds,
     write_meetings,
 )
+from uas_coverage_env.world.height import is_too_low
 from uas_coverage_env.world.outcome import BATTERY, FENCE, MOVING_OBSTACLE, NONE, OBSTACLE, UAS
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
@@ -301,6 +302,9 @@ def count_breaches(arena, state, outcome):
                 if apart_m < keep_m:
                     count += 1
         if event.fence_clearance_m < rules.fence_margin_m:
+            count += 1
+        if rules.min_height_m > 0.0 and is_too_low(arena, i, x, y, z):
+            event.too_low = True
             count += 1
         event.breaches = count
 

@@ -32,8 +32,11 @@ OUTCOME_DTYPE = np.dtype(
                 # a code of this module, and the index of the obstacle or UAS, or -1
                 ("contact", "i8"),
                 ("contact_with", "i8"),
-                # how many obstacles and UAS are too near at the new sample; the fence counts too
+                # how many obstacles and UAS are too near at the new sample; the fence
+                # and the least height count too
                 ("breaches", "i8"),
+                # one of these: below the least height
+                ("too_low", "?"),
                 # the vehicle's limits exceeded at the new sample: bit k for `vehicle.LIMITS[k]`
                 ("limits_exceeded", "i8"),
                 # smallest over the segment flown; inf where there is nothing to be clear of, or

@@ -110,8 +110,8 @@ def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
 @kernel
 def _obstructs(obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     """Whether a line in space does not keep the distance of routes from an obstacle."""
-    first = obstacle.first_face
-    last = obstacle.last_face
+    first = obstacle.first_kept
+    last = obstacle.last_kept
     keep_m = min(
         obstacle.wall_m,
         signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M,

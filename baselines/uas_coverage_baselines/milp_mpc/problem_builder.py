@@ -40,7 +40,7 @@ class ProblemBuilder:
         self._uas = {uas.name: uas for uas in brief.uas}
         self._obstacles = tuple(
             (obstacle.name, hull)
-            for obstacle, hull in zip(brief.obstacles, brief.hulls, strict=True)
+            for obstacle, hull in zip(brief.obstacles, brief.kept_hulls, strict=True)
         )
         factor = inner_factor(options.waypoint_sides, 3)
         self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
@@ -129,6 +129,7 @@ class ProblemBuilder:
     ) -> PlanningProblem:
         """What is seen now, about the given waypoints, which are the scenario's rows."""
         options, names = self._options, swarm.active
+        margin_m, least_m = min(options.margin_m, 0.1), self.brief.min_height_m
         obstacles = self._within_reach(swarm)
         rows = [swarm.names.index(name) for name in names]
         x0 = swarm.x[rows]
@@ -147,7 +148,7 @@ class ProblemBuilder:
             x0=x0,
             horizon=options.horizon,
             fence=self.brief.fence,
-            fence_margin_m=self.brief.geofence.margin_m + min(options.margin_m, 0.1),
+            fence_margin_m=self.brief.geofence.margin_m + margin_m,
             obstacles=tuple(self._obstacles[o] for o in obstacles),
             obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
             moving=self._predicted(swarm),
@@ -164,6 +165,8 @@ class ProblemBuilder:
             dod_max=np.array([u.dod_max for u in uas]),
             targets=(None,) * len(names),
             dt_s=self.dt_s,
+            min_height_m=least_m + margin_m if least_m else 0.0,
+            landing_zone_m=self.brief.landing_zone_m - margin_m,
             weights=weights,
             limit_sides=options.limit_sides,
             obstacle_sides=options.obstacle_sides,

@@ -15,6 +15,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.vehicle.range import ROUTED, Speeds, flight_seconds
+from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart, route
 
 FloatArray = NDArray[np.float64]
@@ -40,25 +41,27 @@ class Around(NamedTuple):
     Attributes:
         keep_m: (O,) distances from the obstacles.
         fence_m: (F,) distances from the faces of the fence.
+        height_m: Above the ground, outside of the landing zone.
         others_m: (U, N+1, 3) where the others are going; NaN where none is flying.
         path_m: (K, 3) room for a braking flight.
     """
 
     keep_m: FloatArray
     fence_m: FloatArray
+    height_m: float
     others_m: FloatArray
     path_m: FloatArray
 
 
 @allocating_kernel
 def look_around(arena, i, x, others_m):
-    """What is kept from obstacles and fence: less where there is less already."""
+    """What is kept from obstacles, fence and ground: less where there is less already."""
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
     keep_m = np.empty(arena.obstacles.shape[0])
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         now_m = signed_distance(
-            normals, offsets_m, obstacle.first_face, obstacle.last_face, x[X], x[Y], x[Z]
+            normals, offsets_m, obstacle.first_kept, obstacle.last_kept, x[X], x[Y], x[Z]
         )
         keep_m[o] = min(arena.uas[i].radius_m + obstacle.safe_distance_m + _MARGIN_M, now_m - 1e-3)
     fence_m = np.empty(rules.fence_last - rules.fence_first)
@@ -66,13 +69,20 @@ def look_around(arena, i, x, others_m):
         face = rules.fence_first + h
         now_m = -signed_distance(normals, offsets_m, face, face + 1, x[X], x[Y], x[Z])
         fence_m[h] = min(rules.fence_margin_m + 0.5 * _MARGIN_M, now_m - 1e-3)
+    height_m = -math.inf
+    if rules.min_height_m > 0.0:
+        height_m = rules.min_height_m + 0.5 * _MARGIN_M
+        if not in_landing_zone(arena, i, x[X], x[Y]):
+            height_m = min(height_m, -x[Z] - 1e-3)
     path_m = np.empty((rules.lookahead_steps + 1, 3))
-    return Around(keep_m, fence_m, others_m, path_m)
+    return Around(keep_m, fence_m, height_m, others_m, path_m)
 
 
 @allocating_kernel
-def _is_clear(arena, around, x0, y0, z0, x1, y1, z1):
-    """Whether a segment keeps its distances from obstacles and fence."""
+def _is_clear(arena, i, around, x0, y0, z0, x1, y1, z1):
+    """Whether a segment keeps its distances from obstacles and fence, and its end the height."""
+    if -z1 < around.height_m and not in_landing_zone(arena, i, x1, y1):
+        return False
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
     for h in range(rules.fence_first, rules.fence_last):
         outside_m = signed_distance(normals, offsets_m, h, h + 1, x1, y1, z1)
@@ -82,7 +92,7 @@ def _is_clear(arena, around, x0, y0, z0, x1, y1, z1):
         obstacle = arena.obstacles[o]
         if box_apart(obstacle, x0, y0, z0, x1, y1, z1):
             continue
-        first, last = obstacle.first_face, obstacle.last_face
+        first, last = obstacle.first_kept, obstacle.last_kept
         if segment_meets(normals, offsets_m, first, last, around.keep_m[o], x0, y0, z0, x1, y1, z1):
             return False
     return True
@@ -163,7 +173,7 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s):
         if k >= first:
             fly_step(arena, i, task, plan, k, command)
             a, x = plan.path_m[k], plan.x[k + 1]
-            clear = _is_clear(arena, around, a[0], a[1], a[2], x[X], x[Y], x[Z])
+            clear = _is_clear(arena, i, around, a[0], a[1], a[2], x[X], x[Y], x[Z])
             if clear and k < _EXACT_STEPS:
                 n_braking, slack_m = fly_and_brake(
                     arena, i, plan.x[k], plan.reference[k], command, False, around.path_m
@@ -171,7 +181,7 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s):
                 clear = fixed_slack(arena, i, around.path_m, n_braking, 0.0, slack_m) >= 0.0
             elif clear:
                 clear = _is_clear(
-                    arena, around, x[X], x[Y], x[Z], x[X] + task.brake_s * x[VX],
+                    arena, i, around, x[X], x[Y], x[Z], x[X] + task.brake_s * x[VX],
                     x[Y] + task.brake_s * x[VY], x[Z] + 0.5 * dt_s * x[VZ],
                 )  # fmt: skip
             if not clear:

@@ -20,6 +20,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import CLIMB, VELOCITY
+from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
 
 FloatArray = NDArray[np.float64]
@@ -194,20 +195,22 @@ def _pursue(arena, i, task, plan, k):
         speed_mps = min(speed_mps, slow_mps)
     dx, dy = end_x - x[X] - lead_s * x[VX], end_y - x[Y] - lead_s * x[VY]
     share = plan.share[k] * speed_mps / (math.hypot(dx, dy) + 1e-9)
-    altitude_m = min(max(altitude_m, rules.floor_m), max(rules.ceiling_m, -z1))
+    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    altitude_m = min(max(altitude_m, floor_m), max(rules.ceiling_m, -z1))
     _write_pushed(arena, i, plan, k, share * dx, share * dy, altitude_m)
 
 
 @allocating_kernel
 def _write_pushed(arena, i, plan, k, north_mps, east_mps, altitude_m):
     """Write command k of a plan: the one given and the push, within the limits."""
-    rules, push = arena.rules[0], plan.push[k]
+    rules, push, x = arena.rules[0], plan.push[k], plan.x[k]
     north_mps += push[0]
     east_mps += push[1]
     share = min(1.0, arena.uas[i].speed_mps / (math.hypot(north_mps, east_mps) + 1e-9))
     plan.commands[k, 0] = share * north_mps
     plan.commands[k, 1] = share * east_mps
-    pushed_m = max(altitude_m + push[2], min(rules.floor_m, altitude_m))
+    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    pushed_m = max(altitude_m + push[2], min(floor_m, altitude_m))
     plan.commands[k, 2] = min(pushed_m, max(rules.ceiling_m, altitude_m))
 
 
@@ -282,7 +285,7 @@ def pull_clear(arena, i, task, plan, leg):
             x, y, z = aim_m[0], aim_m[1], aim_m[2]
             if not box_apart(obstacle, x, y, z, x, y, z):
                 clearance_m = signed_distance(
-                    normals, offsets_m, obstacle.first_face, obstacle.last_face, x, y, z
+                    normals, offsets_m, obstacle.first_kept, obstacle.last_kept, x, y, z
                 )
                 if clearance_m < obstacle.wall_m:
                     share = 0.5

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
 from uas_coverage_baselines.milp_mpc.model.flown import pushed
+from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.vehicle import compile_vehicle
 
@@ -77,12 +78,13 @@ def _flights(
 
 
 def _too_close(problem: PlanningProblem, uas: int, x: FloatArray) -> FloatArray:
-    """(C,) how far flights are too close to obstacles, moving ones and the fence, squared, summed.
+    """(C,) how far flights are too close to anything, or too low, squared and summed.
 
     Where a UAS is too close already, getting out sooner is better.
     """
     path = _dense(x[..., :3])
     cost = _squared(problem.fence.signed_distance(path) + problem.fence_margin_m)
+    cost += (too_low_m(problem, uas, x[..., :3]) ** 2).sum(axis=1)
     for (_, hull), clearance in zip(
         problem.obstacles, problem.obstacle_clearance_m[uas], strict=True
     ):

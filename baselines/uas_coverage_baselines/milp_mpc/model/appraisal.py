@@ -32,6 +32,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     Coverage,
     Dynamics,
     Geofence,
+    MinHeight,
     MovingObstacles,
     Obstacles,
 )
@@ -47,7 +48,7 @@ FloatArray = NDArray[np.float64]
 _MEASURED = frozenset(
     (
         *(Dynamics, Capabilities, Collision, Geofence, Obstacles, MovingObstacles),
-        *(CornerCutting, Coverage),
+        *(CornerCutting, Coverage, MinHeight),
     )
 )
 _TOLERANCE = 1e-4  # of a row, as of a distance when plans are verified

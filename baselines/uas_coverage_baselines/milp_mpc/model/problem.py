@@ -152,6 +152,9 @@ class PlanningProblem:
         home_m: (U, 3) where each UAS lands.
         dod_max: (U,) depth of discharge with which it lands at the latest.
         targets: (U) see `Target`.
+        min_height_m: least height above the ground outside of a UAS's landing zone, margin
+            included; 0: none.
+        landing_zone_m: its radius, around `home_m`.
         tours: (U) each UAS's own order, where it has one: it plans these waypoints only; empty
             where no UAS has one.
         dt_s: sampling time.
@@ -186,6 +189,8 @@ class PlanningProblem:
     targets: tuple[Target | None, ...]
     tours: tuple[TourSegment | None, ...] = ()
     dt_s: float = 1.0
+    min_height_m: float = 0.0
+    landing_zone_m: float = 0.0
     weights: Weights = field(default_factory=Weights)
     physical_sides: int = 8
     limit_sides: int = 16

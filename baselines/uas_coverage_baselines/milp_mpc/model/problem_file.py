@@ -35,7 +35,10 @@ _ARRAYS = (
     "home_m",
     "dod_max",
 )
-_NUMBERS = ("horizon", "dt_s", "fence_margin_m", "n_scenario_waypoints")
+_NUMBERS = (
+    *("horizon", "dt_s", "fence_margin_m", "min_height_m", "landing_zone_m"),
+    "n_scenario_waypoints",
+)
 _OF_A_TOUR = ("aims_m", "radius_m", "onward_s")
 _SIDES = ("physical_sides", "limit_sides", "obstacle_sides", "waypoint_sides")
 

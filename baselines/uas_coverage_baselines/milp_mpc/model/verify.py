@@ -11,6 +11,7 @@ from itertools import chain, combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.geometry import closed_cylinder_faces, cylinder_clearance, segment_clearance
 
@@ -40,13 +41,15 @@ def first_trouble(problem: PlanningProblem, plan: Plan) -> str | None:
 
 
 def _trouble_alone(problem: PlanningProblem, row: int, path: FloatArray) -> str | None:
-    """Where a UAS begins, the fence, the obstacles and what moves."""
+    """Where a UAS begins, the fence, the least height, the obstacles and what moves."""
     name = problem.names[row]
     if np.abs(path[0] - problem.x0[row, :3]).max() > _START_M:
         return f"{name} is not where its plan begins"
     outside = (problem.fence.signed_distance(path[1:]) + problem.fence_margin_m).max()
     if outside > _TOLERANCE_M:
         return f"{name} leaves the fence's margin by {outside:.3g} m"
+    if problem.min_height_m and (low := too_low_m(problem, row, path).max()) > _TOLERANCE_M:
+        return f"{name} is {low:.3g} m below the least height"
     clearances = problem.obstacle_clearance_m[row] - _TOLERANCE_M
     # an obstacle one of whose faces separates the whole path needs no look at the segments
     near = np.flatnonzero(problem.hulls.apart_m(path) < clearances)

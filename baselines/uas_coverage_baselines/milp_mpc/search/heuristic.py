@@ -43,6 +43,7 @@ _TOUR_DEPTH = 6
 _BRANCHES = (10, 5, 4, 3)
 _LEADS_S = (1.0, 2.0)  # how far ahead of itself the UAS aims; which is better depends on the turn
 _ROOF_LOOKAHEAD = 4
+_SPARE_HEIGHT_M, _SOON_S = 0.3, 2.5
 
 
 def construct(
@@ -176,6 +177,10 @@ class _KeepOut(NamedTuple):
     """(O+1,) the one after its last."""
     clearance: FloatArray
     """(O+1,) [m]."""
+    min_height_m: float
+    home: FloatArray
+    """(3,) [m] around which it may be lower."""
+    zone_m: float
 
 
 def _keep_out(problem: PlanningProblem, uas: int) -> _KeepOut:
@@ -187,7 +192,8 @@ def _keep_out(problem: PlanningProblem, uas: int) -> _KeepOut:
     first = np.concatenate([last - counts, [last[-1] if len(last) else 0]]).astype(np.int64)
     last = np.concatenate([last, [len(offsets)]]).astype(np.int64)
     clearance = np.concatenate([problem.obstacle_clearance_m[uas], [problem.fence_margin_m]])
-    return _KeepOut(normals, offsets, first, last, clearance)
+    ground = problem.min_height_m, problem.home_m[uas], problem.landing_zone_m
+    return _KeepOut(normals, offsets, first, last, clearance, *ground)
 
 
 @allocating_kernel
@@ -219,7 +225,7 @@ def _aim_at(center, reach_m, faces, x, following):
 @allocating_kernel
 def _over_roofs(vehicle, x, down_mps, keep_out):
     """Climb instead where the way ahead leads into an obstacle."""
-    normals, offsets, first, last, clearance = keep_out
+    normals, offsets, first, last, clearance = keep_out[:5]
     for step in range(1, _ROOF_LOOKAHEAD + 1):
         north, east = x[X] + step * x[VX], x[Y] + step * x[VY]
         for o in range(len(first) - 1):
@@ -231,10 +237,27 @@ def _over_roofs(vehicle, x, down_mps, keep_out):
 
 
 @allocating_kernel
+def _above_ground(x, down_mps, keep_out):
+    """Sink no lower than the least height outside of the landing zone; climb where it is lower."""
+    if keep_out.min_height_m <= 0.0:
+        return down_mps
+    north = x[X] + _SOON_S * x[VX] - keep_out.home[0]
+    east = x[Y] + _SOON_S * x[VY] - keep_out.home[1]
+    if np.hypot(north, east) <= keep_out.zone_m:
+        return down_mps
+    spare_m = -x[Z] - keep_out.min_height_m - _SPARE_HEIGHT_M
+    return min(down_mps, (0.6 if spare_m > 0.0 else 2.0) * spare_m - 0.2 * x[VZ])
+
+
+@allocating_kernel
 def _depth_inside(x, keep_out):
-    """How far the position is inside keep-out zones or outside the fence [m]."""
-    normals, offsets, first, last, clearance = keep_out
+    """How far the position is inside keep-out zones, too low, or outside the fence [m]."""
+    normals, offsets, first, last, clearance = keep_out[:5]
     depth = 0.0
+    if keep_out.min_height_m > 0.0:
+        away_m = np.hypot(x[X] - keep_out.home[0], x[Y] - keep_out.home[1])
+        if away_m > keep_out.zone_m:
+            depth += max(keep_out.min_height_m + x[Z], 0.0)
     fence = len(first) - 1
     for o in range(fence):
         d = signed_distance(normals, offsets, first[o], last[o], x[X], x[Y], x[Z])
@@ -298,7 +321,7 @@ def _fly_all(
             length = np.hypot(ex, ey) + 1e-9
             if w < 0 and has_target:
                 speed = min(speed, 0.3 * away)
-            down = 0.6 * (aim[2] - x[Z]) - 0.2 * x[VZ]
+            down = _above_ground(x, 0.6 * (aim[2] - x[Z]) - 0.2 * x[VZ], keep_out)
             down = min(max(down, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
             down = _over_roofs(vehicle, x, down, keep_out)
             velocity_climb_wrench(

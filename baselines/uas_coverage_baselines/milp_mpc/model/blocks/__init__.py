@@ -7,6 +7,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.corner_cutting import CornerCu
 from uas_coverage_baselines.milp_mpc.model.blocks.coverage import Coverage, coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.dynamics import Dynamics
 from uas_coverage_baselines.milp_mpc.model.blocks.geofence import Geofence
+from uas_coverage_baselines.milp_mpc.model.blocks.min_height import MinHeight
 from uas_coverage_baselines.milp_mpc.model.blocks.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.milp_mpc.model.blocks.obstacles import Obstacles
 from uas_coverage_baselines.milp_mpc.model.blocks.slack import Slack
@@ -21,6 +22,7 @@ __all__ = [
     "Coverage",
     "Dynamics",
     "Geofence",
+    "MinHeight",
     "MovingObstacles",
     "Obstacles",
     "Slack",
