@@ -45,7 +45,7 @@ class PaperOptions(ModeOptions):
     """Options of `milp-mpc-paper`: Table I, and where the paper is silent what is closest to it."""
 
     formulation: str = Field(
-        default="lift",
+        default="clique",
         description="how the rows are written, all with the same optimum: "
         + ", ".join(FORMULATIONS),
     )
@@ -172,9 +172,7 @@ class MilpMpcPaper:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what the first decision compiles, without solving it."""
-        rehearsal = type(self)(self.options)
-        rehearsal.reset(brief, 0)
-        rehearsal.problem(first_sight(brief))
+        ModeProblems(brief, self.options).problem(first_sight(brief), None)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
@@ -193,7 +191,7 @@ class MilpMpcPaper:
         """One step of Algorithm 1: solve the OCP and fly its first input."""
         if not swarm.active:
             return {}
-        found = self._solved(self.problem(swarm), swarm.step)
+        found = self.solved(self.problem(swarm), swarm.step)
         reason = found if isinstance(found, Reason) else None
         plan = self.plan if isinstance(found, Reason) else found
         if plan is None or not set(swarm.active) <= set(plan.names):
@@ -207,8 +205,13 @@ class MilpMpcPaper:
         self.last_decision = Decision(paths, reason is not None, gap, reason)
         return first_inputs(plan, swarm, self.mode)
 
-    def _solved(self, problem: PlanningProblem, step: int) -> Plan | Reason:
-        """The OCP's solution; or why there is none."""
+    def solved(self, problem: PlanningProblem, step: int) -> Plan | Reason:
+        """The OCP's solution; or why there is none. Leaves `last_program`.
+
+        Args:
+            problem: the decision.
+            step: the sample it is made at.
+        """
         began, busy = time.perf_counter(), time.process_time()
         program = RestrictedMilp(problem, self.blocks, first=self.options.formulation)
         written, built = time.perf_counter(), program.built
