@@ -175,8 +175,8 @@ def main(
     ]
     flight.save(out / "flight", overwrite=True)
     with (out / "steps.csv").open("w", newline="", encoding="utf-8") as file:
-        heads = [*(one.name for one in fields(SolvedProgram)), "open", "modes", "gap"]
-        writer = csv.DictWriter(file, heads)
+        heads = [one.name for one in fields(SolvedProgram)]
+        writer = csv.DictWriter(file, [*heads, "open", "modes", "gap"])
         writer.writeheader()
         writer.writerows(rows)
     text = f"{summary_of(flight, rows)}\n\n{table_of(rows)}\n"
