@@ -3,6 +3,7 @@
     python benchmarks/planner.py                                  all parts, with short defaults
     python benchmarks/planner.py formulations --which all --cap 60 --plot gaps.png
     python benchmarks/planner.py restricted
+    python benchmarks/planner.py joint
     python benchmarks/planner.py closed-loop --planner milp-mpc --steps 400
     python benchmarks/planner.py growth --waypoints 49,100,200,500,1000 --uas 2,4,8,16,32
     python benchmarks/planner.py states                           writes village_decisions.json anew
@@ -24,10 +25,11 @@ from solver_watch import Watched, watch
 from uas_coverage_baselines.milp_mpc import MilpMpc
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
-from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, Formulation
 from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
+from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.search.trajectories import teams
@@ -215,6 +217,39 @@ def restricted(
             *(f"{1e3 * np.mean(seconds):.1f}" for seconds in (build_s, solve_s)),
             f"{np.mean(np.array(objectives)[found]):.3f}",
         )
+    console.print(table)
+
+
+@app.command()
+def joint(
+    which: Annotated[str, typer.Option(help="Forms, comma-separated.")] = "state,clique,lift",
+) -> None:
+    """What the root of the joint program adds to the team of plans that a decision begins with."""
+    names = which.split(",")
+    table = Table(
+        *("sample", "J of the team", "s"),
+        *(head for name in names for head in (f"J, {name}", "gap", "s more")),
+        title="Deterministic decisions on the stored states; processor time",
+    )
+    for step, problem in read_problems(DECISIONS).items():
+        problem = _reached(problem)
+        cells, alone_s = [f"{step}"], 0.0
+        for name in (None, *names):
+            effort = Effort(deterministic=True, threads=1, joint=name)
+            began = time.process_time()
+            plan = decide(replace(problem), None, problem.dt_s, effort)
+            took_s = time.process_time() - began
+            if not isinstance(plan, Plan):
+                cells += [plan, "", ""][: 2 if name is None else 3]
+                continue
+            cells.append(f"{plan.objective:.2f}")
+            if name is None:
+                alone_s = took_s
+            else:
+                gap = plan.relative_gap()
+                cells.append("none" if gap is None else _share(gap))
+            cells.append(f"{took_s - (0.0 if name is None else alone_s):.2f}")
+        table.add_row(*cells)
     console.print(table)
 
 

@@ -134,7 +134,7 @@ def test_every_name_of_the_paper_map_stands_where_it_says():
         if line.startswith("|") and "`" in line
     ]
     assert len(rows) > 30
-    for what, _, names, places in rows:
+    for what, _, _, names, places, _ in rows:
         words = set()
         for place in re.findall(r"`([^`]*)`", places):
             path = place.replace("milp_mpc/", "baselines/uas_coverage_baselines/milp_mpc/")
@@ -142,6 +142,21 @@ def test_every_name_of_the_paper_map_stands_where_it_says():
             words |= set(re.findall(r"\w+", (ROOT / path).read_text(encoding="utf-8")))
         missing = set(re.findall(r"`(\w+)`", names)) - words
         assert not missing, f"{what}: {missing} not in {places}"
+
+
+def test_every_row_of_the_paper_map_has_a_verdict_and_a_test_that_exists():
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in (DOCS / "paper_map.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("|") and not line.startswith(("| paper |", "|---"))
+    ]
+    assert {row[2] for row in rows} == {"faithful", "ours", "missing"}
+    for what, _, verdict, names, _, proof in rows:
+        if verdict == "missing":
+            assert not names, what
+            continue
+        file, _, test = proof.strip("`").partition("::")
+        assert f"def {test}(" in (ROOT / "tests" / file).read_text(encoding="utf-8"), what
 
 
 def test_the_columns_of_a_flight_are_described_in_their_order():

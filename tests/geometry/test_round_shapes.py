@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from uas_coverage_env.geometry import (
     closed_cylinder_faces,
     cylinder_faces,
-    faces_for_slack_variables,
     inner_factor,
     sphere_faces,
 )
@@ -80,31 +79,6 @@ def test_the_inner_approximation_lies_in_the_round_shape(H, x, y, z):
 def test_the_inner_polygon_touches_the_circle_at_its_corners(H):
     corner = np.array([math.cos(math.pi / H), math.sin(math.pi / H), 0.0])
     assert (cylinder_faces(H) @ corner).max() == pytest.approx(inner_factor(H, 2))
-
-
-@EXAMPLES
-@given(st.sampled_from([4, 8, 12, 16]), COORDINATE, COORDINATE, COORDINATE)
-def test_slack_variables_need_only_the_first_octant(H, x, y, z):
-    """The remark: where a_s >= |a| and H is divisible by 4, fewer rows bound the same vectors."""
-    for faces in (cylinder_faces(H), closed_cylinder_faces(H), sphere_faces(H)):
-        kept = faces_for_slack_variables(faces)
-        assert len(kept) < len(faces)
-        assert (kept @ np.abs([x, y, z])).max() == pytest.approx(
-            (faces @ [x, y, z]).max(), abs=1e-9
-        )
-
-
-def test_the_number_of_rows_for_slack_variables():
-    assert len(faces_for_slack_variables(cylinder_faces(8))) == 3
-    assert len(faces_for_slack_variables(closed_cylinder_faces(8))) == 4
-    # 3 azimuths at β = π/4 and π/2, and straight down
-    assert len(faces_for_slack_variables(sphere_faces(8))) == 7
-
-
-def test_rows_that_are_not_mirrored_in_the_axes_are_refused_for_slack_variables():
-    turned = cylinder_faces(4) @ np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
-    with pytest.raises(ValueError, match="mirrored in the axes"):
-        faces_for_slack_variables(turned)
 
 
 @pytest.mark.parametrize("H", [5, 2, 0, -4, 4.0, True, "8"])

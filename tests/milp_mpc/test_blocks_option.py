@@ -123,7 +123,6 @@ def test_the_weights_are_options_and_what_is_not_given_stays():
     planner = load_planner("milp-mpc", {"weight_energy": "0.5", "weight_return_home": "4"})
     assert isinstance(planner, MilpMpc)
     assert planner.options.weights == Weights(energy=0.5, return_home=4.0)
-    assert planner._weights == planner.options.weights
 
 
 @pytest.mark.parametrize("given", ["weight_lift=-1", "weight_lift=nan", "weight_lift=much"])

@@ -23,6 +23,7 @@ from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 from uas_coverage_env.geometry import sphere_faces
 
 BY_NODES = Effort(deterministic=True, teams=4)
+BY_TEAM = dataclasses.replace(BY_NODES, joint=None)
 WITH_TIME = Effort(time_limit_s=60.0, teams=4)  # all of it is needed only on a very busy machine
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
 
@@ -100,6 +101,45 @@ def test_no_decision_is_better_than_the_best_one_and_no_bound_above_it(problem, 
     assert first_trouble(problem, with_time) is None
 
 
+def test_a_deterministic_decision_has_the_bound_of_the_joint_program(problem, by_nodes, best):
+    assert np.isfinite(by_nodes.bound)
+    assert by_nodes.bound <= best.objective + 1e-3
+    without = planned(decide(problem, None, 1.0, BY_TEAM))
+    assert without.relative_gap() is None
+    assert by_nodes.objective <= without.objective + 1e-6
+
+
+def test_no_gap_is_told_where_the_joint_program_was_not_solved(problem, monkeypatch):
+    waiting = dataclasses.replace(BY_NODES, at_once=1)
+    assert planned(decide(problem, None, 1.0, waiting)).relative_gap() is None
+    monkeypatch.setattr(team_search, "_JOINT_WHOLE", 10)
+    assert planned(decide(problem, None, 1.0, BY_NODES)).relative_gap() is None
+
+
+def test_the_joint_program_is_written_in_the_tightest_form(problem, monkeypatch):
+    first = []
+
+    class Noted(RestrictedMilp):
+        def __init__(self, problem, blocks, **form):
+            super().__init__(problem, blocks, **form)
+            first.append((problem.n_uas, form.get("first")))
+
+    monkeypatch.setattr(team_search, "RestrictedMilp", Noted)
+    decide(problem, None, 1.0, BY_NODES)
+    assert first == [(1, None), (1, None), (2, "clique")]
+
+
+def test_a_share_of_the_time_is_the_joint_programs_once_each_uas_has_a_plan(problem, by_nodes):
+    search = team_search.TeamSearch(problem, WITH_TIME, time.perf_counter())
+    search.formulate(range(2))
+    alone = {key: getattr(by_nodes, key)[:1] for key in ("x", "u", "covers")}
+    search.collect(0, [dataclasses.replace(by_nodes, names=by_nodes.names[:1], **alone)])
+    assert not search.joint_is_due(0), "there is time enough"
+    search._began -= 0.6 * WITH_TIME.time_limit_s
+    assert search.joint_is_due(0)
+    assert not search.joint_is_due(1), "it has no plan yet"
+
+
 def test_one_uas_with_time_gets_its_best_plan():
     problem = two_around_a_tower(n_uas=1)
     plan = planned(decide(problem, None, 1.0, WITH_TIME))
@@ -162,7 +202,7 @@ def nothing_for_b(monkeypatch):
 
 
 def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
-    plan = planned(decide(problem, None, 1.0, BY_NODES))
+    plan = planned(decide(problem, None, 1.0, BY_TEAM))
     assert first_trouble(problem, plan) is None
     assert plan.covers[0].any()
     assert not plan.covers[1].any()
@@ -172,7 +212,7 @@ def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
 
 def test_who_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes, nothing_for_b):
     out = backup_trajectory(problem, by_nodes, 1.0)
-    plan = planned(decide(problem, None, 1.0, BY_NODES, backup=out))
+    plan = planned(decide(problem, None, 1.0, BY_TEAM, backup=out))
     assert plan.x[1] == pytest.approx(out.x[1, :8])
     assert first_trouble(problem, plan) is None
 

@@ -271,6 +271,9 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         physical_sides=12,
         obstacle_sides=6,
         limit_sides=12,
+        outer_limits=True,
+        order=3,
+        corners_of_all=False,
         prune=False,
     )
     for one in fields(problem):

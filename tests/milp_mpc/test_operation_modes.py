@@ -240,6 +240,40 @@ def test_near_home_flying_on_to_cover_costs_no_more_than_farther_out():
     assert at_50.weight == at_100.weight
 
 
+def test_near_home_the_distance_alone_normalises_where_the_paper_has_it_so():
+    at_50, at_100 = (
+        target_of(
+            *(ModeMemory(RETURN), situation((north, 0.0, -1.0), plans_coverage=True)),
+            *(np.array((100.0, 0.0, -1.0)), WAYPOINTS, 600.0, 60.0, 0.0, Weights()),
+        )
+        for north in (50.0, 0.0)
+    )
+    assert at_50.weight * 50.0 == pytest.approx(at_100.weight * 100.0)
+
+
+def test_a_metre_from_home_weighs_at_most_what_is_said():
+    for most in (0.1, 0.5):
+        made = target_of(
+            *(ModeMemory(RETURN), situation((97.0, 0.0, -1.0), covered=EVERYTHING)),
+            *(np.array((100.0, 0.0, -1.0)), WAYPOINTS, 600.0, 60.0, 0.0),
+            Weights(home_per_m_max=most),
+        )
+        assert made.weight == most
+
+
+def test_the_costs_of_a_target_are_normalised_among_the_candidates_where_that_is_asked_for():
+    # the second is nearer and higher; a third one is so high that beside it height says little
+    places = np.array([(50.0, 0.0, -10.0), (40.0, 0.0, -36.0), (60.0, 0.0, -110.0)])
+    now = situation((0.0, 0.0, -10.0), n_waypoints=3)
+    chosen = [
+        best_fitting_waypoint(now, places, (), TargetChoice(1.0, 0.3, 0.3, among_candidates=among))
+        for among in (False, True)
+    ]
+    assert 0.5 < 0.4 + 0.3 * 26.0 / 40.0
+    assert 50.0 / 60.0 > 40.0 / 60.0 + 0.3 * 26.0 / 100.0
+    assert chosen == [0, 1]
+
+
 def test_modes_have_the_names_of_the_flight_record():
     assert [mode.label for mode in Mode] == ["covering", "transit", "return", "return"]
     assert [int(mode) for mode in Mode] == [0, 1, 2, 3]

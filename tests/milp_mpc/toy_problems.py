@@ -75,7 +75,7 @@ def toy(
         names=tuple("abcdef"[:U]),
         vehicles=vehicles,
         models=tuple(
-            linear_model(vehicle, float(x[DOD]), dt_s)
+            linear_model(vehicle, float(x[DOD]), dt_s, fields.get("order", 4))
             for vehicle, x in zip(vehicles, states, strict=True)
         ),
         x0=np.array(states),

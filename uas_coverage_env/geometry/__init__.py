@@ -4,7 +4,6 @@ from uas_coverage_env.geometry.polytope import ConvexPolytope, corners_of
 from uas_coverage_env.geometry.round_shapes import (
     closed_cylinder_faces,
     cylinder_faces,
-    faces_for_slack_variables,
     inner_factor,
     sphere_faces,
 )
@@ -24,7 +23,6 @@ __all__ = [
     "cylinder_clearance",
     "cylinder_faces",
     "cylinder_gap",
-    "faces_for_slack_variables",
     "inner_factor",
     "outside_cylinder",
     "segment_clearance",

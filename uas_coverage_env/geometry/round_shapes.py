@@ -65,28 +65,6 @@ def inner_factor(H: int, dimensions: int) -> float:
     return float(np.cos(np.pi / _checked(H)) ** (dimensions - 1))
 
 
-def faces_for_slack_variables(faces: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rows that bound a vector of slack variables a_s ≥ |a| (the remark of Sec. III-B.3).
-
-    The paper asks for H divisible by 4; what counts is that the rows are mirrored in the axes,
-    which those of this module are for every even H.
-
-    Args:
-        faces: (F, 3) rows of a round shape.
-
-    Returns:
-        The rows with α, β in [0, π/2], in their order.
-
-    Raises:
-        ValueError: The rows are not mirrored in the axes.
-    """
-    kept = faces[(faces >= 0).all(axis=1)]
-    distance = np.abs(np.abs(faces)[:, None, :] - kept[None, :, :]).max(axis=2)
-    if not (distance.min(axis=1, initial=np.inf) < 1e-12).all():
-        raise ValueError("the rows are not mirrored in the axes; take those of a round shape")
-    return kept
-
-
 def _checked(H: int) -> int:
     if isinstance(H, bool) or not isinstance(H, int | np.integer) or H < 4 or H % 2:
         raise ValueError(f"H is {H!r}; the number of sides should be even and at least 4")

@@ -1,22 +1,25 @@
-"""The paper's MILP-MPC (Gasche et al., Sec. III), and ours that follows a global order."""
+"""The MILP-MPC of Gasche et al., Sec. III, as it is and in real time; and ours with an order."""
 
 from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
-from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block, Priced, formulate
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, PAPER_OCP, Block, Priced, formulate
 from uas_coverage_baselines.milp_mpc.model.problem import (
     PlanningProblem,
     Trajectories,
     Variables,
     Weights,
 )
+from uas_coverage_baselines.milp_mpc.paper_planner import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc
 
 __all__ = [
     "OCP",
+    "PAPER_OCP",
     "Block",
     "Milp",
     "MilpMpc",
     "MilpMpcGuided",
+    "MilpMpcPaper",
     "PlanningProblem",
     "Priced",
     "Trajectories",

@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 
 FloatArray = NDArray[np.float64]
-# distance counts at samples only: were it dearer than lift, a UAS would bob through its home
-# once a step instead of coming to rest
-_PER_METRE_MAX = 0.1
 _NEAR_M = 5.0  # distances below this no longer raise the normalised target cost
 
 
@@ -91,6 +88,8 @@ class TargetChoice:
         horizontal: per `distance_scale_m` of horizontal distance.
         vertical: per `height_scale_m` of vertical distance.
         heading: for a turn by 180 degrees.
+        among_candidates: whether each term is normalised by its largest value among the
+            candidates, and not by the two scales.
     """
 
     horizontal: float = 1.0
@@ -98,6 +97,7 @@ class TargetChoice:
     heading: float = 0.3
     distance_scale_m: float = 100.0
     height_scale_m: float = 40.0
+    among_candidates: bool = False
 
 
 def best_fitting_waypoint(
@@ -126,10 +126,14 @@ def best_fitting_waypoint(
     speed = float(np.hypot(*now.velocity_mps[:2]))
     cosine = away[:, :2] @ now.velocity_mps[:2] / np.maximum(distance * speed, 1e-9)
     turn = 0.5 * (1.0 - cosine) if speed > 0.5 else np.zeros(len(candidates))
+    height = np.abs(away[:, 2])
+    scales = choice.distance_scale_m, choice.height_scale_m, 1.0
+    if choice.among_candidates:
+        scales = tuple(max(float(term.max()), 1e-9) for term in (distance, height, turn))
     cost = (
-        choice.horizontal * distance / choice.distance_scale_m
-        + choice.vertical * np.abs(away[:, 2]) / choice.height_scale_m
-        + choice.heading * turn
+        choice.horizontal * distance / scales[0]
+        + choice.vertical * height / scales[1]
+        + choice.heading * turn / scales[2]
     )
     return int(candidates[int(np.argmin(cost))])
 
@@ -179,7 +183,7 @@ def target_of(
     waypoints_m: FloatArray,
     seconds_left: float,
     seconds_home: float,
-    horizon_m: float,
+    alike_m: float,
     weights: Weights,
 ) -> Target | None:
     """The target distance dynamics of one UAS (eq. (OCP_7)), None in covering mode.
@@ -198,7 +202,7 @@ def target_of(
         waypoints_m: (K, 3).
         seconds_left: flight time until DoD_max.
         seconds_home: flight time home.
-        horizon_m: how far a UAS cruises within the horizon.
+        alike_m: distances from home up to this one count alike while a UAS covers on its way.
         weights: cost coefficients.
     """
     if memory.mode is Mode.TRANSIT and memory.waypoint is not None:
@@ -206,12 +210,10 @@ def target_of(
         distance = max(float(np.linalg.norm(position - now.position_m)), _NEAR_M)
         return Target(position, weights.transit / distance, memory.waypoint)
     if memory.mode is Mode.RETURN:
-        # near home the normalised cost of flying away would outweigh all coverage: while there is
-        # something to cover on the way, distances within the horizon count alike
-        nearest = horizon_m if now.plans_coverage and now.uncovered.any() else _NEAR_M
+        nearest = max(alike_m, _NEAR_M) if now.plans_coverage and now.uncovered.any() else _NEAR_M
         distance = max(float(np.linalg.norm(home_m - now.position_m)), nearest)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
         growth = urgency / (1.0 - urgency) if now.uncovered.any() else 4.0
-        weight = min(weights.return_home * growth / distance, _PER_METRE_MAX)
+        weight = min(weights.return_home * growth / distance, weights.home_per_m_max)
         return Target(home_m, weight)
     return None

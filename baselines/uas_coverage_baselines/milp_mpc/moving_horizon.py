@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Generic, Self, TypeVar
 
+from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -20,8 +21,7 @@ from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
-from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, Wrench
+from uas_coverage_env.world import Command, Mode, SwarmState
 
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
 
@@ -112,7 +112,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
         self.last_decision = Decision(paths, reason is not None, gap, reason)
-        return {name: self._command(plan, name) for name in swarm.active}
+        return first_inputs(plan, swarm, self._announced)
 
     def _effort(self) -> Effort:
         return Effort(
@@ -124,22 +124,12 @@ class MovingHorizon(ABC, Generic[Chosen]):
             solver=self.options.solver,
         )
 
-    def _command(self, plan: Plan, name: str) -> Wrench:
-        wrench = plan.u[plan.of(name), 0]
-        return Wrench(
-            float(wrench[LIFT]),
-            float(wrench[TAU_X]),
-            float(wrench[TAU_Y]),
-            float(wrench[TAU_Z]),
-            mode="return" if name in self._returning_home else self.mode(name),
-        )
+    def _announced(self, name: str) -> Mode:
+        return "return" if name in self._returning_home else self.mode(name)
 
     def _hover(self, swarm: SwarmState, reason: Reason | None) -> dict[str, Command]:
         """Brake and hold with the vehicle's inner loop: there is neither plan nor backup."""
         self.plan = self._backup = None
-        here = {name: swarm.x[swarm.names.index(name), 0:3] for name in swarm.active}
-        paths = {name: position[None] for name, position in here.items()}
+        paths = {name: swarm.x[[swarm.names.index(name)], 0:3] for name in swarm.active}
         self.last_decision = Decision(paths, fallback=True, reason=reason)
-        return {
-            name: Velocity(0.0, 0.0, -float(p[2]), mode=self.mode(name)) for name, p in here.items()
-        }
+        return hovering(swarm, self.mode)

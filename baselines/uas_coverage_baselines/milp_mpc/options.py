@@ -1,5 +1,6 @@
 """Options that every MILP-MPC takes."""
 
+from copy import copy
 from dataclasses import fields
 from typing import Annotated, Any, Literal
 
@@ -16,6 +17,13 @@ def weight(default: float, what: str) -> Any:
     return Field(default=default, ge=0.0, le=1000.0, description=f"weight {what}")
 
 
+def with_default(model: type[PlannerOptions], name: str, default: Any) -> Any:
+    """An option of a model with another default, for a model that derives from it."""
+    field = copy(model.model_fields[name])
+    field.default = default
+    return field
+
+
 def _split(text: Any) -> Any:
     """A list of names as it is typed: A,B; nothing, or none, is no name."""
     if not isinstance(text, str):
@@ -24,26 +32,11 @@ def _split(text: Any) -> Any:
     return tuple(name for name in names if name not in ("", "none"))
 
 
-class MovingHorizonOptions(PlannerOptions):
-    """What every MILP-MPC takes; the defaults are the paper's table and our tuning."""
+class OcpOptions(PlannerOptions):
+    """What the OCP of every MILP-MPC takes; the defaults are the paper's table and our tuning."""
 
-    time_limit_s: float = Field(
-        default=1.0, gt=0.0, le=3600.0, description="wall clock per decision"
-    )
-    threads: int = Field(default=2, ge=1, le=64, description="programs solved side by side")
-    horizon: int = Field(default=18, ge=8, le=60, description="N, steps of the prediction")
     solver: Literal["highs", "scip", "gurobi"] = Field(default="highs", description="MILP solver")
-    deterministic: bool = Field(
-        default=False,
-        description="limit work by nodes, not by the clock: the same seed flies the same",
-    )
-    limit_sides: int = Field(
-        default=16,
-        ge=4,
-        le=64,
-        multiple_of=4,
-        description="H_P of the polygons inside the limits of speed, tilt and tilt rate",
-    )
+    horizon: int = Field(default=18, ge=8, le=60, description="N, steps of the prediction")
     obstacle_sides: int = Field(default=8, ge=4, le=32, multiple_of=2, description="H_O")
     waypoint_sides: int = Field(default=4, ge=4, le=16, multiple_of=4, description="H_WP")
     margin_m: float = Field(
@@ -57,15 +50,6 @@ class MovingHorizonOptions(PlannerOptions):
         ge=0.0,
         le=50.0,
         description="added for a moving obstacle's next change of velocity",
-    )
-    teams: int = Field(
-        default=6, ge=1, le=20, description="constructed teams whose flights are refined"
-    )
-    at_once: int = Field(
-        default=64,
-        ge=1,
-        le=64,
-        description="UAS planned anew in a decision, at most; the others go on with their plans",
     )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),
@@ -96,3 +80,78 @@ class MovingHorizonOptions(PlannerOptions):
         for name in names:
             block_named(name)
         return names
+
+    @property
+    def form(self) -> dict[str, Any]:
+        """How the OCP is approximated: fields of `PlanningProblem`; others have their default."""
+        return {"obstacle_sides": self.obstacle_sides, "waypoint_sides": self.waypoint_sides}
+
+
+class MovingHorizonOptions(OcpOptions):
+    """What a MILP-MPC in real time takes."""
+
+    time_limit_s: float = Field(
+        default=1.0, gt=0.0, le=3600.0, description="wall clock per decision"
+    )
+    threads: int = Field(default=2, ge=1, le=64, description="programs solved side by side")
+    deterministic: bool = Field(
+        default=False,
+        description="limit work by nodes, not by the clock: the same seed flies the same",
+    )
+    limit_sides: int = Field(
+        default=16,
+        ge=4,
+        le=64,
+        multiple_of=4,
+        description="H_P of the polygons inside the limits of speed, tilt and tilt rate",
+    )
+    teams: int = Field(
+        default=6, ge=1, le=20, description="constructed teams whose flights are refined"
+    )
+    at_once: int = Field(
+        default=64,
+        ge=1,
+        le=64,
+        description="UAS planned anew in a decision, at most; the others go on with their plans",
+    )
+
+    @property
+    def form(self) -> dict[str, Any]:
+        """How the OCP is approximated."""
+        return super().form | {"limit_sides": self.limit_sides}
+
+
+class ModeOptions(OcpOptions):
+    """What a MILP-MPC takes whose targets are chosen by operation modes, as the paper's are."""
+
+    priority_per_s: float = Field(
+        default=0.15,
+        ge=0.0,
+        le=10.0,
+        description="added to a waypoint's weight per second its coverage takes off the way left",
+    )
+    return_rule: Literal["fence", "vehicle"] = Field(
+        default="fence",
+        description="D_r,max: by the distance to the fence, or the vehicle file's return_rule",
+    )
+    return_detour: float = Field(
+        default=2.5,
+        ge=1.0,
+        le=20.0,
+        description="D_r,max over the distance from home to the fence's far corner (rule fence)",
+    )
+    target_scale: Literal["fixed", "candidates"] = Field(
+        default="fixed",
+        description="what normalises a transit target's costs: 100 m, 40 m and half a turn, or "
+        "the largest among the candidates",
+    )
+    return_scale: Literal["horizon", "distance"] = Field(
+        default="horizon",
+        description="what normalises the way home: the distance, or while something is covered "
+        "on the way at least what is flown in N steps",
+    )
+    weight_transit: float = weight(Weights.transit, "of the way to a transit target")
+    weight_return_home: float = weight(Weights.return_home, "of the way home")
+    weight_home_per_m_max: float = weight(
+        Weights.home_per_m_max, "that a metre from home has in a step, at most"
+    )

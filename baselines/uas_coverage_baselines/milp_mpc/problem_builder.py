@@ -18,7 +18,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     Target,
     Weights,
 )
-from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
+from uas_coverage_baselines.milp_mpc.options import OcpOptions
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.vehicle import DOD, VehicleParams, dod_per_s, linear_model, return_threshold
@@ -30,8 +30,8 @@ FloatArray = NDArray[np.float64]
 class ProblemBuilder:
     """What stays the same over a mission, and the view of it at one sample."""
 
-    def __init__(self, brief: MissionBrief, options: MovingHorizonOptions) -> None:
-        self.brief, self._options = brief, options
+    def __init__(self, brief: MissionBrief, options: OcpOptions) -> None:
+        self.brief, self._options, self._form = brief, options, options.form
         self._view = WorldView(brief)
         self.dt_s = brief.dt_s
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
@@ -50,12 +50,15 @@ class ProblemBuilder:
         """Parameters of a UAS's vehicle."""
         return self._vehicles[name]
 
-    def dod_return(self, name: str, detour: float) -> float:
+    def dod_return(self, name: str, detour: float | None) -> float:
         """DoD_r (Sec. III-C.6, return mode).
 
-        D_r,max, the overestimated way home, is `detour` times the way to the fence's far corner.
+        D_r,max, the overestimated way home, is `detour` times the way to the fence's far corner;
+        that of the vehicle file where None.
         """
         vehicle, uas = self._vehicles[name], self._uas[name]
+        if detour is None:
+            return return_threshold(vehicle, uas.dod_max)
         corners = self.brief.fence.vertices_m - self.home_m[name]
         farthest_m = float(np.linalg.norm(corners, axis=1).max())
         way_s = detour * farthest_m / vehicle.limits.v_cruise_mps
@@ -130,6 +133,7 @@ class ProblemBuilder:
         """What is seen now, about the given waypoints, which are the scenario's rows."""
         options, names = self._options, swarm.active
         margin_m, least_m = min(options.margin_m, 0.1), self.brief.min_height_m
+        order = self._form.get("order", PlanningProblem.order)
         obstacles = self._within_reach(swarm)
         rows = [swarm.names.index(name) for name in names]
         x0 = swarm.x[rows]
@@ -142,7 +146,7 @@ class ProblemBuilder:
             names=names,
             vehicles=vehicles,
             models=tuple(
-                linear_model(vehicle, float(x[DOD]), self.dt_s)
+                linear_model(vehicle, float(x[DOD]), self.dt_s, order)
                 for vehicle, x in zip(vehicles, x0, strict=True)
             ),
             x0=x0,
@@ -168,9 +172,7 @@ class ProblemBuilder:
             min_height_m=least_m + margin_m if least_m else 0.0,
             landing_zone_m=self.brief.landing_zone_m - margin_m,
             weights=weights,
-            limit_sides=options.limit_sides,
-            obstacle_sides=options.obstacle_sides,
-            waypoint_sides=options.waypoint_sides,
+            **self._form,
         )
 
     def _within_reach(self, swarm: SwarmState) -> list[int]:
@@ -178,6 +180,8 @@ class ProblemBuilder:
 
         By boxes: a UAS that flies straight at full speed all the time does not get to the others.
         """
+        if not self._form.get("prune", PlanningProblem.prune):
+            return list(range(len(self.brief.obstacles)))
         near_m = max(u.radius_m for u in self.brief.uas) + self._options.margin_m
         result = []
         rows = [swarm.names.index(name) for name in swarm.active]

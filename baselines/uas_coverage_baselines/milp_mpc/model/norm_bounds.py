@@ -1,6 +1,7 @@
 """Bounds of the norms in the OCP: speed, tilt and tilt rate, by polygons (eq. (const_Vec_ub)).
 
-The polygons lie inside the vehicle's limits, c_in = cos(pi / H), so that no plan exceeds them.
+The polygons lie inside the vehicle's limits, c_in = cos(pi / H), so that no plan exceeds them;
+around the limits, c_in = 1, where the paper's outer approximation is asked for.
 
 A UAS may begin outside of its polygons: what the inner loop flies (each fallback does) keeps the
 norms themselves, and the nonlinear plant does not end a step where the plan does. Then no plan
@@ -47,7 +48,13 @@ class NormBounds:
 
 
 def norm_bounds(
-    vehicle: VehicleParams, x0: FloatArray, horizon: int, dt_s: float, sides: int
+    vehicle: VehicleParams,
+    x0: FloatArray,
+    horizon: int,
+    dt_s: float,
+    sides: int,
+    *,
+    outer: bool = False,
 ) -> NormBounds:
     """The bounds over a horizon from a state.
 
@@ -57,13 +64,14 @@ def norm_bounds(
         horizon: N.
         dt_s: sampling time.
         sides: H, a multiple of 4.
+        outer: whether the polygons lie around the limits.
     """
-    faces, inner = cylinder_faces(sides)[:, :2], inner_factor(sides, 2)
+    faces, inner = cylinder_faces(sides)[:, :2], 1.0 if outer else inner_factor(sides, 2)
     limits = np.array([getattr(vehicle.limits, name) for *_, name in NORMS])
     pairs = [[first, second] for _, first, second, _ in NORMS]
     upper = np.broadcast_to(inner * limits[:, None, None], (len(NORMS), horizon, sides))
     if (faces @ x0[pairs].T <= inner * limits * (1.0 + _ROUNDING)).all():
-        return NormBounds(upper, np.ones(len(NORMS)))
+        return NormBounds(upper, np.full(len(NORMS), inner / inner_factor(sides, 2)))
     record = compile_vehicle(vehicle, dt_s)[()]
     speed_mps = max(float(np.hypot(x0[VX], x0[VY])), 1e-9)
     share = min(1.0, inner * limits[0] / speed_mps)
@@ -72,5 +80,5 @@ def norm_bounds(
         reached = np.array([states[:, pair] @ faces.T for pair in pairs])
         # free of rounding, so that the flight itself satisfies them
         upper = np.maximum(upper, reached * (1.0 + _ROUNDING))
-    grown = upper.max(axis=(1, 2)) / limits / inner
+    grown = upper.max(axis=(1, 2)) / limits / inner_factor(sides, 2)
     return NormBounds(upper, np.maximum(grown, 1.0))

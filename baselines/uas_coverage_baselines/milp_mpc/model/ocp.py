@@ -74,6 +74,10 @@ OCP: tuple[Block, ...] = (
 )
 
 
+PAPER_OCP = tuple(block for block in OCP if not isinstance(block, (TimeToGo, BatteryReserve)))
+"""The paper's own families: without the two that are ours."""
+
+
 class MakesVariables(Protocol):
     """How a formulation makes the columns that its blocks share."""
 

@@ -30,7 +30,9 @@ class Weights:
 
     The paper names what is penalised but publishes no figures; these are ours, in units of one
     waypoint of weight 1 left uncovered for one step. `climb`, on |v_z|, is not among the paper's:
-    without it heights are indifferent, and a plan may descend for nothing.
+    without it heights are indifferent, and a plan may descend for nothing. `home_per_m_max` bounds
+    what a metre from home costs in a step: distance counts at samples only, and were it dearer than
+    lift, a UAS would bob through its home once a step instead of coming to rest.
     """
 
     lift: float = 0.05
@@ -41,6 +43,7 @@ class Weights:
     climb: float = 0.0
     transit: float = 0.6
     return_home: float = 2.5
+    home_per_m_max: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -161,8 +164,12 @@ class PlanningProblem:
         weights: see `Weights`.
         physical_sides: H_P of what is no limit, a multiple of 4.
         limit_sides: H_P of the limits of speed, tilt and tilt rate, a multiple of 4.
+        outer_limits: whether these polygons lie around the limits (c_in = 1), not inside of them.
         obstacle_sides: H_O.
         waypoint_sides: H_WP.
+        order: N_dis, of the series in `models`.
+        corners_of_all: whether moving obstacles and pairs of UAS have corner cutting constraints,
+            too; fixed obstacles always have.
         prune: whether reachable sets drop what cannot matter; False keeps every row and column,
             with big M from the fence alone (the oracle of the tests).
     """
@@ -196,6 +203,9 @@ class PlanningProblem:
     limit_sides: int = 16
     obstacle_sides: int = 8
     waypoint_sides: int = 4
+    outer_limits: bool = False
+    order: int = 4
+    corners_of_all: bool = True
     prune: bool = True
 
     def __post_init__(self) -> None:
@@ -239,7 +249,9 @@ class PlanningProblem:
     def norm_bounds(self) -> tuple[NormBounds, ...]:
         """(U) the bounds of speed, tilt and tilt rate."""
         return tuple(
-            norm_bounds(vehicle, x, self.horizon, self.dt_s, self.limit_sides)
+            norm_bounds(
+                vehicle, x, self.horizon, self.dt_s, self.limit_sides, outer=self.outer_limits
+            )
             for vehicle, x in zip(self.vehicles, self.x0, strict=True)
         )
 

@@ -40,7 +40,10 @@ _NUMBERS = (
     "n_scenario_waypoints",
 )
 _OF_A_TOUR = ("aims_m", "radius_m", "onward_s")
-_SIDES = ("physical_sides", "limit_sides", "obstacle_sides", "waypoint_sides")
+_FORM = (
+    *("physical_sides", "limit_sides", "obstacle_sides", "waypoint_sides"),
+    *("outer_limits", "order", "corners_of_all", "prune"),
+)
 
 
 def write_problems(
@@ -89,7 +92,7 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
     return {
         "names": list(problem.names),
         "vehicles": [vehicle.name for vehicle in problem.vehicles],
-        **{name: getattr(problem, name) for name in (*_NUMBERS, *_SIDES)},
+        **{name: getattr(problem, name) for name in (*_NUMBERS, *_FORM)},
         **{name: getattr(problem, name).tolist() for name in _ARRAYS},
         "waypoint_index": problem.waypoint_index.tolist(),
         "moving": [
@@ -113,7 +116,6 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
         ],
         "tours": [None if tour is None else _tour(tour) for tour in problem.tours],
         "weights": asdict(problem.weights),
-        "prune": problem.prune,
     }
 
 
@@ -131,13 +133,13 @@ def _problem(
     vehicles = tuple(known[name] for name in row["vehicles"])
     fields: dict[str, Any] = {name: np.array(row[name], float) for name in _ARRAYS}
     fields["waypoints_m"] = fields["waypoints_m"].reshape(-1, 3)
-    # files from before the limits had sides of their own do not say how many
-    fields |= {name: row[name] for name in (*_NUMBERS, *_SIDES) if name in row}
+    # older files do not have all of these
+    fields |= {name: row[name] for name in (*_NUMBERS, *_FORM) if name in row}
     return PlanningProblem(
         names=tuple(row["names"]),
         vehicles=vehicles,
         models=tuple(
-            linear_model(vehicle, float(x[DOD]), row["dt_s"])
+            linear_model(vehicle, float(x[DOD]), row["dt_s"], row.get("order", 4))
             for vehicle, x in zip(vehicles, fields["x0"], strict=True)
         ),
         fence=fence,
@@ -161,7 +163,6 @@ def _problem(
         # files from before these were written: no tours, the default weights
         tours=tuple(None if tour is None else _read_tour(tour) for tour in row.get("tours", ())),
         weights=Weights(**row.get("weights", {})),
-        prune=row.get("prune", True),
         **fields,
     )
 

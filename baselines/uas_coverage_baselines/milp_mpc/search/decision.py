@@ -5,7 +5,8 @@ solved first, restricted to the neighbourhood of a trajectory: what is left of i
 and the constructed trajectories that make the best teams (programs of some hundredths of a second,
 solved side by side). A UAS without a plan then gets wider programs, and after these a plan that
 needs no solver (`fallback.plans`). The best team of the plans found is checked as a whole; then the
-whole OCP starts from it with the time that is left, for the bound and what it still finds.
+whole OCP starts from it with the time that is left, a share of which is kept for it, for the bound
+and what it still finds.
 """
 
 from __future__ import annotations

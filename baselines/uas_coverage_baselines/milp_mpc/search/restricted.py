@@ -24,7 +24,8 @@ from uas_coverage_baselines.milp_mpc.solvers import Solution
 
 FloatArray = NDArray[np.float64]
 _QUICKEST = "state"  # to write and to solve, where little is free
-_TIGHTEST = "clique"  # where times of visits are free
+TIGHTEST = "clique"
+"""Name of the form to take where times of visits are free."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class RestrictedMilp:
         blocks: of the OCP.
         formulation: how it is written, see `reductions`; all give the same optimum. Where None,
             what is quickest.
+        first: name of the form that is taken where the blocks allow it, see `write_smallest`.
     """
 
     def __init__(
@@ -73,10 +75,11 @@ class RestrictedMilp:
         blocks: Sequence[Block] = OCP,
         *,
         formulation: Formulation | None = None,
+        first: str | None = None,
     ) -> None:
         self.problem = problem
         if formulation is None:
-            first = _TIGHTEST if problem.tours else _QUICKEST
+            first = first or (TIGHTEST if problem.tours else _QUICKEST)
             formulation, self.milp, self.variables = write_smallest(problem, blocks, first)
         else:
             self.milp, self.variables = formulation.write(problem, blocks)

@@ -16,6 +16,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningP
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
 from uas_coverage_baselines.milp_mpc.search.restricted import (
     ALONG,
+    TIGHTEST,
     Neighbourhood,
     RestrictedMilp,
 )
@@ -49,6 +50,7 @@ class Effort:
         teams: how many constructed teams are refined.
         at_once: how many UAS are planned for, at most; the others go on with what they have.
         solver: one of `SOLVERS`.
+        joint: the form of the joint program; None where it is not to be solved.
     """
 
     time_limit_s: float = 1.0
@@ -57,6 +59,7 @@ class Effort:
     teams: int = 6
     at_once: int = 64
     solver: str = "highs"
+    joint: str | None = TIGHTEST
 
 
 _RESERVE = 0.15  # share of the time limit kept for verification and whatever is late
@@ -70,6 +73,9 @@ _PER_WRITING = 6.0  # a busy machine takes longer: what writing a program took s
 _TEAMS_VERIFIED = 6
 _RESTRICTED_NODES = 60
 _ALONE_NODES = 30
+_JOINT_NODES = 1  # the root: its bound and what comes of the start, in about a second
+_JOINT_WHOLE = 2000  # binaries: the root of a larger program takes many seconds
+_JOINT_SHARE = 0.3  # of the time limit, for the joint program once each UAS has a plan
 
 
 class TeamSearch:
@@ -132,6 +138,8 @@ class TeamSearch:
         self, uas: int, flight: Trajectory, neighbourhood: Neighbourhood, at_most_s: float = np.inf
     ) -> Plan | None:
         """Solve a UAS's own OCP restricted to what lies near a flight."""
+        if self.joint_is_due(uas):
+            return None
         if not self._has_time(_WORTH_STARTING_S):
             self._late = True
             return None
@@ -155,6 +163,15 @@ class TeamSearch:
             self._late |= unsolved and limits.time_s is not None
             return None
         return program.plan(solution)
+
+    def joint_is_due(self, uas: int) -> bool:
+        """Whether what is left of the time is the joint program's, and the UAS has a plan."""
+        everyone = len(self._own) == self.problem.n_uas > 1 and not self.problem.tours
+        if not everyone or self.effort.deterministic or self.effort.joint is None:
+            return False
+        if not self.has_plan(uas):
+            return False
+        return self.time_left_s() < _JOINT_SHARE * self.effort.time_limit_s
 
     def polished(
         self, uas: int, tasks: Sequence[tuple[int, Trajectory]], at_most_s: float
@@ -257,22 +274,31 @@ class TeamSearch:
     def improve(self) -> None:
         """The whole OCP from the best plan so far, with the time that is left.
 
-        For several UAS its work cannot be bounded by nodes (the root alone may take any time), so
-        that a deterministic decision goes without it, and without a bound.
+        In the tightest form, since its bound is what is asked for, and the only one that a plan
+        gets. A deterministic decision solves the root, of a program that is not too large; with
+        tours, that of one UAS only.
         """
         deterministic, alone = self.effort.deterministic, self.problem.n_uas == 1
-        if (deterministic and not alone) or len(self._own) < self.problem.n_uas:
+        if self.effort.joint is None or len(self._own) < self.problem.n_uas:
+            return
+        if deterministic and self.problem.tours and not alone:
             return
         # the whole program takes about as long to write as all own programs together
         if not self._has_time(_WORTHWHILE_S + (0.0 if alone else 1.5 * self._formulating_s)):
             return
-        program = self._own[0] if alone else RestrictedMilp(self.problem, self._blocks)
+        if alone and self.problem.tours:
+            program = self._own[0]
+        else:
+            program = RestrictedMilp(self.problem, self._blocks, first=self.effort.joint)
+        if deterministic and program.built.integer.sum() > _JOINT_WHOLE:
+            return
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
         limits = SolverLimits(time_s=max(self.time_left_s(), 0.01))
         if deterministic:
-            limits = SolverLimits(nodes=_ALONE_NODES, relative_gap=0.01, heuristics=False)
+            nodes = _ALONE_NODES if alone else _JOINT_NODES
+            limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
         solution = self._solved(program, limits, start)
         if solution is not None:
             self._bound = solution.bound

@@ -90,7 +90,7 @@ def _environment() -> Iterator[gurobipy.Env]:
 def _parameters(limits: SolverLimits, elapsed_s: float) -> dict[str, int | float]:
     parameters: dict[str, int | float] = {
         "Seed": 0,
-        "Threads": 1,
+        "Threads": limits.threads,
         "MIPGap": limits.relative_gap,
         "MIPGapAbs": limits.absolute_gap,
         "FeasibilityTol": SOLVER_TOLERANCE,

@@ -1,12 +1,13 @@
 """HiGHS: the one file that knows this solver. Models in parallel threads are safe.
 
-Every call made: Highs(), setOptionValue, passModel, setSolution, run (which frees the
-interpreter), getModelStatus, getInfo, getSolution.
+Every call made: Highs(), setOptionValue, passModel, setSolution, cbMipInterrupt, run (which frees
+the interpreter), getModelStatus, getInfo, getSolution.
 """
 
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import highspy
 import numpy as np
@@ -23,6 +24,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     confirmed,
 )
 
+_PATIENCE_S = 10.0  # a solve that may take longer can be ended by Ctrl-C
 _HEURISTICS = ("feasibility_jump", "rens", "rins", "root_reduced_cost")
 
 
@@ -48,7 +50,7 @@ def solve(
             raise SolverError("HiGHS refuses the program")
         if start is not None and free_integers.any():
             solver.setSolution(len(start[0]), start[0].astype(np.int32), start[1])
-        solver.run()
+        _run(solver, limits)
     except (RuntimeError, MemoryError) as error:  # what its C++ exceptions become
         raise SolverError(f"HiGHS: {error}") from error
     status, info = solver.getModelStatus(), solver.getInfo()
@@ -65,11 +67,32 @@ def solve(
     return confirmed(claim, milp, lower, upper, time.perf_counter() - began)
 
 
+def _run(solver: highspy.Highs, limits: SolverLimits) -> None:
+    """Search, in a thread of its own where that has several threads or may take long.
+
+    HiGHS starts its threads once per thread that calls it, and refuses another number later. The
+    calling thread cannot hear Ctrl-C as long as it is in HiGHS.
+    """
+    endless = limits.nodes is None and (limits.time_s is None or limits.time_s > _PATIENCE_S)
+    if limits.threads == 1 and not endless:
+        solver.run()
+        return
+    given_up = False
+    solver.cbMipInterrupt.subscribe(lambda event: event.interrupt(given_up))
+    with ThreadPoolExecutor(1) as apart:
+        running = apart.submit(solver.run)
+        try:
+            running.result()
+        except KeyboardInterrupt:
+            given_up = True
+            raise
+
+
 def _options(limits: SolverLimits) -> dict[str, bool | int | float | str]:
     options: dict[str, bool | int | float | str] = {
         "output_flag": False,
         "random_seed": 0,
-        "threads": 1,  # global to the process in HiGHS; programs are solved side by side instead
+        "threads": limits.threads,
         "mip_rel_gap": limits.relative_gap,
         "mip_abs_gap": limits.absolute_gap,
         "primal_feasibility_tolerance": SOLVER_TOLERANCE,

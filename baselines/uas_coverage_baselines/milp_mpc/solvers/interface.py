@@ -46,12 +46,13 @@ class SolverLimits:
 
     Attributes:
         time_s: wall clock; None for none.
-        nodes: branch-and-bound nodes after the root; None for none. Solvers run on one thread, so
-            that a node limit alone makes the solve repeatable bit by bit.
+        nodes: branch-and-bound nodes after the root; None for none. On one thread a node limit
+            alone makes the solve repeatable bit by bit.
         relative_gap: stop once the gap is proven to be at most this.
         absolute_gap: likewise, in units of the objective.
         heuristics: whether the solver may search with sub-programs; on small programs they take
             longer than the search itself.
+        threads: of the solver itself.
     """
 
     time_s: float | None = None
@@ -59,6 +60,7 @@ class SolverLimits:
     relative_gap: float = 1e-3
     absolute_gap: float = 1e-2
     heuristics: bool = True
+    threads: int = 1
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ class Solve(Protocol):
             `TOLERANCE`.
 
         Raises:
-            InputError: the solver's licence does not allow this program; one line.
+            InputError: the solver's licence does not allow this program, or it has one thread
+                only; one line.
             SolverError: the solver raised something of its own.
         """
         ...
@@ -152,6 +155,6 @@ def confirmed(
         outcome = SolveStatus.INFEASIBLE if claim.infeasible else SolveStatus.NO_SOLUTION
         return Solution(outcome, None, np.inf, claim.bound, violation, wall_time_s)
     outcome = SolveStatus.OPTIMAL if claim.optimal else SolveStatus.FEASIBLE
-    objective = milp.objective(values)
-    bound = min(claim.bound, objective)
+    objective = float(milp.objective(values))
+    bound = min(float(claim.bound), objective)
     return Solution(outcome, values, objective, bound, violation, wall_time_s)

@@ -23,6 +23,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Start,
     confirmed,
 )
+from uas_coverage_env.files.strict_toml import InputError
 
 
 def solve(
@@ -35,6 +36,11 @@ def solve(
 ) -> Solution:
     """Minimize the program with SCIP, see `Solve`."""
     began = time.perf_counter()
+    if limits.threads > 1:
+        raise InputError(
+            f"solver 'scip' searches on one thread; give threads=1 instead of {limits.threads}, "
+            "or take another solver"
+        )
     lower = milp.lower if lower is None else lower
     upper = milp.upper if upper is None else upper
     try:

@@ -18,7 +18,8 @@ class CornerCutting:
 
     A face that separates at both ends of a step separates along the straight segment between
     them. The paper asks this of fixed obstacles; moving obstacles and pairs of UAS can be jumped
-    over just as well, so they get the same rows (docs/deviations.md). c is `crossed`.
+    over just as well, so they get the same rows (docs/deviations.md), unless the problem says
+    otherwise (`corners_of_all`). c is `crossed`.
 
     Two exact reductions: the sum row is written as b(n) <= c(n) and b(n+1) <= c(n), which says
     the same of whole numbers and cuts off fractions; and b need not be whole where c is, because

@@ -38,6 +38,7 @@ class Separation:
         lowest_m: (G, N+1, F) smallest reachable face distance.
         highest_m: (G, N+1, F) largest reachable face distance.
         prune: see `PlanningProblem`.
+        corners: whether one face has to separate at both ends of each interval.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Separation:
     lowest_m: FloatArray
     highest_m: FloatArray
     prune: bool = True
+    corners: bool = True
 
     @cached_property
     def always(self) -> NDArray[np.bool_]:
@@ -82,7 +84,9 @@ class Separation:
 
     @cached_property
     def needed(self) -> NDArray[np.bool_]:
-        """(G, N+1) samples at the end of an undecided interval."""
+        """(G, N+1) samples at the end of an undecided interval, or undecided themselves."""
+        if not self.corners:
+            return np.asarray(~self.always.any(axis=2))
         result = np.zeros(self.always.shape[:2], bool)
         result[:, :-1] |= self.undecided
         result[:, 1:] |= self.undecided
@@ -122,7 +126,7 @@ class Separation:
 
     def add_same_face(self, milp: Milp) -> None:
         """One face separates at both ends of each interval (corner cutting constraints)."""
-        if not self.undecided.any():
+        if not self.corners or not self.undecided.any():
             return
         relaxed = milp.columns(f"{self.name}.relaxed")
         crossed = milp.variables(
@@ -151,6 +155,9 @@ class Separation:
 
     def add_one_face(self, milp: Milp, v: Variables) -> None:
         """Both of the above with `crossed` alone (`reductions.one_face`)."""
+        if not self.corners:
+            self.add_outside(milp, v)
+            return
         if not self.undecided.any():
             return
         F = self.always.shape[2]
@@ -260,6 +267,7 @@ def from_moving_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
             lowest + offset,
             highest + offset,
             problem.prune,
+            problem.corners_of_all,
         )
 
 
@@ -281,4 +289,5 @@ def from_each_other(problem: PlanningProblem) -> Iterator[Separation]:
         -(behind[first] + ahead[second]),
         ahead[first] + behind[second],
         problem.prune,
+        problem.corners_of_all,
     )

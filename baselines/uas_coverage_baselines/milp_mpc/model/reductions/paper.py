@@ -40,8 +40,8 @@ class PaperCoverage:
 class PaperCornerCutting:
     """Corner cutting word for word (Sec. III-C.4): b(n) + b(n+1) <= 2 c(n), b and c whole.
 
-    Asked of everything that can be jumped over, as by `CornerCutting`: what is compared is how the
-    rows are written, not what they are about.
+    Asked of what `CornerCutting` asks it of: what is compared is how the rows are written, not
+    what they are about.
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
@@ -50,7 +50,7 @@ class PaperCornerCutting:
             from_obstacles(problem), from_moving_obstacles(problem), from_each_other(problem)
         ):
             undecided = separation.undecided
-            if not undecided.any():
+            if not separation.corners or not undecided.any():
                 continue
             relaxed = milp.columns(f"{separation.name}.relaxed")
             crossed = milp.variables(

@@ -1,0 +1,30 @@
+"""What is commanded: a plan's first inputs, or to hover."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
+from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, Wrench
+
+
+def first_inputs(plan: Plan, swarm: SwarmState, mode: Callable[[str], Mode]) -> dict[str, Command]:
+    """The inputs of the plan's first step, for every active UAS.
+
+    Args:
+        plan: for all of them.
+        swarm: what is seen.
+        mode: of a UAS.
+    """
+    steps = {name: plan.u[plan.of(name), 0] for name in swarm.active}
+    return {
+        name: Wrench(*(float(u[row]) for row in (LIFT, TAU_X, TAU_Y, TAU_Z)), mode=mode(name))
+        for name, u in steps.items()
+    }
+
+
+def hovering(swarm: SwarmState, mode: Callable[[str], Mode]) -> dict[str, Command]:
+    """Brake and hold the height with the vehicle's inner loop, for every active UAS."""
+    z_m = {name: float(swarm.x[swarm.names.index(name), 2]) for name in swarm.active}
+    return {name: Velocity(0.0, 0.0, -z, mode=mode(name)) for name, z in z_m.items()}

@@ -1,0 +1,103 @@
+"""The paper's decisions: operation modes choose each UAS's target, the OCP's data follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem, Target
+from uas_coverage_baselines.milp_mpc.modes import (
+    ModeMemory,
+    Situation,
+    TargetChoice,
+    target_of,
+    update_modes,
+)
+from uas_coverage_baselines.milp_mpc.options import ModeOptions
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.vehicle import DOD, VX, VZ
+from uas_coverage_env.world import Mode, SwarmState
+
+
+class ModeProblems:
+    """Algorithms 2 and 3 before each decision, with the memory they need.
+
+    Args:
+        brief: the mission.
+        options: of the planner.
+    """
+
+    def __init__(self, brief: MissionBrief, options: ModeOptions) -> None:
+        self._options, self._weights = options, options.weights
+        self._choice = TargetChoice(among_candidates=options.target_scale == "candidates")
+        self._builder = ProblemBuilder(brief, options)
+        self._memories = {uas.name: ModeMemory() for uas in brief.uas}
+        self._detour = options.return_detour if options.return_rule == "fence" else None
+
+    def mode(self, name: str) -> Mode:
+        """The operation mode of a UAS."""
+        return self._memories[name].mode.label
+
+    def problem(self, swarm: SwarmState, plan: Plan | None) -> PlanningProblem:
+        """The decision to make now.
+
+        Args:
+            swarm: what is seen.
+            plan: what is left of the last plan, beginning now.
+        """
+        planned = _still_planned(plan)
+        situations = [self._situation(swarm, name, planned.get(name)) for name in swarm.active]
+        memories = update_modes(
+            [self._memories[name] for name in swarm.active],
+            situations,
+            self._builder.waypoints_m,
+            set().union(*planned.values()),
+            self._builder.blocked_waypoints(swarm),
+            self._choice,
+        )
+        self._memories.update(zip(swarm.active, memories, strict=True))
+        targets = self._targets(swarm, situations)
+        return self._builder.problem(swarm, targets, self._weights, self._options.priority_per_s)
+
+    def _situation(self, swarm: SwarmState, name: str, planned: set[int] | None) -> Situation:
+        x = swarm.x[swarm.names.index(name)]
+        return Situation(
+            position_m=x[0:3],
+            velocity_mps=x[VX : VZ + 1],
+            dod=float(x[DOD]),
+            dod_return=self._builder.dod_return(name, self._detour),
+            uncovered=swarm.uncovered,
+            plans_coverage=planned is None or bool(planned),
+        )
+
+    def _targets(
+        self, swarm: SwarmState, situations: Sequence[Situation]
+    ) -> dict[str, Target | None]:
+        # near home the normalised cost of flying away outweighs all coverage: where distances
+        # within the horizon count alike, a UAS goes on covering there
+        level = self._options.return_scale == "horizon"
+        return {
+            name: target_of(
+                self._memories[name],
+                now,
+                self._builder.home_m[name],
+                self._builder.waypoints_m,
+                self._builder.seconds_left(name, now.dod),
+                self._builder.seconds_home(name, now.position_m),
+                self._builder.horizon_m(name) if level else 0.0,
+                self._weights,
+            )
+            for name, now in zip(swarm.active, situations, strict=True)
+        }
+
+
+def _still_planned(plan: Plan | None) -> dict[str, set[int]]:
+    """The waypoints that a plan still covers, by UAS."""
+    if plan is None:
+        return {}
+    return {
+        name: set(np.flatnonzero(covers.any(axis=0)).tolist())
+        for name, covers in zip(plan.names, plan.covers, strict=True)
+    }
