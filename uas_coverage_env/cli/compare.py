@@ -137,7 +137,7 @@ def compare(
         _take(others, entries, store)
         _warn(sweep)
         source = source_of(sweep.players.values())
-        trouble = _fly(entries, store, screen, side_by_side, backend, source)
+        trouble = fly_sweep(entries, store, screen, side_by_side, backend, source)
         rows = store.rows()
     if not rows:
         sys.stderr.write(f"error: nothing was flown: {one_line(trouble)}\n")
@@ -169,15 +169,26 @@ def _take(rows: Sequence[Row], entries: Sequence[Entry], store: Store) -> None:
             lacking.remove(row.key)
 
 
-def _fly(
+def fly_sweep(
     entries: Sequence[Entry],
     store: Store,
     screen: Console,
     jobs: int,
     backend: Backend,
     source_sha256: str,
+    keep: Path | None = None,
 ) -> str:
-    """Fly what the store lacks; returns why it did not come to the end, empty where it did."""
+    """Fly what the store lacks; returns why it did not come to the end, empty where it did.
+
+    Args:
+        entries: All that the sweep flies.
+        store: Where the rows go.
+        screen: Where it shows how far it is.
+        jobs: Flights side by side.
+        backend: Processes here, or Ray.
+        source_sha256: Hash of the source code that flies.
+        keep: Folder that gets each flight's directory; None: none is kept.
+    """
     kept = store.keys()
     if kept - {entry.key for entry in entries}:
         raise InputError(
@@ -192,7 +203,7 @@ def _fly(
             compile_world(first.scenario, return_mode=True, safety_filter=first.safety_filter)
     try:
         with _shown(screen, len(entries), len(entries) - len(todo)) as told:
-            for row in fly_all(todo, jobs, backend, source_sha256):
+            for row in fly_all(todo, jobs, backend, source_sha256, keep):
                 store.add(row)
                 told(row)
     except (KeyboardInterrupt, StoppedError):

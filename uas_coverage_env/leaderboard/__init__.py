@@ -20,6 +20,7 @@ from uas_coverage_env.leaderboard.workers import (
     fly,
     fly_all,
     jobs_of,
+    kept_as,
 )
 
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "fly",
     "fly_all",
     "jobs_of",
+    "kept_as",
     "leaderboard_figure",
     "machine",
     "opened",

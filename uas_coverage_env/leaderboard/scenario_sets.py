@@ -1,16 +1,15 @@
 """The scenarios that players are compared on: sets by name, shipped scenarios, files, seeds."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.hashing import content_hash
-from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
+from uas_coverage_env.scenario import SERIES, Scenario, load_scenario
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
-_GENERATED = "generated"
 _MOST_SEEDS = 10_000
 # digits that a column of a store can hold
 _LONGEST_SEED = 18
@@ -21,7 +20,7 @@ def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
 
     Args:
         texts: Each one or several (comma or space between them) of: the name of a set, the name of
-            a shipped scenario, the path of a scenario file, `generated:FIRST:END`.
+            a shipped scenario, the path of a scenario file, SERIES:FIRST:END, as in `generated:0:20`.
 
     Raises:
         InputError: There are none, one of them cannot be read, or two that differ share a name.
@@ -80,10 +79,8 @@ def _is_file(text: str) -> bool:
 def _scenarios(item: str) -> Iterator[Scenario]:
     kind, separator, rest = item.partition(":")
     if item in SETS:
-        seeds: Sequence[int] = SETS[item]
-    elif separator and kind == _GENERATED:
-        seeds = seed_range(f"--scenarios {_GENERATED}:", rest)
+        yield from map(SERIES["generated"], SETS[item])
+    elif separator and kind in SERIES:
+        yield from map(SERIES[kind], seed_range(f"--scenarios {kind}:", rest))
     else:
         yield load_scenario(item)
-        return
-    yield from map(sample_scenario, seeds)

@@ -5,6 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Literal
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
@@ -36,7 +37,11 @@ def jobs_of(asked: int | None, backend: Backend) -> int:
 
 
 def fly_all(
-    entries: Sequence[Entry], jobs: int, backend: Backend, source_sha256: str
+    entries: Sequence[Entry],
+    jobs: int,
+    backend: Backend,
+    source_sha256: str,
+    keep: Path | None = None,
 ) -> Iterator[Row]:
     """Fly everything; each row as soon as its flight is over, in no particular order.
 
@@ -45,6 +50,7 @@ def fly_all(
         jobs: Flights side by side, see `jobs_of`.
         backend: `process`, or `ray`: the cluster of `RAY_ADDRESS`, or a local one.
         source_sha256: Hash of the source code that flies.
+        keep: Folder that gets each flight's directory, see `kept_as`; None: only rows are kept.
 
     Raises:
         InputError: Ray is not installed.
@@ -66,7 +72,7 @@ def fly_all(
                 batch_size=1,  # pyright: ignore[reportArgumentType]  # its default is a word
                 max_nbytes=None,  # nothing large travels
             )
-            for row in parallel(delayed(fly)(entry, source_sha256) for entry in entries):
+            for row in parallel(delayed(fly)(entry, source_sha256, keep) for entry in entries):
                 if row is None:
                     raise StoppedError
                 yield row
@@ -76,7 +82,14 @@ def fly_all(
         ) from error
 
 
-def fly(entry: Entry, source_sha256: str) -> Row | None:
+def kept_as(row: Row | Entry) -> str:
+    """The name of a flight's directory where flights are kept."""
+    if isinstance(row, Entry):
+        return f"{row.scenario.name}-{row.player.label}-{row.seed}"
+    return f"{row.scenario}-{row.player}-{row.seed}"
+
+
+def fly(entry: Entry, source_sha256: str, keep: Path | None = None) -> Row | None:
     """Fly one flight; None: it was stopped by hand."""
     player = entry.player
     try:
@@ -94,7 +107,11 @@ def fly(entry: Entry, source_sha256: str) -> Row | None:
         return Row.failed(entry, str(error), source_sha256)
     except Exception as error:  # a planner may be anybody's: its crash must not end the sweep
         return Row.failed(entry, f"{type(error).__name__}: {error}", source_sha256)
-    return None if flight.ended == "stopped" else Row.of(entry, flight, source_sha256)
+    if flight.ended == "stopped":
+        return None
+    if keep is not None:
+        flight.save(keep / kept_as(entry), overwrite=True)
+    return Row.of(entry, flight, source_sha256)
 
 
 def _end_with(owner: int) -> None:

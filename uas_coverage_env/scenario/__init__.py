@@ -2,7 +2,12 @@
 
 from uas_coverage_env.scenario.checks import warnings
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
-from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios, sample_scenario
+from uas_coverage_env.scenario.family import (
+    FAMILIES,
+    SERIES,
+    GeneratedScenarios,
+    sample_scenario,
+)
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
@@ -14,6 +19,7 @@ from uas_coverage_env.scenario.fields import (
     Waypoint,
     Wind,
 )
+from uas_coverage_env.scenario.flood_village import flood_village
 from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
@@ -21,6 +27,7 @@ from uas_coverage_env.scenario.source import MissionSource, Room, ScenarioGenera
 
 __all__ = [
     "FAMILIES",
+    "SERIES",
     "Decoration",
     "DisturbanceTable",
     "GeneratedScenarios",
@@ -37,6 +44,7 @@ __all__ = [
     "Uas",
     "Waypoint",
     "Wind",
+    "flood_village",
     "generate_scenario",
     "load_scenario",
     "sample_scenario",

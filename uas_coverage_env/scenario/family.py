@@ -1,10 +1,11 @@
 """Scenarios of a family: the counts are drawn from the seed too."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from uas_coverage_env.scenario.flood_village import FLOOD_VILLAGE, flood_village
 from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.model import Scenario
 
@@ -91,3 +92,9 @@ class GeneratedScenarios:
 
 FAMILIES: Mapping[str, GeneratedScenarios] = {"generated": GeneratedScenarios()}
 """The families that are known by name."""
+
+SERIES: Mapping[str, Callable[[int], Scenario]] = {
+    "generated": sample_scenario,
+    FLOOD_VILLAGE: flood_village,
+}
+"""Scenarios that are known by a name and a seed: name -> the scenario of a seed."""

@@ -1,0 +1,1 @@
+"""The result section of Gasche et al., flown again: its figures beside ours, in one command."""
