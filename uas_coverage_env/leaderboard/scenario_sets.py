@@ -20,7 +20,7 @@ def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
 
     Args:
         texts: Each one or several (comma or space between them) of: the name of a set, the name of
-            a shipped scenario, the path of a scenario file, SERIES:FIRST:END, as in `generated:0:20`.
+            a shipped scenario, the path of a scenario file, SERIES:FIRST:END (see `SERIES`).
 
     Raises:
         InputError: There are none, one of them cannot be read, or two that differ share a name.

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _FLIGHTS = "flights"
 _PROGRAM_STEP = 60
+_WIDEST_TABLE = 200
 _QUICK_CAP_S, _CAP_S = 10.0, 120.0
 
 
@@ -164,7 +165,7 @@ def _written(
         tried = list(trades(flight, step, cap_s, QUICK if quick else FULL))
     sizes = class_sizes(whole_decision(flight))
     names = page.write_page(done, sizes, timings, tried, command, out)
-    wide = Console(width=max(screen.width, 150), highlight=False)
+    wide = Console(width=max(screen.width, _WIDEST_TABLE), highlight=False)
     wide.print(rich_table(page.figure_cells(done), "Figures"))
     wide.print(rich_table(page.event_cells(done), "\nWhat the text tells"))
     wide.print(rich_table(page.size_cells(sizes), "\nSize of the program"))

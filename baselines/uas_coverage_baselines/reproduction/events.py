@@ -86,13 +86,12 @@ def forests_first(story: Story) -> Event:
     kinds = np.array([waypoint.kind for waypoint in story.flight.scenario.waypoints])
     forest = kinds == "forest"
     if not forest.any() or forest.all() or not story.all_covered:
-        return Event(False, None, "not all were covered, or none is a forest's")
+        return Event(False, None, "not everything was covered, or nothing is forest")
     first_s, later_s = (
         float(story.covered[chosen].mean() * story.dt_s) for chosen in (forest, ~forest)
     )
-    return Event(
-        first_s < later_s, first_s, f"mean of forests {first_s:.0f} s, others {later_s:.0f} s"
-    )
+    detail = f"mean of forests {first_s:.0f} s, of the others {later_s:.0f} s"
+    return Event(first_s < later_s, first_s, detail)
 
 
 def tired_past_threshold(story: Story) -> Event:
@@ -111,7 +110,7 @@ def tired_in_the_east(story: Story) -> Event:
     """It is in the eastern half of the area at the snapshot, in the air."""
     flight = story.flight
     if flight.last_sample[_TIRED] < _SNAPSHOT:
-        return Event(False, None, "not in the air any more")
+        return Event(False, None, f"not in the air at step {_SNAPSHOT}")
     east_m = flight.scenario.fence.vertices_m[:, 1]
     middle_m = 0.5 * float(east_m.min() + east_m.max())
     here_m = float(flight.x[_SNAPSHOT, _TIRED, Y])
@@ -148,7 +147,7 @@ def behind_helicopter_last(story: Story) -> Event:
     """The last waypoint covered is one that could not be covered at the start."""
     blocked = np.flatnonzero(WorldView(MissionBrief.of(story.flight.scenario)).blocked())
     if not len(blocked) or not story.all_covered:
-        return Event(False, None, "not all were covered, or none was blocked")
+        return Event(False, None, "not everything was covered, or nothing was blocked")
     mine, others = story.covered[blocked].max(), np.delete(story.covered, blocked).max()
     mine_s, others_s = story.seconds(int(mine)), story.seconds(int(others))
     return Event(bool(mine >= others), mine_s, f"the last of the others at {others_s:.0f} s")

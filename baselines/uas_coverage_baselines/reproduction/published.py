@@ -1,6 +1,7 @@
 """What a paper prints, as data: its settings, figures and events, and how far off we may be."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import resources
 from typing import Annotated, Any
 
@@ -109,7 +110,8 @@ def paper_named(name: str) -> Paper:
         return read_toml(path, Paper)
 
 
-class Curves(StrictModel):
+@dataclass(frozen=True)
+class Curves:
     """The battery of one UAS over its flight, a sample per second, the landed ones left out.
 
     Attributes:
@@ -117,8 +119,6 @@ class Curves(StrictModel):
         voltage_V: (T,) under the current.
         current_A: (T,) of the step that begins.
     """
-
-    model_config = {**StrictModel.model_config, "arbitrary_types_allowed": True}
 
     soc: NDArray[np.float64]
     voltage_V: NDArray[np.float64]
