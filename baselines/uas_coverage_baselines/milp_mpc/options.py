@@ -51,6 +51,16 @@ class OcpOptions(PlannerOptions):
         le=50.0,
         description="added for a moving obstacle's next change of velocity",
     )
+    moving_acceleration_mps2: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=50.0,
+        description="with which a moving obstacle may set off at a UAS, which is to get out of "
+        "its way: widens the margin; 0: not reckoned with",
+    )
+    moving_speed_mps: float = Field(
+        default=15.0, gt=0.0, le=100.0, description="up to which it may set off so"
+    )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),
         description="added to the OCP: names (entry points) or MODULE:CLASS, separated by commas",

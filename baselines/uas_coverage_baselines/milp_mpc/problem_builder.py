@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
+from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import seconds_home
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
@@ -45,6 +46,7 @@ class ProblemBuilder:
         factor = inner_factor(options.waypoint_sides, 3)
         self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
         self._waypoint_weight = np.array([w.weight for w in brief.waypoints], float)
+        self._getaway_m = self._getaway_margins()
 
     def vehicle(self, name: str) -> VehicleParams:
         """Parameters of a UAS's vehicle."""
@@ -88,7 +90,8 @@ class ProblemBuilder:
         # its faces are `up` of the radius away, its upright edges `level` of it
         up = inner_factor(self._options.waypoint_sides, 3)
         level = inner_factor(self._options.waypoint_sides, 2)
-        return set(np.flatnonzero(self._view.blocked(level, up)).tolist())
+        margin_m = float(self._getaway_m.min()) if len(self._getaway_m) else 0.0
+        return set(np.flatnonzero(self._view.blocked(level, up, margin_m)).tolist())
 
     def problem(
         self,
@@ -156,7 +159,9 @@ class ProblemBuilder:
             obstacles=tuple(self._obstacles[o] for o in obstacles),
             obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
             moving=self._predicted(swarm),
-            moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
+            moving_clearance_m=radius[:, None]
+            + moving
+            + np.maximum(options.moving_margin_m, self._getaway_m),
             separation_m=(
                 radius[:, None] + radius + self.brief.uas_safe_distance_m + options.margin_m
             ),
@@ -196,6 +201,24 @@ class ProblemBuilder:
             apart = np.linalg.norm(np.maximum(np.maximum(low - here, here - high), 0.0), axis=1)
             if (apart <= way_m + near_m + obstacle.safe_distance_m).any():
                 result.append(o)
+        return result
+
+    def _getaway_margins(self) -> FloatArray:
+        """(M,) to get out of the way of each moving obstacle; 0 where that is not reckoned with."""
+        options, brief = self._options, self.brief
+        result = np.zeros(len(brief.moving_obstacles))
+        if options.moving_acceleration_mps2 > 0.0:
+            for m, moving in enumerate(brief.moving_obstacles):
+                result[m] = max(
+                    getaway_margin_m(
+                        self._vehicles[uas.name],
+                        self.dt_s,
+                        moving.radius_m + moving.safe_distance_m + uas.radius_m,
+                        options.moving_acceleration_mps2,
+                        options.moving_speed_mps,
+                    )
+                    for uas in brief.uas
+                )
         return result
 
     def _predicted(self, swarm: SwarmState) -> tuple[MovingHull, ...]:
