@@ -37,9 +37,7 @@ def told(**changed):
 
 def reproduced(main=None, *drawn) -> ReproducedPaper:
     flights = {PAPER.scenario: main or told()}
-    return ReproducedPaper.of(
-        PAPER, flights | {f"drawn-{k}": some for k, some in enumerate(drawn)}
-    )
+    return ReproducedPaper.of(PAPER, flights | {f"drawn-{k}": some for k, some in enumerate(drawn)})
 
 
 def line(done, name, uas):
