@@ -1,5 +1,6 @@
 """What a sweep flies, and by what its flights are known."""
 
+import dataclasses
 from itertools import combinations
 
 import pytest
@@ -7,7 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard import SETS, Sweep, planner_specs_of, scenarios_of, source_of
+from uas_coverage_env.flight import Flight, rollout
+from uas_coverage_env.leaderboard import (
+    SETS,
+    TIMES,
+    Sweep,
+    fly,
+    kept_as,
+    planner_specs_of,
+    scenarios_of,
+    source_of,
+)
 from uas_coverage_env.leaderboard.hashing import content_hash
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.sweep import difference
@@ -157,3 +168,17 @@ def test_a_difference_is_named_where_it_lies():
 def test_the_source_is_that_of_the_world_and_of_who_flies():
     hover = planner_specs_of(["hover"], []).values()
     assert source_of(hover) == source_of(hover) != source_of([])
+
+
+def test_a_flight_is_kept_where_that_is_asked_for(tmp_path):
+    some = sweep("corridor", "hover")
+    short = next(iter(some.scenarios.values())).model_copy(update={"max_steps": 2})
+    (entry,) = Sweep({"corridor": short}, some.players, range(7, 8)).entries()
+    row = fly(entry, "")
+    assert list(tmp_path.iterdir()) == []
+    assert dataclasses.replace(fly(entry, "", tmp_path), **dict.fromkeys(TIMES)) == (
+        dataclasses.replace(row, **dict.fromkeys(TIMES))
+    )
+    assert kept_as(entry) == kept_as(row) == "corridor-hover-7"
+    kept = Flight.load(tmp_path / "corridor-hover-7")
+    assert (kept.x == rollout(short, "hover", seed=7).x).all()
