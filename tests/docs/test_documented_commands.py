@@ -15,6 +15,7 @@ from uas_coverage_env.cli import main
 QUICK = {"nearest-waypoint", "lawnmower", "learned-velocity"}
 SHORTER = {
     "run": ["--steps", "1"],
+    "reproduce": ["--steps", "2", "--seeds", "0:1"],
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }
 COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}

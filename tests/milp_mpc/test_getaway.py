@@ -8,6 +8,7 @@ from practice_missions import mission
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.mission import MissionBrief, first_sight
@@ -102,5 +103,7 @@ def test_without_the_option_nothing_is_added_and_nothing_more_is_blocked():
     margin_m = MilpMpcOptions().moving_margin_m
     assert plain.problem(swarm).moving_clearance_m == pytest.approx(10.36 + margin_m)
     assert (wary.problem(swarm).moving_clearance_m > 10.36 + margin_m).all()
-    assert not plain._builder.blocked_waypoints(swarm)
-    assert wary._builder.blocked_waypoints(swarm) == {0}
+    blocked = [
+        ProblemBuilder(brief, made.options).blocked_waypoints(swarm) for made in (plain, wary)
+    ]
+    assert blocked == [set(), {0}]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from practice_missions import mission, obstacle, with_uas
 from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
-from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
+from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, return_threshold
+from uas_coverage_env.vehicle import return_threshold
 from uas_coverage_env.world import LANDED, Velocity
 
 PLACES = [((60.0, 50.0, -6.0), 8.0), ((50.0, 75.0, -6.0), 8.0), ((190.0, 190.0, -20.0), 8.0)]
@@ -132,17 +132,3 @@ def test_the_return_rule_is_the_fences_or_that_of_the_vehicles_file(scenario, ar
         assert around.dod_return(uas.name, 2.0) == pytest.approx(by_fence)
         by_file = return_threshold(vehicle, uas.dod_max, vehicle.return_rule.distance_over_speed_s)
         assert around.dod_return(uas.name, None) == pytest.approx(by_file)
-
-
-def test_a_uas_returns_by_the_rule_that_its_option_names(scenario):
-    # between the two thresholds: the fence is small, the file says 180 s
-    charges = {}
-    for rule in ("fence", "vehicle"):
-        made = MilpMpc(MilpMpcOptions(return_rule=rule, return_detour=1.0))
-        made.reset(MissionBrief.of(scenario), 0)
-        between = 0.5 * sum(made._builder.dod_return("uas_2", d) for d in (1.0, None))
-        swarm = seen(scenario)
-        swarm.x[1, DOD] = between
-        made.problem(swarm)
-        charges[rule] = made.mode("uas_2")
-    assert charges == {"fence": "covering", "vehicle": "return"}

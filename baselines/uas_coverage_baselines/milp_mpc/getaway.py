@@ -3,8 +3,8 @@
 Plans predict a moving obstacle with the velocity it has (Sec. III-C.4). One that changes it gives
 notice at a sample, and a UAS takes seconds to turn its tilt into speed: a margin of what the
 obstacle moves in one step (`moving_margin_m`) is not enough for a UAS in front of it. A helicopter
-that takes up 15 m/s within a second, as the village's does, covers 75 m while a hovering UAS gets
-17 m aside.
+that takes up 15 m/s within a second, as the village's does, covers 45 m while a UAS that hovers
+gets 7 m aside.
 
 The margin here is found by flying: the obstacle sets off straight at the UAS, as fast as it is
 assumed to gain speed and up to its largest; the UAS flees in the best of some directions at full
