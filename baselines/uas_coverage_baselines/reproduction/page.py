@@ -117,15 +117,15 @@ def setting_cells(done: ReproducedPaper) -> Cells:
 
 def size_cells(sizes: Sequence[ClassSize]) -> Cells:
     """Headings and rows: rows, columns and binaries by class of constraints."""
-    counts = [(one.name, one.rows, one.columns, one.binaries) for one in sizes]
-    totals = [sum(row[k] for row in counts) for k in (1, 2, 3)]
+    counts = [(one.rows, one.columns, one.binaries) for one in sizes]
+    totals = [sum(column) for column in zip(*counts, strict=True)]
 
     def row(name: str, *numbers: int) -> list[str]:
         parts = zip(numbers, totals, strict=True)
         return [name, *(f"{n} ({n / total:.0%})" if total else "0" for n, total in parts)]
 
     return ["class", "rows", "columns", "binaries"], [
-        *(row(*one) for one in counts),
+        *(row(one.name, *count) for one, count in zip(sizes, counts, strict=True)),
         row("all", *totals),
     ]
 

@@ -106,7 +106,9 @@ def paper_named(name: str) -> Paper:
     """
     if name not in PAPERS:
         raise InputError(f"unknown paper {name[:80]!r}; take {', '.join(PAPERS)}")
-    with resources.as_file(resources.files(__package__) / f"{name}.toml") as path:
+    with resources.as_file(
+        resources.files("uas_coverage_baselines.reproduction") / f"{name}.toml"
+    ) as path:
         return read_toml(path, Paper)
 
 
