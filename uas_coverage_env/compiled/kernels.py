@@ -181,6 +181,6 @@ def _prefetched(typing_context, array):
 
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
     lowest_bit = _trailing_zeros()
-    prefetch = intrinsic(_prefetched)
+    prefetch = intrinsic(_prefetched)  # pyright: ignore[reportAssignmentType]
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())
