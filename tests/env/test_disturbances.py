@@ -1,10 +1,15 @@
 """The same disturbances, from outside of the package, in single and batched environments."""
 
+import json
+import os
 import pickle
+import subprocess
+import sys
 
 import gymnasium
 import numba
 import numpy as np
+import own_disturbances_on_gpu
 import pytest
 from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
 from practice_grounds import practice_ground
@@ -187,11 +192,25 @@ def test_what_does_not_fit_is_refused():
     cases = [
         (lambda: CoverageBatch(2, GROUND, disturbances="wind"), "disturbances"),
         (lambda: uas_coverage_v0.parallel_env(GROUND, disturbances=(gusts(), other)), "of its own"),
-        (lambda: CudaMissions(2, GROUND, disturbances=(gusts(),)), "gusts does not run on a GPU"),
+        (lambda: CudaMissions(2, GROUND, seed=-1), "seed is -1"),
     ]
     for case, match in cases:
         with pytest.raises(ValueError, match=match):
             case()
+
+
+def test_they_run_on_a_simulated_gpu():
+    done = subprocess.run(
+        [sys.executable, own_disturbances_on_gpu.__file__],
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    for flown_on_gpu in json.loads(done.stdout):
+        assert flown_on_gpu["different"] == 0
+        assert flown_on_gpu["restarts"] >= 2
+        assert flown_on_gpu["apart"]
 
 
 def test_threads_draw_what_one_thread_draws():

@@ -59,6 +59,10 @@ allocating_kernel = _decorator(error_model="numpy", _nrt=True)
 numba's other options: `@allocating_kernel(parallel=True)`."""
 
 
+_LINE = 64
+"""Bytes of a line of the cache."""
+
+
 class Constant(int):
     """A whole number that `machine_code` compiles into a kernel: one for each value."""
 
@@ -148,7 +152,35 @@ def _trailing_zeros() -> Any:
     return intrinsic(make)
 
 
+def prefetch(array: NDArray[Any]) -> None:
+    """Bring an array into the processor's cache while the kernel goes on.
+
+    For what is read or written later than other data of the same mission, and apart from it.
+
+    Args:
+        array: C-contiguous.
+    """
+
+
+def _prefetched(typing_context, array):
+    def generate(context, builder, signature, arguments):
+        view = make_array(array)(context, builder, arguments[0])
+        address, flag = cgutils.voidptr_t, ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [address, flag, flag, flag])
+        code = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        how = [flag(1), flag(3), flag(1)]  # to be written, kept in all caches, data
+        begin, step = context.get_constant(types.intp, 0), context.get_constant(types.intp, _LINE)
+        n_bytes = builder.mul(view.nitems, view.itemsize)
+        start = builder.bitcast(view.data, address)
+        with cgutils.for_range_slice(builder, begin, n_bytes, step, inc=True) as (at, _):
+            builder.call(code, [builder.gep(start, [at]), *how])
+        return context.get_dummy_value()
+
+    return types.none(array), generate
+
+
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
     lowest_bit = _trailing_zeros()
+    prefetch = intrinsic(_prefetched)  # pyright: ignore[reportAssignmentType]
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

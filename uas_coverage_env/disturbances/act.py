@@ -66,11 +66,6 @@ def disturbance_code(disturbances: Sequence[Disturbance]) -> DisturbanceCode:
     return code
 
 
-def runs_on_gpu(disturbance: Disturbance) -> bool:
-    """Whether it is one of those that `disturb` knows without an address."""
-    return disturbance.act is blow
-
-
 @kernel
 def begin_random(disturbances, random, seed, mission):
     """Put all generators where a mission begins: a function of seed and mission alone.
@@ -94,8 +89,8 @@ def disturb(arena, state, disturbances, outcome):
     Args:
         arena: The arena.
         state: The state at sample k; what disturbances keep is written.
-        disturbances: `DisturbanceCode`; None on a GPU, which calls nothing at an address and knows
-            those of the package alone.
+        disturbances: `DisturbanceCode`; None on a GPU, which calls nothing at an address and flies
+            those of the package alone with this (see `on_gpu` for others).
         outcome: (U,) of OUTCOME_DTYPE with the inputs; written.
 
     Raises:
@@ -115,10 +110,7 @@ def _disturb(arena, state, disturbances, outcome):
 @inlined_kernel
 def _act_on_all(arena, state, disturbances, outcome):
     for i in range(state.status.shape[0]):
-        event = outcome[i]
-        for axis in range(3):
-            event.wind_mps[axis] = 0.0
-            event.force_N[axis] = 0.0
+        clear(outcome[i])
         if state.status[i] != FLYING:
             continue
         for d in range(arena.disturbances.shape[0]):
@@ -132,11 +124,25 @@ def _act_on_all(arena, state, disturbances, outcome):
                 blow(arena, state, outcome, i, parameters, memory, random)
             else:
                 _act(disturbances[1 + d], arena, state, outcome, i, parameters, memory, random)
-        total = 0.0
-        for axis in range(3):
-            total += abs(event.wind_mps[axis]) + abs(event.force_N[axis])
-        for k in range(LIFT, TAU_Z + 1):
-            total += abs(event.u[k])
-        if not math.isfinite(total):
-            raise ValueError("what disturbances do to a UAS is not finite; correct their kernels")
-        clip_wrench(arena.vehicles[i], event.u)
+        check_and_clip(arena, i, outcome[i])
+
+
+@inlined_kernel
+def clear(event):
+    """Begin with still air and no force."""
+    for axis in range(3):
+        event.wind_mps[axis] = 0.0
+        event.force_N[axis] = 0.0
+
+
+@inlined_kernel
+def check_and_clip(arena, i, event):
+    """Refuse what is not finite, and keep the inputs of UAS i within the limits."""
+    total = 0.0
+    for axis in range(3):
+        total += abs(event.wind_mps[axis]) + abs(event.force_N[axis])
+    for k in range(LIFT, TAU_Z + 1):
+        total += abs(event.u[k])
+    if not math.isfinite(total):
+        raise ValueError("what disturbances do to a UAS is not finite; correct their kernels")
+    clip_wrench(arena.vehicles[i], event.u)

@@ -10,7 +10,7 @@ from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import rows_view
-from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel, prefetch
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.random import SEEDS, counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
@@ -223,14 +223,19 @@ def _add_up(worlds, lanes, learners, lane, max_steps):
             flies |= worlds.status[lane, i] == FLYING
             lanes.rewards[lane, i] = report[i, REWARD]
     swarm = rows_view(lanes.swarm, lane, (lanes.swarm.shape[1],))
-    for column in range(swarm.shape[0]):
-        swarm[column] = 0.0
+    # sums in variables: memory that has just been written is read late
+    energy_Wh = 0.0
     for i in range(n_uas):
-        swarm[SWARM_ENERGY] += report[i, ENERGY]
-        for term in range(swarm.shape[0] - SWARM_FIRST_TERM):
-            swarm[SWARM_FIRST_TERM + term] += learners.terms[i, term]
-    for term in range(swarm.shape[0] - SWARM_FIRST_TERM):
-        swarm[SWARM_REWARD] += swarm[SWARM_FIRST_TERM + term]
+        energy_Wh += report[i, ENERGY]
+    swarm[SWARM_ENERGY] = energy_Wh
+    reward = 0.0
+    for term in range(learners.terms.shape[1]):
+        paid = 0.0
+        for i in range(n_uas):
+            paid += learners.terms[i, term]
+        swarm[SWARM_FIRST_TERM + term] = paid
+        reward += paid
+    swarm[SWARM_REWARD] = reward
     swarm[SWARM_COVERED] = report[0, COVERED]
     lanes.terminated[lane] = not flies
     lanes.truncated[lane] = flies and worlds.step[lane, 0] >= max_steps
@@ -249,6 +254,18 @@ def _keep_last_looks(worlds, settled, lane, n_uas, before, observation, width):
             for k in range(width):
                 observation[lane, i, k] = before[lane, i, k]
         settled[lane, i] = not flies
+
+
+@inlined_kernel
+def _fetch_ahead(state, learners, observation):
+    """While the UAS fly, fetch what observing them reads and writes.
+
+    Of 1000 missions most lies far from the processor.
+    """
+    prefetch(learners.company)
+    for i in range(observation.shape[0]):
+        if state.status[i] == FLYING:
+            prefetch(observation[i])
 
 
 @inlined_kernel
@@ -284,11 +301,12 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
         state = state_of(missions.worlds, lane, pool.arenas, s)
         learners = learners_of(missions.learners, lane, pool.arenas, s)
         n_uas = state.status.shape[0]
+        rows = rows_view(observation, lane, (n_uas, width))
+        _fetch_ahead(state, learners, rows)
         _keep_last_looks(missions.worlds, missions.settled, lane, n_uas, before, observation, width)
         step_learners(
             arena, state, tables_at(pool.tables, s), learners,
-            _scratch_of(missions.scratch, thread, pool.arenas, s), rules,
-            rows_view(observation, lane, (n_uas, width)),
+            _scratch_of(missions.scratch, thread, pool.arenas, s), rules, rows,
         )  # fmt: skip
         over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
         if over and autoreset == NEXT_STEP:

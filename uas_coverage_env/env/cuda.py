@@ -8,6 +8,7 @@ precision; the GPU's own roots and exponentials may differ in the last digit.
 Without a GPU, numba's simulator runs it: `NUMBA_ENABLE_CUDASIM=1`, for tests.
 """
 
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,8 +17,10 @@ from numba import config, cuda, njit
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
-from uas_coverage_env.disturbances.act import runs_on_gpu
+from uas_coverage_env.disturbances.act import begin_random
+from uas_coverage_env.disturbances.on_gpu import are_own, disturb_with
 from uas_coverage_env.env.act import (
     acting_of,
     begin_command,
@@ -52,7 +55,13 @@ from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.pool import arena_of, lanes_of, start_of, state_of
-from uas_coverage_env.simulation.step import begin_step, carry_out
+from uas_coverage_env.simulation.step import (
+    begin_step,
+    carry_out,
+    judge,
+    move_all,
+    write_all_inputs,
+)
 from uas_coverage_env.world import FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
@@ -75,6 +84,10 @@ class Missions(NamedTuple):
     """(N,) an action was not finite, and so nothing was flown."""
     acted: NDArray[np.int64]
     """(N,) agent-steps flown since the beginning."""
+    seed: NDArray[np.uint64]
+    """(N,) of what disturbances draw."""
+    mission: NDArray[np.int64]
+    """(N,) number of the mission since the beginning, from 0 on."""
 
 
 _scratch_of = lane_view(SCRATCH, sized_by=ARENA)
@@ -82,73 +95,69 @@ _look_of = lane_view(FIRST_OBSERVATION, sized_by=ARENA)
 
 
 @kernel
-def step_mission(pool, acting, paying, observing, missions, nonlinear, lane):
-    """Fly one lane for one step; see `Missions`.
-
-    Args:
-        pool: `MissionPool` of one scenario.
-        acting: `Acting`.
-        paying: `Paying`.
-        observing: `Observing`.
-        missions: `Missions`; the lane is written.
-        nonlinear: Whether the 6-DOF plant is flown.
-        lane: Which.
-    """
+def _flies(pool, missions, lane):
+    """Whether a lane flies in this step: it refuses an action, or begins a mission, where not."""
     state = state_of(missions.worlds, lane, pool.arenas, 0)
     learners = learners_of(missions.learners, lane, pool.arenas, 0)
-    seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
     missions.refused[lane] = first_not_finite(learners.asked) != ACCEPTED
     if missions.refused[lane]:
-        return
+        return False
     if missions.ended[lane]:
+        seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
         missions.ended[lane] = False
+        missions.mission[lane] += 1
         copy_arrays(start_of(pool.starts, 0), state)
+        begin_random(
+            arena_of(pool.arenas, 0).disturbances, state.disturbance_random, missions.seed[lane],
+            missions.mission[lane],
+        )  # fmt: skip
         copy_arrays(first_learners_at(pool.learners, 0), learners)
         copy_arrays(first_observation_at(pool.first_observations, 0), seen)
         for i in range(state.status.shape[0]):
             missions.rewards[lane, i] = 0.0
-        return
-    arena = arena_of(pool.arenas, 0)
-    tables = tables_at(pool.tables, 0)
+        return False
+    return True
+
+
+@kernel
+def _decide(pool, acting, missions, lane):
+    """Begin a step with the commands of the actions."""
+    state = state_of(missions.worlds, lane, pool.arenas, 0)
+    learners = learners_of(missions.learners, lane, pool.arenas, 0)
     scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
-    max_steps = arena.rules[0].max_steps
+    arena, tables = arena_of(pool.arenas, 0), tables_at(pool.tables, 0)
     write_commands(arena, state, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
-    carry_out(arena, state, nonlinear, None, scratch.outcome)
+
+
+@kernel
+def _finish(pool, paying, observing, missions, lane):
+    """Reward and observe a step that was flown."""
+    state = state_of(missions.worlds, lane, pool.arenas, 0)
+    learners = learners_of(missions.learners, lane, pool.arenas, 0)
+    scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
+    arena, tables = arena_of(pool.arenas, 0), tables_at(pool.tables, 0)
+    seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
         missions.rewards[lane, i] = learners.report[i, REWARD]
         missions.acted[lane] += scratch.outcome[i].flew
         flies = flies or learners.report[i, STATUS] == FLYING
-    missions.ended[lane] = not flies or state.step[0] >= max_steps
+    missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps
 
 
-def _on_device(array: NDArray) -> Any:
-    # the simulator's own arrays are strange to what is called by its kernels; it takes plain ones
-    simulated = config.ENABLE_CUDASIM  # pyright: ignore[reportAttributeAccessIssue]
-    return array.copy() if simulated else cuda.to_device(array)
+@kernel
+def _write_as_usual(pool, acting, missions, lane):
+    """The commands of the usual kinds of action are written by `write_commands`."""
 
 
-def _all_on_device(arrays: Any) -> Any:
-    """The same named tuple, of arrays and named tuples, with its arrays on the device."""
-    if isinstance(arrays, np.ndarray):
-        return _on_device(arrays)
-    return arrays._make(map(_all_on_device, arrays))
-
-
-@cuda.jit
-def _step_missions(pool, acting, paying, observing, missions, nonlinear):
-    lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
-    if lane < missions.ended.shape[0]:
-        step_mission(pool, acting, paying, observing, missions, nonlinear, lane)
-
-
-def _own_step(write: Any) -> Any:
-    """`_step_missions` for a kind of action of one's own, with its kernel as a part of it."""
+@cache
+def _write_with(write: Any) -> Any:
+    """A function that writes commands with the kernel of a kind of action of one's own."""
 
     @njit(error_model="numpy")
-    def act(pool, acting, missions, lane):
+    def write_own(pool, acting, missions, lane):
         # before the step: an action that cannot be flown is refused as one that is not finite
         arena = arena_of(pool.arenas, 0)
         state = state_of(missions.worlds, lane, pool.arenas, 0)
@@ -165,14 +174,63 @@ def _own_step(write: Any) -> Any:
                 write(arena, state, tables, learners, i, acting.parameters, values, command)
                 refuse_unflyable(arena, learners, acting, i, command)
 
+    return write_own
+
+
+@kernel
+def _fly_as_usual(pool, missions, nonlinear, lane):
+    """Fly and judge a step, with the disturbances of the package."""
+    state = state_of(missions.worlds, lane, pool.arenas, 0)
+    scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
+    carry_out(arena_of(pool.arenas, 0), state, nonlinear, None, scratch.outcome)
+
+
+@cache  # to compile it again takes seconds
+def _fly_with(kernels: tuple[Any, ...]) -> Any:
+    """The same with disturbances of one's own, of which these are the kernels."""
+    disturb = disturb_with(kernels)
+
+    @njit(error_model="numpy")
+    def fly_disturbed(pool, missions, nonlinear, lane):
+        arena = arena_of(pool.arenas, 0)
+        state = state_of(missions.worlds, lane, pool.arenas, 0)
+        scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
+        write_all_inputs(arena, state, scratch.outcome)
+        disturb(arena, state, scratch.outcome)
+        move_all(arena, state, nonlinear, scratch.outcome)
+        judge(arena, state, nonlinear, scratch.outcome)
+
+    return fly_disturbed
+
+
+@cache
+def _step_of(write: Any, fly: Any) -> Any:
+    """The step of all lanes, made of these functions."""
+
     @cuda.jit
     def step(pool, acting, paying, observing, missions, nonlinear):
         lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
         if lane < missions.ended.shape[0]:
-            act(pool, acting, missions, lane)
-            step_mission(pool, acting, paying, observing, missions, nonlinear, lane)
+            write(pool, acting, missions, lane)
+            if _flies(pool, missions, lane):
+                _decide(pool, acting, missions, lane)
+                fly(pool, missions, nonlinear, lane)
+                _finish(pool, paying, observing, missions, lane)
 
     return step
+
+
+def _on_device(array: NDArray) -> Any:
+    # the simulator's own arrays are strange to what is called by its kernels; it takes plain ones
+    simulated = config.ENABLE_CUDASIM  # pyright: ignore[reportAttributeAccessIssue]
+    return array.copy() if simulated else cuda.to_device(array)
+
+
+def _all_on_device(arrays: Any) -> Any:
+    """The same named tuple, of arrays and named tuples, with its arrays on the device."""
+    if isinstance(arrays, np.ndarray):
+        return _on_device(arrays)
+    return arrays._make(map(_all_on_device, arrays))
 
 
 class CudaMissions:
@@ -183,6 +241,7 @@ class CudaMissions:
     Args:
         num_envs: N.
         scenario: Name of a shipped scenario, path of a scenario file, or a scenario.
+        seed: Of all that disturbances draw; lane i has the seed `seed` + i.
         **settings: See `MissionSettings`; what does not run on a GPU is refused.
 
     Attributes:
@@ -197,10 +256,15 @@ class CudaMissions:
         self,
         num_envs: int,
         scenario: str | Path | Scenario = "village",
+        *,
+        seed: int = 0,
         **settings: Any,
     ) -> None:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
+        whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+        if not whole or not 0 <= seed <= SEEDS - num_envs:
+            raise ValueError(f"seed is {seed!r}; give a whole number from 0 to 2**64 - num_envs")
         given = MissionSettings.of(settings)
         if given.kind.goes_to or given.return_mode or given.safety_filter:
             raise ValueError(
@@ -212,13 +276,12 @@ class CudaMissions:
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
         pool = ScenarioPool(scenario, given)
-        for disturbance in pool.disturbances:
-            if not runs_on_gpu(disturbance):
-                raise ValueError(
-                    f"disturbance {disturbance.name} does not run on a GPU; constant_wind does"
-                )
         acting = acting_of(given.kind, on_gpu=True)
-        self._launched: Any = _own_step(given.kind.write) if is_own(acting) else _step_missions
+        acts = tuple(disturbance.act for disturbance in pool.disturbances)
+        self._launched = _step_of(
+            _write_with(given.kind.write) if is_own(acting) else _write_as_usual,
+            _fly_with(acts) if are_own(acts) else _fly_as_usual,
+        )
         paying = paying_of(DEFAULT_REWARD, given.weights)
         observing = observing_of(OBSERVATION)
         n_uas = pool.sizes["U"]
@@ -230,6 +293,8 @@ class CudaMissions:
             np.zeros((num_envs, n_uas)),
             np.zeros(num_envs, dtype=np.bool_),
             np.zeros(num_envs, dtype=np.bool_),
+            np.zeros(num_envs, dtype=np.int64),
+            np.arange(num_envs, dtype=np.uint64) + np.uint64(seed),
             np.zeros(num_envs, dtype=np.int64),
         )
         _begin_all(pool.arrays, missions)
@@ -267,3 +332,13 @@ def _begin_all(pool: MissionPool, missions: Missions) -> None:
     for arrays, first in parts:
         for array, start in zip(arrays, first, strict=True):
             array[:] = start
+    disturbances = ARENA.mission(pool.arenas, 0).disturbances
+    if len(disturbances):
+        _begin_random_of_all(disturbances, missions)
+
+
+@kernel
+def _begin_random_of_all(disturbances, missions):
+    for lane in range(missions.seed.shape[0]):
+        random = missions.worlds.disturbance_random[lane]
+        begin_random(disturbances, random, missions.seed[lane], missions.mission[lane])

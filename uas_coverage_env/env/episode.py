@@ -12,9 +12,9 @@ from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.express import Moment
 from uas_coverage_env.env.global_state import global_state
+from uas_coverage_env.env.infos import Infos
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
-from uas_coverage_env.env.named import namer_of
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
@@ -22,10 +22,11 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES, SwarmState
+from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.arena import ARENA
 
-_FLOAT32 = np.dtype(np.float32)
+# numpy takes as long to find them as to use them
+_FLOAT32, _empty = np.dtype(np.float32), np.empty
 
 
 class Episode:
@@ -42,16 +43,19 @@ class Episode:
         names: Of all UAS, in order.
         actions: The kind of action.
         max_cycles: Steps after which the episode is cut.
-        chooses: Whether the action is a choice.
         steps: Flown since t = 0.
         tables: What does not change during a mission.
         asked: (U, size) the actions of the coming step, to be written before it.
+        asked_rows: Its rows: to index the array takes longer.
         observation: (U, V) the latest; a new array in every step.
+        terms: The weighted terms of the reward of the latest step, one row for each UAS.
+        infos: What is told about the UAS.
     """
 
     def __init__(
         self, scenario: Scenario, settings: MissionSettings, room: Room | None = None
     ) -> None:
+        # at most 29 attributes: with more, Python takes twice as long for each
         scenario = settings.limited(scenario)
         self.settings = settings
         self._room = room or Room.of(scenario)
@@ -67,31 +71,25 @@ class Episode:
         self.scenario = scenario
         self.names = self._world.names
         self.max_cycles = scenario.max_steps
-        self.chooses = settings.chooses
-        self._filters = settings.safety_filter
-        self._tells_more = self.chooses or self._filters
-        self._named_terms = namer_of(settings.term_names)
-        self._partners = {
-            "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
-            "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
-            "uas": self.names,
-        }
         self.tables = tables_of(scenario, self.actions)
         self._sizes = learners_sizes(settings, self.actions.size)
         sizes = ARENA.sizes_of(self._world.arena, self._sizes)
         self._learners = LEARNERS.zeros(sizes)
         self._scratch = SCRATCH.zeros(sizes)
-        self.asked = self._learners.asked
         self._observation_shape = (len(self.names), settings.observation_size)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
-        self._terms: list[list[float]] = []
+        self.terms: list[list[float]] = []
         self._first: tuple[Learners, NDArray[np.float32]] | None = None
         self._prepare()
 
     def _prepare(self) -> None:
         world = self._world
         kind = self.actions.kind
+        self.asked = self._learners.asked
+        self.asked_rows = list(self.asked)
+        self._report, self._paid = self._learners.report, self._learners.terms
+        self.infos = Infos(self.scenario, self.settings, self._learners, self._scratch)
         self._acting = acting_of(kind)
         self._checks = is_own(self._acting)
         self._paying = paying_of(self.settings.reward, self.settings.weights)
@@ -111,12 +109,14 @@ class Episode:
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses and views travel
-        stays = ("_step", "_given", "_scratch_bytes", "_acting", "_paying", "_observing")
+        stays = (
+            "asked", "asked_rows", "infos", "_report", "_paid", "_step", "_given",
+            "_scratch_bytes", "_acting", "_paying", "_observing",
+        )  # fmt: skip
         return {key: value for key, value in self.__dict__.items() if key not in stays}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self.asked = self._learners.asked  # one array again, not two equal ones
         self._prepare()
 
     def reset(self, seed: int = 0, mission: int = 0) -> None:
@@ -138,7 +138,7 @@ class Episode:
         for array in self._scratch_bytes:
             array[:] = 0
         self.observation = observation.copy()
-        self._terms = self._learners.terms.tolist()
+        self.terms = self._learners.terms.tolist()
 
     def step(self) -> list[list[float]]:
         """Fly what was asked for one step.
@@ -150,7 +150,7 @@ class Episode:
             ValueError: An action is not finite; names UAS and value, and nothing has changed. Or
                 an own kind of action wrote a command that cannot be flown.
         """
-        observation = np.empty(self._observation_shape, _FLOAT32)
+        observation = _empty(self._observation_shape, _FLOAT32)
         invalid = self._step(*self._given, self.observation, observation)
         if invalid != ACCEPTED:
             numbers_asked = self.asked[invalid].tolist()
@@ -160,20 +160,15 @@ class Episode:
             )
         self.observation = observation
         self.steps += 1
-        self._terms = self._learners.terms.tolist()
+        self.terms = self._paid.tolist()
         if self._checks:
             refuse_what_it_wrote(self.actions.kind, self.asked, self.names)
-        return self._learners.report.tolist()
+        return self._report.tolist()
 
     @property
     def report(self) -> list[list[float]]:
         """The report of the latest step; before the first, one in which nothing happened."""
         return self._learners.report.tolist()
-
-    @property
-    def terms(self) -> list[list[float]]:
-        """The weighted terms of the reward of the latest step, one row for each UAS."""
-        return self._terms
 
     def global_state(self) -> NDArray[np.float32]:
         """The whole mission as one vector, see `global_state`."""
@@ -216,42 +211,3 @@ class Episode:
         world = self._world
         arrays = (world.arena, world.state, self.tables, self._learners)
         return Moment(self.names, *arrays, world.dynamics == "nonlinear")
-
-    def info(self, i: int, row: list[float]) -> dict[str, Any]:
-        """What is told about a UAS beside its observation and reward, see `CoverageParallelEnv`."""
-        (
-            energy_Wh, contact, contact_with, limits, status, filtered, returning, covered, _
-        ) = row  # fmt: skip
-        info: dict[str, Any] = {
-            "status": STATUS_NAMES[int(status)],
-            "contact": None,
-            "contact_with": None,
-            "limits_exceeded": int(limits),
-            "returning": returning > 0.0,
-            "covered": int(covered),
-            "energy_Wh": energy_Wh,
-            "reward_terms": self._named_terms(self._terms[i]),
-        }
-        if contact:
-            info["contact"] = kind = CONTACT_NAMES[int(contact)]
-            if kind in self._partners:
-                info["contact_with"] = self._partners[kind][int(contact_with)]
-        if not self._tells_more:
-            return info
-        if self.chooses:
-            info["action_mask"] = self.action_mask(i)
-        if self._filters:
-            info["filter"] = {
-                "changed": filtered > 0.0,
-                "asked": _described(self._scratch.commands[i]),
-                "applied": _described(self._scratch.outcome[i]["applied_command"]),
-            }
-        return info
-
-    def action_mask(self, i: int) -> NDArray[np.int8]:
-        """(choices,) 1 where a choice of UAS i exists now."""
-        return self.actions.kind.masks(self._learners.candidates[i]).astype(np.int8)
-
-
-def _described(command: np.void) -> dict[str, Any]:
-    return {"kind": KIND_NAMES[int(command["kind"])], "values": command["values"].tolist()}

@@ -62,9 +62,10 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         report[i, FILTERED] = event.filtered
         report[i, RETURNING] = event.returning
         report[i, COVERED] += newly_covered
-        report[i, REWARD] = 0.0
+        reward = 0.0
         for term in range(paying.weights.shape[0]):
-            report[i, REWARD] += learners.terms[i, term]
+            reward += learners.terms[i, term]
+        report[i, REWARD] = reward
     if newly_covered > 0:
         count_company(state.uncovered, tables.neighbours, learners.company)
     for i in range(report.shape[0]):

@@ -187,10 +187,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             self._screen.see(episode.positions_m)
             self._show()
         observations = dict(zip(self.agents, episode.observation, strict=True))
-        infos = {
-            agent: episode.info(i, row)
-            for i, (agent, row) in enumerate(zip(self.agents, episode.report, strict=True))
-        }
+        rows = zip(self.agents, episode.report, episode.terms, strict=True)
+        infos = {agent: episode.infos.of(i, *each) for i, (agent, *each) in enumerate(rows)}
         return observations, infos
 
     def step(
@@ -217,21 +215,21 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             self._check_agents(actions)
         if not agents:
             return {}, {}, {}, {}, {}
-        accept, asked = episode.actions.accept, episode.asked
+        accept, asked = episode.actions.accept, episode.asked_rows
         for agent in agents:
             if agent not in actions:
                 self._check_agents(actions)
-            accept(agent, actions[agent], asked, index[agent])
+            accept(agent, actions[agent], asked[index[agent]])
         report = episode.step()
 
-        observation = episode.observation
+        observation, terms, told = episode.observation, episode.terms, episode.infos
         over = episode.steps >= episode.max_cycles
         observations: Observations = {}
         rewards: dict[str, float] = {}
         terminations: dict[str, bool] = {}
         truncations: dict[str, bool] = {}
         infos: Infos = {}
-        alive: list[str] = []
+        ended = over
         # by index: to iterate over the array, or to zip, takes twice as long
         for agent in agents:
             i = index[agent]
@@ -241,12 +239,12 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             rewards[agent] = row[REWARD]
             terminations[agent] = not flies
             truncations[agent] = over and flies
-            infos[agent] = episode.info(i, row)
-            if flies and not over:
-                alive.append(agent)
-        if len(alive) < len(agents):
+            infos[agent] = told.of(i, row, terms[i])
+            if not flies:
+                ended = True
+        if ended:
             # what one that has ended was asked last must not count as its next action
-            self._forget(alive)
+            self._forget([a for a in agents if not (terminations[a] or truncations[a])])
         if self.render_mode is not None:
             self._screen.see(episode.positions_m)
             self._show()
@@ -258,8 +256,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Raises:
             ValueError: It could not; names agent and value.
         """
-        asked = np.zeros((1, self._episode.actions.size))
-        self._episode.actions.accept(agent, action, asked, 0)
+        asked = np.zeros(self._episode.actions.size)
+        self._episode.actions.accept(agent, action, asked)
         if not np.isfinite(asked).all():
             raise ValueError(f"action of {agent} is {action!r}; give finite numbers")
 

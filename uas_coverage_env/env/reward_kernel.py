@@ -93,9 +93,9 @@ def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
     terms = learners.terms
     n_terms = paying.weights.shape[0]
     for i in range(terms.shape[0]):
-        for term in range(n_terms):
-            terms[i, term] = 0.0
         if not scratch.outcome[i].flew:
+            for term in range(n_terms):
+                terms[i, term] = 0.0
             continue
         if on_gpu is not None:
             _pay_as_usual(arena, state, tables, learners, scratch, i)

@@ -134,8 +134,8 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             raise ResetNeeded("step() before reset(): call reset() first")
         episode = self._episode
         rows = episode.actions.joint_rows(action, self._n_uas)
-        for i, (name, row) in enumerate(zip(episode.names, rows, strict=False)):
-            episode.actions.accept(name, row, episode.asked, i)
+        for name, row, asked in zip(episode.names, rows, episode.asked, strict=False):
+            episode.actions.accept(name, row, asked)
         report = episode.step()
         info = self._info(report)
         flies = any(row[STATUS] == FLYING for row in report)
@@ -176,7 +176,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         Raises:
             ValueError: The action is no choice.
         """
-        if not self._episode.chooses:
+        if not self._episode.settings.chooses:
             raise ValueError("only actions that are choices have masks; this one is continuous")
         return self._action_mask().astype(np.bool_)
 
@@ -205,7 +205,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         """(U · choices,) a UAS that the mission does not have has no waypoint to choose."""
         nothing = np.full(K_WAYPOINTS, -1)
         missing = self._episode.settings.kind.masks(nothing).astype(np.int8)
-        masks = [self._episode.action_mask(i) for i in range(len(self._episode.names))]
+        masks = [self._episode.infos.action_mask(i) for i in range(len(self._episode.names))]
         return np.concatenate(masks + [missing] * (self._n_uas - len(masks)))
 
     def _info(self, report: list[list[float]]) -> dict[str, Any]:
@@ -217,10 +217,10 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             "covered": int(report[0][COVERED]),
             "energy_Wh": reduce(add, [row[ENERGY] for row in report]),
             "uas": {
-                name: episode.info(i, row)
+                name: episode.infos.of(i, row, episode.terms[i])
                 for i, (name, row) in enumerate(zip(episode.names, report, strict=True))
             },
         }
-        if episode.chooses:
+        if episode.settings.chooses:
             info["action_mask"] = self._action_mask()
         return info

@@ -98,38 +98,56 @@ def _write_inputs(arena, state, i, outcome):
 
 
 @inlined_kernel
+def write_all_inputs(arena, state, outcome):
+    """What the motors of all UAS are asked for: a disturbance of one may depend on the others'."""
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING:
+            _write_inputs(arena, state, i, outcome)
+
+
+@inlined_kernel
+def _move(arena, state, nonlinear, disturbed, i, outcome):
+    """Fly the inputs of a UAS for one step."""
+    x = state.x[i]
+    event = outcome[i]
+    u = event.u[:]
+    vehicle = arena.vehicles[i]
+    if disturbed:
+        enter_air(x, event.wind_mps)
+    if nonlinear:
+        voltage_V, current_A = plant_step(vehicle, x, u, x)
+    else:
+        voltage_V, current_A = lpv_step(vehicle, x, u, x)
+    if disturbed:
+        leave_air(vehicle, x, event.wind_mps, event.force_N)
+    event.voltage_V = voltage_V
+    event.current_A = current_A
+    event.energy_Wh = voltage_V * current_A * (arena.rules[0].dt_s / 3600.0)
+    if event.applied_command.kind == WRENCH:
+        reseed_reference(vehicle, x, state.reference[i])
+
+
+@inlined_kernel
+def move_all(arena, state, nonlinear, outcome):
+    """Fly the inputs, the winds and the forces in `outcome` for one step."""
+    for i in range(state.status.shape[0]):
+        if state.status[i] == FLYING:
+            _move(arena, state, nonlinear, True, i, outcome)
+
+
+@inlined_kernel
 def _fly(arena, state, nonlinear, disturbances, outcome):
     """Fly the commands for one step."""
-    dt_h = arena.rules[0].dt_s / 3600.0
     disturbed = arena.rules[0].disturbed
     if disturbed:
-        # what acts on one UAS may depend on the inputs of the others
-        for i in range(state.status.shape[0]):
-            if state.status[i] == FLYING:
-                _write_inputs(arena, state, i, outcome)
+        write_all_inputs(arena, state, outcome)
         disturb(arena, state, disturbances, outcome)
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
             continue
         if not disturbed:
             _write_inputs(arena, state, i, outcome)
-        x = state.x[i]
-        event = outcome[i]
-        u = event.u[:]
-        vehicle = arena.vehicles[i]
-        if disturbed:
-            enter_air(x, event.wind_mps)
-        if nonlinear:
-            voltage_V, current_A = plant_step(vehicle, x, u, x)
-        else:
-            voltage_V, current_A = lpv_step(vehicle, x, u, x)
-        if disturbed:
-            leave_air(vehicle, x, event.wind_mps, event.force_N)
-        event.voltage_V = voltage_V
-        event.current_A = current_A
-        event.energy_Wh = voltage_V * current_A * dt_h
-        if event.applied_command.kind == WRENCH:
-            reseed_reference(vehicle, x, state.reference[i])
+        _move(arena, state, nonlinear, disturbed, i, outcome)
 
 
 @inlined_kernel
@@ -147,6 +165,12 @@ def carry_out(arena, state, nonlinear, disturbances, outcome):
     There `disturbances` is None, see `disturb`.
     """
     _fly(arena, state, nonlinear, disturbances, outcome)
+    judge(arena, state, nonlinear, outcome)
+
+
+@inlined_kernel
+def judge(arena, state, nonlinear, outcome):
+    """Judge what happened in a step that has been flown."""
     check_obstacles(arena, state, outcome)
     check_separation(arena, state, outcome)
     check_fence_and_battery(arena, state, outcome)

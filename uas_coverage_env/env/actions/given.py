@@ -12,6 +12,7 @@ from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.scenario import Scenario
 
 _REAL = (np.dtype(np.float32), np.dtype(np.float64))
+_ARRAY = np.ndarray
 
 
 class Actions(Protocol):
@@ -40,8 +41,8 @@ class Actions(Protocol):
         """A new space of the whole swarm."""
         ...
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
-        """Write an action into row i of `asked` (U, size), not yet known to be finite.
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
+        """Write an action into `asked` (size,), not yet known to be finite.
 
         Raises:
             ValueError: It has a wrong type or shape; names UAS and value.
@@ -73,13 +74,13 @@ class Continuous:
         """The boxes of all UAS, one after the other."""
         return spaces.Box(-1.0, 1.0, (n_uas * self.size,), np.float32)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
         """Write the numbers; any real numbers in the right shape will do."""
-        if type(action) is not np.ndarray:
+        if type(action) is not _ARRAY:
             action = as_array(name, action)
         if action.dtype in _REAL and action.shape == (self.size,):
             # what learners give; all others are looked at more closely
-            asked[i] = action
+            asked[...] = action
             return
         if action.dtype.kind not in "fiu":
             raise ValueError(
@@ -90,7 +91,7 @@ class Continuous:
                 f"action of {name} has shape {action.shape}: {_shown(action)}; "
                 f"give {self.size} numbers, shape ({self.size},)"
             )
-        asked[i] = action
+        asked[...] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One row of numbers for each UAS."""
@@ -119,7 +120,7 @@ class Choice:
         """One choice for each UAS."""
         return spaces.MultiDiscrete([self.kind.choices] * n_uas)
 
-    def accept(self, name: str, action: Any, asked: NDArray[np.float64], i: int) -> None:
+    def accept(self, name: str, action: Any, asked: NDArray[np.float64]) -> None:
         """Write the choice; any whole number in range will do, also as an array without axes."""
         if isinstance(action, np.ndarray) and action.shape == ():
             action = action[()]
@@ -129,7 +130,7 @@ class Choice:
                 f"action of {name} is {_shown(action)} of type {type(action).__name__}; "
                 f"give a whole number from 0 to {self.kind.choices - 1}"
             )
-        asked[i] = action
+        asked[...] = action
 
     def joint_rows(self, action: Any, n_uas: int) -> NDArray[Any]:
         """One choice for each UAS."""

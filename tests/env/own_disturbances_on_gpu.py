@@ -1,0 +1,62 @@
+"""Own disturbances on numba's simulated GPU, and the same as episodes; prints JSON.
+
+Run as a program, with NUMBA_ENABLE_CUDASIM=1.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from practice_grounds import practice_ground
+
+from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.env.cuda import CudaMissions
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.settings import MissionSettings
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
+
+from own_actions import CLIMB_RATE
+from own_disturbances import gusts, push, weak_rotors
+
+SEED, N_LANES, N_STEPS = 7, 2, 13
+OWN = (constant_wind(3.0, 250.0), gusts(), push(0.2, 0.0, 0.0), weak_rotors(0.05))
+
+
+def compare(**settings):
+    """Fly both ways past the end of missions; lanes have seeds of their own."""
+    ground = practice_ground(n_uas=2, max_steps=6)
+    missions = CudaMissions(N_LANES, ground, seed=SEED, disturbances=OWN, **settings)
+    episodes = [
+        Episode(ground, MissionSettings(disturbances=OWN, **settings)) for _ in range(N_LANES)
+    ]
+    flown = [0] * N_LANES
+    for lane, episode in enumerate(episodes):
+        episode.reset(SEED + lane)
+    ended = [False] * N_LANES
+    different = 0
+    asked = np.full((2, 3), 0.2)
+    seen = missions.missions
+    for _ in range(N_STEPS):
+        missions.step(np.array([asked] * N_LANES))
+        for lane, episode in enumerate(episodes):
+            if ended[lane]:
+                flown[lane] += 1
+                episode.reset(SEED + lane, flown[lane])
+            else:
+                episode.asked[:] = asked
+                episode.step()
+            ended[lane] = bool(seen.ended[lane])
+            observed = seen.first_observations.observation[lane]
+            different += int((observed != episode.observation).sum())
+            different += int((seen.worlds.x[lane, :, :3] != episode.positions_m).sum())
+    return {
+        "different": different,
+        "restarts": sum(flown),
+        "apart": bool((seen.worlds.x[0] != seen.worlds.x[1]).any()),
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps([compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]))

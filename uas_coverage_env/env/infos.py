@@ -1,0 +1,99 @@
+"""What is told about a UAS beside its observation and reward: what is made most often of all."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.memory import Learners, Scratch
+from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES
+
+_STATUS_NAMES: dict[float, str] = dict(enumerate(STATUS_NAMES))
+"""By the floats of a report."""
+
+
+class Infos:
+    """The infos of `CoverageParallelEnv`.
+
+    Args:
+        scenario: The scenario.
+        settings: How it is flown.
+        learners: The arrays of the mission.
+        scratch: Likewise.
+    """
+
+    def __init__(
+        self, scenario: Scenario, settings: MissionSettings, learners: Learners, scratch: Scratch
+    ) -> None:
+        self._term_names = settings.term_names
+        self._usual = self._term_names == REWARD_TERMS
+        self._partners = {
+            "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
+            "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
+            "uas": tuple(uas.name for uas in scenario.uas),
+        }
+        self._kind = settings.kind
+        self._chooses = settings.chooses
+        self._filters = settings.safety_filter
+        self._learners = learners
+        self._scratch = scratch
+
+    def of(self, i: int, row: Sequence[float], terms: Sequence[float]) -> dict[str, Any]:
+        """The info of a UAS.
+
+        Args:
+            i: Its index.
+            row: Its row of the report, the columns of `memory`.
+            terms: The weighted terms of its reward.
+        """
+        energy_Wh, contact, contact_with, limits, status, filtered, returning, covered, _ = row
+        if self._usual:
+            # written out: in half the time of `dict(zip(...))`, and this is a tenth of a step
+            coverage, team_coverage, energy, violation, home, stranded, filter_, time = terms
+            named = {
+                "coverage": coverage,
+                "team_coverage": team_coverage,
+                "energy": energy,
+                "violation": violation,
+                "home": home,
+                "stranded": stranded,
+                "filter": filter_,
+                "time": time,
+            }
+        else:
+            named = dict(zip(self._term_names, terms, strict=True))
+        info: dict[str, Any] = {
+            "status": _STATUS_NAMES[status],
+            "contact": None,
+            "contact_with": None,
+            "limits_exceeded": int(limits),
+            "returning": returning > 0.0,
+            "covered": int(covered),
+            "energy_Wh": energy_Wh,
+            "reward_terms": named,
+        }
+        if contact:
+            info["contact"] = kind = CONTACT_NAMES[int(contact)]
+            if kind in self._partners:
+                info["contact_with"] = self._partners[kind][int(contact_with)]
+        if self._chooses:
+            info["action_mask"] = self.action_mask(i)
+        if self._filters:
+            info["filter"] = {
+                "changed": filtered > 0.0,
+                "asked": _described(self._scratch.commands[i]),
+                "applied": _described(self._scratch.outcome[i]["applied_command"]),
+            }
+        return info
+
+    def action_mask(self, i: int) -> NDArray[np.int8]:
+        """(choices,) 1 where a choice of UAS i exists now."""
+        return self._kind.masks(self._learners.candidates[i]).astype(np.int8)
+
+
+def _described(command: np.void) -> dict[str, Any]:
+    return {"kind": KIND_NAMES[int(command["kind"])], "values": command["values"].tolist()}
