@@ -12,6 +12,7 @@ from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.express import Moment
 from uas_coverage_env.env.global_state import global_state
+from uas_coverage_env.env.interface import flat
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
 from uas_coverage_env.env.named import namer_of
@@ -22,7 +23,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES, SwarmState
+from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.arena import ARENA
 
 _FLOAT32 = np.dtype(np.float32)
@@ -69,13 +70,9 @@ class Episode:
         self.max_cycles = scenario.max_steps
         self.chooses = settings.chooses
         self._filters = settings.safety_filter
-        self._tells_more = self.chooses or self._filters
+        self._masks = self.chooses and not settings.mask_in_observation
+        self._tells_more = self._masks or self._filters or settings.flat_infos
         self._named_terms = namer_of(settings.term_names)
-        self._partners = {
-            "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
-            "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
-            "uas": self.names,
-        }
         self.tables = tables_of(scenario, self.actions)
         self._sizes = learners_sizes(settings, self.actions.size)
         sizes = ARENA.sizes_of(self._world.arena, self._sizes)
@@ -223,22 +220,18 @@ class Episode:
             energy_Wh, contact, contact_with, limits, status, filtered, returning, covered, _
         ) = row  # fmt: skip
         info: dict[str, Any] = {
-            "status": STATUS_NAMES[int(status)],
-            "contact": None,
-            "contact_with": None,
+            "status": int(status),
+            "contact": int(contact),
+            "contact_with": int(contact_with),
             "limits_exceeded": int(limits),
             "returning": returning > 0.0,
             "covered": int(covered),
             "energy_Wh": energy_Wh,
             "reward_terms": self._named_terms(self._terms[i]),
         }
-        if contact:
-            info["contact"] = kind = CONTACT_NAMES[int(contact)]
-            if kind in self._partners:
-                info["contact_with"] = self._partners[kind][int(contact_with)]
         if not self._tells_more:
             return info
-        if self.chooses:
+        if self._masks:
             info["action_mask"] = self.action_mask(i)
         if self._filters:
             info["filter"] = {
@@ -246,7 +239,7 @@ class Episode:
                 "asked": _described(self._scratch.commands[i]),
                 "applied": _described(self._scratch.outcome[i]["applied_command"]),
             }
-        return info
+        return flat(info) if self.settings.flat_infos else info
 
     def action_mask(self, i: int) -> NDArray[np.int8]:
         """(choices,) 1 where a choice of UAS i exists now."""
@@ -254,4 +247,4 @@ class Episode:
 
 
 def _described(command: np.void) -> dict[str, Any]:
-    return {"kind": KIND_NAMES[int(command["kind"])], "values": command["values"].tolist()}
+    return {"kind": int(command["kind"]), "values": command["values"].copy()}
