@@ -111,7 +111,7 @@ def _village_sync(num_envs: int, threads: int) -> Steps:
 
     def flying(infos: dict[str, Any]) -> float:
         fleet = (uas for name, uas in infos["uas"].items() if not name.startswith("_"))
-        return float(sum((uas["status"] == "flying").sum() for uas in fleet))
+        return float(sum((uas["status"] == 0).sum() for uas in fleet))
 
     return _vector(env, flying)
 

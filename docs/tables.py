@@ -25,6 +25,7 @@ from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, Coverage
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
 from uas_coverage_env.env.rewards import rewards_table
+from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.registry import GROUP, KINDS, describe_planners
 from uas_coverage_env.scenario.schema import scenario_schema
@@ -61,7 +62,7 @@ def environment_summary() -> str:
         ("State shape", f"`{env.state_space.shape}` in `{SCENARIO}`"),
         ("Parallel API", "yes"),
         ("Manual control", "no"),
-        ("Render modes", ", ".join(f"`{mode}`" for mode in env.metadata["render_modes"])),
+        ("Render modes", ", ".join(f"`{mode}`" for mode in RENDER_MODES)),
     ]
     return table((env.metadata["name"], ""), rows)
 

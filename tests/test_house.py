@@ -130,18 +130,33 @@ def test_no_python_file_is_much_longer_than_400_lines():
     assert {name: n for name, n in lengths.items() if n > LONGEST_FILE} == {}
 
 
-def test_constraints_pin_exact_versions_and_nothing_else():
-    lines = (ROOT / "constraints.txt").read_text().splitlines()
-    requirements = [Requirement(line) for line in lines if not line.startswith("#")]
-    for requirement in requirements:
-        (pin,) = requirement.specifier
-        assert pin.operator == "=="
-        assert requirement.url is None
-        assert "+" not in pin.version, f"{requirement}: a local version is on no index"
+def pinned(file: str) -> dict[str, str]:
+    """Package -> version of a file of constraints, which pins exact versions and nothing else."""
+    versions = {}
+    for line in (ROOT / file).read_text().splitlines():
+        if not line.startswith("#"):
+            requirement = Requirement(line)
+            (pin,) = requirement.specifier
+            assert pin.operator == "=="
+            assert requirement.url is None
+            assert "+" not in pin.version, f"{requirement}: a local version is on no index"
+            versions[_canonical(requirement.name)] = pin.version
+    return versions
+
+
+def test_developers_constraints_pin_all_that_tests_need():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]
-    pinned = {_canonical(requirement.name) for requirement in requirements}
-    assert {_canonical(Requirement(text).name) for text in needed} <= pinned
+    names = {_canonical(Requirement(text).name) for text in needed}
+    assert names <= pinned("constraints-dev.txt").keys()
+
+
+def test_users_constraints_leave_room_for_learners_libraries():
+    users = pinned("constraints.txt")
+    assert users.items() <= pinned("constraints-dev.txt").items()
+    assert {"numba", "numpy", "scipy", "highspy"} <= users.keys()
+    # RLlib and AgileRL need versions of their own
+    assert not users.keys() & {"gymnasium", "pettingzoo", "torch", "pandas", "packaging", "ray"}
 
 
 def _canonical(name: str) -> str:
@@ -150,7 +165,7 @@ def _canonical(name: str) -> str:
 
 def test_ci_runs_what_the_readme_tells_a_newcomer():
     script = (ROOT / ".ci" / "run").read_text()
-    command = 'python -m pip install -c constraints.txt ".[test]" && python -m pytest -n 2'
+    command = 'python -m pip install -c constraints-dev.txt ".[test]" && python -m pytest -n 2'
     assert all(part in script for part in command.split(" && "))
     assert command in (ROOT / "README.md").read_text()
 

@@ -53,6 +53,16 @@ def test_the_site_is_built_as_contributing_says():
         assert command.removesuffix(" --check") in CONTRIBUTING
 
 
+def test_every_library_of_the_clients_tests_is_installed_by_a_job():
+    jobs = [entry["tests"].split() for entry in matrix("clients", "library")["include"]]
+    named = [f"test_{name}.py" for names in jobs for name in names]
+    files = {path.name for path in (ROOT / "tests" / "clients").glob("test_*.py")}
+    assert len(named) == len(set(named))
+    assert files - set(named) == {"test_gymnasium_wrappers.py", "test_loops.py"}
+    assert set(named) <= files
+    assert " -c constraints.txt " in steps("clients")[0]
+
+
 def test_the_next_numba_may_be_newer_than_the_bound():
     installs = [command for command in steps("numba-next") if "pip install" in command]
     assert "numba" not in installs[0]

@@ -24,13 +24,25 @@ from uas_coverage_env.vehicle import (
     simulate_battery,
     vehicle_names,
 )
-from uas_coverage_env.world import Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
+from uas_coverage_env.world import (
+    Acceleration,
+    Command,
+    CommandKind,
+    ContactKind,
+    GoTo,
+    SwarmState,
+    UasStatus,
+    Velocity,
+    Wrench,
+)
 
 register_environments()
 
 __all__ = [
     "Acceleration",
     "Command",
+    "CommandKind",
+    "ContactKind",
     "Decision",
     "Flight",
     "GoTo",
@@ -40,6 +52,7 @@ __all__ = [
     "Planner",
     "Scenario",
     "SwarmState",
+    "UasStatus",
     "VehicleParams",
     "Velocity",
     "World",

@@ -24,6 +24,12 @@ def test_gymnasium_finds_nothing_wrong(scenario, action, dynamics, monkeypatch):
     check_env(env.unwrapped)
 
 
+def test_gymnasium_finds_nothing_wrong_with_masks_in_observations():
+    settings = {"action": "waypoint", "mask_in_observation": True}
+    env = gymnasium.make(ID, scenario="generated", **settings)
+    check_env(env.unwrapped, skip_render_check=True)
+
+
 @pytest.mark.parametrize(("scenario", "action"), SCENARIO_AND_ACTION)
 def test_stable_baselines_finds_nothing_wrong(scenario, action):
     checker = pytest.importorskip("stable_baselines3.common.env_checker")

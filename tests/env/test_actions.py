@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from practice_grounds import practice_ground
 
-from uas_coverage_env import GoTo, uas_coverage_v0
+from uas_coverage_env import GoTo, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import ACTION_NAMES, HOME_CHOICE, K_WAYPOINTS
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.scenario import load_scenario
@@ -26,7 +26,7 @@ def commands_after(action, kind="velocity"):
     """Values of the command that the action of uas_1 becomes."""
     env = env_of(kind, safety_filter=True)
     *_, infos = env.step({"uas_1": action, "uas_2": np.zeros_like(np.asarray(action))})
-    return infos["uas_1"]["filter"]["asked"]["values"]
+    return infos["uas_1"]["filter"]["asked"]["values"].tolist()
 
 
 def snapshot(env):
@@ -225,7 +225,7 @@ def test_choosing_the_nearest_waypoint_covers_it_and_home_lands():
         if not env.agents:
             break
         *_, infos = env.step(dict.fromkeys(env.agents, HOME_CHOICE))
-    assert {info["status"] for info in infos.values()} == {"landed"}
+    assert {info["status"] for info in infos.values()} == {UasStatus.LANDED}
 
 
 @pytest.mark.parametrize("name", ["Velocity", "goto", "", None])

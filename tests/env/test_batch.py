@@ -13,7 +13,7 @@ from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
-from uas_coverage_env.world import FLYING, LOST, STATUS_NAMES, build_arena
+from uas_coverage_env.world import FLYING, LOST, build_arena
 from uas_coverage_env.world.arena import ARENA
 
 MIXED = (
@@ -52,7 +52,7 @@ def assert_is(batch, lane, env, observations, rewards=None, infos=None):
             terms = batch.learners.terms[lane, i].tolist()
             assert list(info["reward_terms"].values()) == terms
             assert info["energy_Wh"] == report[ENERGY]
-            assert info["status"] == STATUS_NAMES[int(report[STATUS])]
+            assert info["status"] == report[STATUS]
             assert info["limits_exceeded"] == report[LIMITS]
             if batch.chooses:
                 mask = batch.action_masks()[lane, i]

@@ -193,7 +193,7 @@ PLAIN = ObservationBlock("plain", 1, (Feature("zero", 1, 0, 1, "always 0"),), no
         ({"reward": (*REWARD, 3.0)}, "3.0 is no RewardTerm"),
         ({"reward": (SLOW, SLOW)}, "give each a name of its own"),
         ({"reward_weights": {"slow": 1.0}}, "no reward term 'slow'"),
-        ({"rewards": PAID}, "there is no argument 'rewards'; there are action"),
+        ({"rewards": PAID}, "unexpected keyword argument 'rewards'; there are action"),
         (
             {"observation": (*OBSERVATION, PLAIN)},
             "not_compiled is no compiled function; decorate it with",

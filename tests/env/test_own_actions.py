@@ -24,7 +24,7 @@ from own_actions import (
 )
 from practice_grounds import practice_ground
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import UasStatus, uas_coverage_v0
 from uas_coverage_env.env import ActionKind, CoverageBatch
 from uas_coverage_env.env.actions import ACTIONS
 from uas_coverage_env.vehicle import VX, VY, VZ, load_vehicle
@@ -135,7 +135,7 @@ def test_a_kind_that_goes_to_places_has_guidance():
     for _ in range(40):
         if env.agents:
             *_, infos = env.step(dict.fromkeys(env.agents, GO_HOME))
-    assert {info["status"] for info in infos.values()} == {"landed"}
+    assert {info["status"] for info in infos.values()} == {UasStatus.LANDED}
 
 
 def test_it_runs_on_a_simulated_gpu():

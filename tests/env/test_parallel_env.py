@@ -8,7 +8,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import ContactKind, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import load_scenario
@@ -110,7 +110,7 @@ def test_reset_begins_the_same_mission_again():
     for agent, observation in first.items():
         np.testing.assert_array_equal(observation, again[agent])
     assert infos["uas_1"]["energy_Wh"] == 0.0
-    assert infos["uas_1"]["status"] == "flying"
+    assert infos["uas_1"]["status"] == UasStatus.FLYING
     assert not any(infos["uas_1"]["reward_terms"].values())
 
 
@@ -146,7 +146,8 @@ def test_types_are_plain():
     assert type(info["covered"]) is int
     assert type(info["energy_Wh"]) is float
     assert type(info["returning"]) is type(info["filter"]["changed"]) is bool
-    assert info["contact"] is info["contact_with"] is None
+    assert (info["contact"], info["contact_with"]) == (ContactKind.NONE, -1)
+    assert type(info["contact"]) is type(info["contact_with"]) is type(info["status"]) is int
 
 
 def test_return_mode_brings_all_home_whatever_is_asked():
@@ -158,7 +159,7 @@ def test_return_mode_brings_all_home_whatever_is_asked():
         *_, infos = env.step({agent: np.array([0.0, 0.1, 0.0]) for agent in env.agents})
         returned = returned or any(info["returning"] for info in infos.values())
     assert returned
-    assert {info["status"] for info in infos.values()} == {"landed"}
+    assert {info["status"] for info in infos.values()} == {UasStatus.LANDED}
 
 
 def test_the_filter_keeps_random_flight_whole():
@@ -167,7 +168,7 @@ def test_the_filter_keeps_random_flight_whole():
     rng = np.random.default_rng(0)
     while env.agents:
         *_, truncations, infos = env.step({a: rng.uniform(-1, 1, 3) for a in env.agents})
-        assert all(info["status"] != "lost" for info in infos.values())
+        assert all(info["status"] != UasStatus.LOST for info in infos.values())
     assert all(truncations.values())
 
 

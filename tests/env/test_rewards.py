@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from practice_grounds import practice_ground
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import CommandKind, ContactKind, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE, REWARD, REWARD_TERMS, rewards_table
 
 
@@ -41,7 +41,7 @@ def test_a_mission_pays_for_what_happens_in_it():
     assert paid == pytest.approx(6.0)
     for agent in env.possible_agents:
         last = [infos[agent] for *_, infos in steps if agent in infos][-1]
-        assert last["status"] == "landed"
+        assert last["status"] == UasStatus.LANDED
         assert term(steps, "home", agent)[-1] == pytest.approx(5.0)
         assert sum(term(steps, "home", agent)) == pytest.approx(5.0)
         assert sum(term(steps, "energy", agent)) == pytest.approx(-0.2 * last["energy_Wh"])
@@ -100,9 +100,9 @@ def test_leaving_the_fence_is_a_violation():
     steps = run(env, lambda *_: np.array([0.0, 1.0, 0.0]))
     rewards, terminations, truncations, infos = steps[-1]
     for agent in env.possible_agents:
-        assert infos[agent]["contact"] == "geofence"
-        assert infos[agent]["contact_with"] is None
-        assert infos[agent]["status"] == "lost"
+        assert infos[agent]["contact"] == ContactKind.GEOFENCE
+        assert infos[agent]["contact_with"] == -1
+        assert infos[agent]["status"] == UasStatus.LOST
         assert infos[agent]["reward_terms"]["violation"] == -10.0
         assert terminations[agent]
         assert not truncations[agent]
@@ -112,22 +112,24 @@ def test_leaving_the_fence_is_a_violation():
 def test_a_contact_names_what_was_hit():
     env = uas_coverage_v0.parallel_env(practice_ground(n_uas=1, tower=True))
     *_, infos = run(env, lambda *_: np.array([0.0, -0.5, -0.5]))[-1]
-    assert (infos["uas_1"]["contact"], infos["uas_1"]["contact_with"]) == ("obstacle", "tower")
+    hit = infos["uas_1"]
+    assert hit["contact"] == ContactKind.OBSTACLE
+    assert env.scenario.obstacles[hit["contact_with"]].name == "tower"
 
 
 def test_two_that_meet_name_each_other():
     env = uas_coverage_v0.parallel_env(practice_ground())
     speed = {"uas_1": 0.3, "uas_2": -0.3}
     *_, infos = run(env, lambda agent, *_: np.array([speed[agent], 0.0, -0.5]))[-1]
-    assert infos["uas_1"]["contact_with"] == "uas_2"
-    assert infos["uas_2"]["contact_with"] == "uas_1"
-    assert infos["uas_1"]["contact"] == infos["uas_2"]["contact"] == "uas"
+    assert env.possible_agents[infos["uas_1"]["contact_with"]] == "uas_2"
+    assert env.possible_agents[infos["uas_2"]["contact_with"]] == "uas_1"
+    assert infos["uas_1"]["contact"] == infos["uas_2"]["contact"] == ContactKind.UAS
 
 
 def test_a_battery_that_is_overdrawn_costs_the_uas():
     env = uas_coverage_v0.parallel_env(practice_ground(n_uas=1, soc_0=0.26))
     *_, infos = run(env, lambda *_: np.zeros(3))[-1]
-    assert infos["uas_1"]["contact"] == "battery"
+    assert infos["uas_1"]["contact"] == ContactKind.BATTERY
 
 
 def test_who_still_flies_at_the_end_is_stranded():
@@ -157,15 +159,17 @@ def test_what_the_filter_changes_has_a_price():
         *_, infos = env.step({"uas_1": np.array([0.0, 1.0, 0.0])})
         info = infos["uas_1"]
         asked, applied = info["filter"]["asked"], info["filter"]["applied"]
-        assert asked == {"kind": "velocity", "values": [0.0, 12.0, 20.0, 0.0]}
+        assert asked["kind"] == CommandKind.VELOCITY
+        assert asked["values"].tolist() == [0.0, 12.0, 20.0, 0.0]
         price = info["reward_terms"]["filter"]
         if info["filter"]["changed"]:
             changed.append(price)
-            away = np.hypot(*(np.array(applied["values"]) - asked["values"])[:2])
+            away = np.hypot(*(applied["values"] - asked["values"])[:2])
             assert price == pytest.approx(-0.1 * away / 12.0)
         else:
             assert price == 0.0
-            assert applied == asked
+            assert applied["kind"] == asked["kind"]
+            np.testing.assert_array_equal(applied["values"], asked["values"])
     assert any(price < 0 for price in changed)
     assert env.agents == ["uas_1"]
 

@@ -15,7 +15,6 @@ from uas_coverage_env.env import CoverageSwarmEnv, CoverageVectorEnv
 from uas_coverage_env.env.batch_kernel import ABSENT
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.screen import Screen
-from uas_coverage_env.world import STATUS_NAMES
 
 ID = "UASCoverage-v0"
 GROUND = practice_ground(tower=True, n_moving=1, max_steps=25)
@@ -51,7 +50,8 @@ def assert_same_infos(infos, expected):
         if isinstance(info, np.ndarray):
             continue
         for lane in np.flatnonzero(info["_status"]):
-            assert STATUS_NAMES[infos["status"][lane, i // 2]] == info["status"][lane]
+            for name in ("status", "contact", "contact_with", "limits_exceeded", "returning"):
+                assert infos[name][lane, i // 2] == info[name][lane]
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
@@ -59,8 +59,8 @@ def assert_same_infos(infos, expected):
 def test_it_is_a_sync_vector_env_bit_for_bit(action, mode):
     settings = {"action": action, "autoreset_mode": mode, "max_cycles": 12}
     env, twin = make(**settings), in_turn(**settings)
+    assert env.metadata["autoreset_mode"] == env.autoreset_mode == mode
     assert isinstance(env, VectorEnv)
-    assert env.metadata["autoreset_mode"] == mode
     for space in ("single_observation_space", "observation_space", "single_action_space"):
         assert getattr(env, space) == getattr(twin, space)
     assert env.action_space == twin.action_space

@@ -4,6 +4,6 @@ Pillow is imported when the first `Picture` is made, pygame when the first windo
 """
 
 from uas_coverage_env.draw.picture import Picture, picture
-from uas_coverage_env.draw.window import NoDisplayError, Window
+from uas_coverage_env.draw.window import NoDisplayError, Window, window_possible
 
-__all__ = ["NoDisplayError", "Picture", "Window", "picture"]
+__all__ = ["NoDisplayError", "Picture", "Window", "picture", "window_possible"]

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,15 @@ _NAP_MS = 100
 
 class NoDisplayError(RuntimeError):
     """There is no screen on which a window could be opened."""
+
+
+def window_possible() -> bool:
+    """Whether a window could be opened now: pygame-ce is installed, and there is a display."""
+    return find_spec("pygame") is not None and _display_found()
+
+
+def _display_found() -> bool:
+    return sys.platform != "linux" or any(os.environ.get(name) for name in _WITH_A_DISPLAY)
 
 
 class Window:
@@ -46,7 +56,7 @@ class Window:
             raise ImportError(
                 'a window needs pygame-ce: pip install "uas-coverage-env[human]"'
             ) from error
-        if sys.platform == "linux" and not any(os.environ.get(name) for name in _WITH_A_DISPLAY):
+        if not _display_found():
             raise NoDisplayError("a window needs a display, and DISPLAY is not set")
         self.dismissed = False
         self._pygame = pygame

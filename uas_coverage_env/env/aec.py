@@ -22,13 +22,15 @@ class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
     """
 
     def step(self, action: Any) -> None:
-        """Take the turn of `agent_selection`.
+        """Take the turn of `agent_selection`; what one that has ended is asked is ignored.
 
         Raises:
             ValueError: The action is invalid; names agent and value, and nothing has changed.
         """
         agent = self.agent_selection
-        if self.agents and not (self.terminations[agent] or self.truncations[agent]):
+        if self.agents and (self.terminations[agent] or self.truncations[agent]):
+            action = None  # as PettingZoo wants it
+        elif self.agents:
             self._parallel.check_action(agent, action)
         super().step(action)
 

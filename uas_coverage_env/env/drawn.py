@@ -1,6 +1,6 @@
 """Missions of a batch that are drawn one by one: every lane has a slot for its own."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -74,7 +74,7 @@ class DrawnPool:
         """
         if given is None:
             return None
-        if isinstance(given, str | Path | Scenario):
+        if isinstance(given, str | Path | Scenario | Mapping):
             return [self._source.fitted(given)] * num_envs
         if not isinstance(given, Sequence) or len(given) != num_envs:
             raise ValueError(

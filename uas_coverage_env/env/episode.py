@@ -89,7 +89,7 @@ class Episode:
         self.asked = self._learners.asked
         self.asked_rows = list(self.asked)
         self._report, self._paid = self._learners.report, self._learners.terms
-        self.infos = Infos(self.scenario, self.settings, self._learners, self._scratch)
+        self.infos = Infos(self.settings, self._learners, self._scratch)
         self._acting = acting_of(kind)
         self._checks = is_own(self._acting)
         self._paying = paying_of(self.settings.reward, self.settings.weights)

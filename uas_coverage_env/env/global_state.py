@@ -3,7 +3,9 @@
 For each UAS its `own` group of the observation, then whether it has landed and whether it is lost;
 for each moving obstacle its place in the box around the fence (north, east, up; ±1 are the sides)
 and its velocity (north, east, down / 20 m/s); for each waypoint whether it is still to be covered.
-There is room for the largest mission of the environment: what a mission lacks is zero.
+There is room for the largest mission of the environment, and for four moving obstacles at least:
+what a mission lacks is zero. So the size is the same wherever fleet and number of waypoints (with a
+family or generator, the most that it may have) are the same and no more than four obstacles move.
 """
 
 import numpy as np

@@ -6,39 +6,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.env.interface import flat
 from uas_coverage_env.env.memory import Learners, Scratch
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES
-
-_STATUS_NAMES: dict[float, str] = dict(enumerate(STATUS_NAMES))
-"""By the floats of a report."""
 
 
 class Infos:
     """The infos of `CoverageParallelEnv`.
 
     Args:
-        scenario: The scenario.
         settings: How it is flown.
         learners: The arrays of the mission.
         scratch: Likewise.
     """
 
-    def __init__(
-        self, scenario: Scenario, settings: MissionSettings, learners: Learners, scratch: Scratch
-    ) -> None:
+    def __init__(self, settings: MissionSettings, learners: Learners, scratch: Scratch) -> None:
         self._term_names = settings.term_names
         self._usual = self._term_names == REWARD_TERMS
-        self._partners = {
-            "obstacle": tuple(obstacle.name for obstacle in scenario.obstacles),
-            "moving_obstacle": tuple(obstacle.name for obstacle in scenario.moving_obstacles),
-            "uas": tuple(uas.name for uas in scenario.uas),
-        }
         self._kind = settings.kind
-        self._chooses = settings.chooses
+        self._masks = settings.chooses and not settings.mask_in_observation
         self._filters = settings.safety_filter
+        self._flat = settings.flat_infos
+        self._tells_more = self._masks or self._filters or self._flat
         self._learners = learners
         self._scratch = scratch
 
@@ -67,20 +57,18 @@ class Infos:
         else:
             named = dict(zip(self._term_names, terms, strict=True))
         info: dict[str, Any] = {
-            "status": _STATUS_NAMES[status],
-            "contact": None,
-            "contact_with": None,
+            "status": int(status),
+            "contact": int(contact),
+            "contact_with": int(contact_with),
             "limits_exceeded": int(limits),
             "returning": returning > 0.0,
             "covered": int(covered),
             "energy_Wh": energy_Wh,
             "reward_terms": named,
         }
-        if contact:
-            info["contact"] = kind = CONTACT_NAMES[int(contact)]
-            if kind in self._partners:
-                info["contact_with"] = self._partners[kind][int(contact_with)]
-        if self._chooses:
+        if not self._tells_more:
+            return info
+        if self._masks:
             info["action_mask"] = self.action_mask(i)
         if self._filters:
             info["filter"] = {
@@ -88,7 +76,7 @@ class Infos:
                 "asked": _described(self._scratch.commands[i]),
                 "applied": _described(self._scratch.outcome[i]["applied_command"]),
             }
-        return info
+        return flat(info) if self._flat else info
 
     def action_mask(self, i: int) -> NDArray[np.int8]:
         """(choices,) 1 where a choice of UAS i exists now."""
@@ -96,4 +84,4 @@ class Infos:
 
 
 def _described(command: np.void) -> dict[str, Any]:
-    return {"kind": KIND_NAMES[int(command["kind"])], "values": command["values"].tolist()}
+    return {"kind": int(command["kind"]), "values": command["values"].copy()}

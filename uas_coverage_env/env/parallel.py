@@ -13,16 +13,17 @@ from pettingzoo import ParallelEnv
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import action_of
 from uas_coverage_env.env.global_state import global_space
+from uas_coverage_env.env.interface import LastKnown, observation_space, with_mask
 from uas_coverage_env.env.memory import REWARD, STATUS
-from uas_coverage_env.env.observation import observation_bounds
-from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, Command, SwarmState
 
-Observations = dict[str, NDArray[np.float32]]
+Observations = dict[str, Any]
+"""Of each agent that acted: an array, or a dictionary with `mask_in_observation`."""
 Infos = dict[str, dict[str, Any]]
 
 
@@ -59,7 +60,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         An action for an agent that has ended, or that the mission does not have, is ignored.
 
     Observation Space:
-        A float32 `Box`, the same for all agents and all scenarios. What lies beyond its bounds is
+        A float32 `Box`, the same for all agents and all scenarios; with `mask_in_observation` a
+        `Dict` of it and the mask. What lies beyond its bounds is
         clipped. Directions are those of the map: they do not turn with the UAS.
 
         {observations}
@@ -73,12 +75,18 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         {rewards}
 
     Infos:
-        `status` (flying, landed, lost); `contact` and `contact_with` (what it was lost to, else
-        None); `limits_exceeded` (the vehicle's limits beyond which it is, as a mask: bit k for
-        `vehicle.LIMIT_NAMES[k]`); `returning` (it flies home); `covered`
-        (waypoints the swarm has covered so far); `energy_Wh` (drawn by this UAS so far);
-        `reward_terms`; `action_mask` with the waypoint action; `filter` (changed, asked, applied)
-        with the safety filter.
+        Numbers and arrays, each of the same kind and shape in every step; enumerations of the
+        package name the codes.
+
+        `status` (`UasStatus`: 0 flying, 1 landed, 2 lost); `contact`, what it was lost to
+        (`ContactKind`: 0 nothing, 1 obstacle, 2 moving obstacle, 3 UAS, 4 geofence, 5 battery), and
+        `contact_with`, its index among those of the scenario, else -1; `limits_exceeded` (the
+        vehicle's limits beyond which it is, as a mask: bit k for `vehicle.LIMIT_NAMES[k]`);
+        `returning` (it flies home); `covered` (waypoints the swarm has covered so far);
+        `energy_Wh` (drawn by this UAS so far); `reward_terms`, a dictionary; `action_mask` with the
+        waypoint action; with the safety filter `filter`, a dictionary of `changed`, and of the
+        commands `asked` and `applied`, each with `kind` (`CommandKind`) and four `values`. The last
+        info of an agent that has ended is complete.
 
     Starting State:
         All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
@@ -106,7 +114,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
         "name": "uas_coverage_v0",
-        "render_modes": list(RENDER_MODES),
+        "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,
         "is_parallelizable": True,
     }
@@ -126,10 +134,12 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self.agents: list[str] = []
         self._begun = False
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
-        low, high = observation_bounds(self._episode.settings.observation)
+        flown = self._episode.settings
+        self._masks = flown.mask_in_observation
+        self._told: tuple[Observations, Infos] = ({}, {})
         # one object per agent: a learner seeds them one by one
-        self._observation_spaces: dict[str, Any] = {
-            agent: spaces.Box(low, high, dtype=np.float32) for agent in self.possible_agents
+        self._observation_spaces = {
+            agent: observation_space(flown) for agent in self.possible_agents
         }
         self._action_spaces = {
             agent: self._episode.actions.space() for agent in self.possible_agents
@@ -153,7 +163,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """The scenario flown; where it is drawn, `reset` comes first."""
         return self._missions.scenario
 
-    def observation_space(self, agent: str) -> spaces.Space[NDArray[np.float32]]:
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
         """The space of an agent's observations; always the same object."""
         return self._observation_spaces[agent]
 
@@ -189,7 +199,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         observations = dict(zip(self.agents, episode.observation, strict=True))
         rows = zip(self.agents, episode.report, episode.terms, strict=True)
         infos = {agent: episode.infos.of(i, *each) for i, (agent, *each) in enumerate(rows)}
-        return observations, infos
+        self._told = ({}, {})
+        return self._with_masks(observations, infos) if self._masks else (observations, infos)
 
     def step(
         self, actions: Mapping[str, Any]
@@ -248,6 +259,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         if self.render_mode is not None:
             self._screen.see(episode.positions_m)
             self._show()
+        if self._masks:
+            observations, infos = self._with_masks(observations, infos)
         return observations, rewards, terminations, truncations, infos
 
     def check_action(self, agent: str, action: Any) -> None:
@@ -305,6 +318,12 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     def close(self) -> None:
         """Close the window, if there is one; closing twice does no harm."""
         self._screen.close()
+
+    def _with_masks(self, seen: Observations, infos: Infos) -> tuple[Observations, Infos]:
+        mask_of, index, before = self._episode.infos.action_mask, self._index, self._told
+        masked = {agent: with_mask(seen[agent], mask_of(index[agent])) for agent in seen}
+        self._told = LastKnown(masked, before[0]), LastKnown(infos, before[1])
+        return self._told
 
     def _show(self) -> None:
         if self.render_mode == "human":

@@ -14,7 +14,7 @@ from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES, Fir
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
-from uas_coverage_env.scenario import Scenario, load_scenario
+from uas_coverage_env.scenario import Scenario, loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import Disturbance, fitted_to, in_slots
@@ -85,7 +85,7 @@ class ScenarioPool:
         given = [scenario] if isinstance(scenario, str | Path | Scenario) else scenario
         settings = settings or MissionSettings()
         self.settings = settings
-        self.scenarios = tuple(_loaded(entry, settings) for entry in given)
+        self.scenarios = tuple(settings.limited(loaded_scenario(entry)) for entry in given)
         acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
         if disturbances is None:
             self.disturbances, slots = in_slots(acting)
@@ -139,9 +139,3 @@ class ScenarioPool:
                 f"the pool has indices from 0 to {len(self) - 1}"
             )
         return chosen.astype(np.int64)
-
-
-def _loaded(scenario: str | Path | Scenario, settings: MissionSettings) -> Scenario:
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    return settings.limited(scenario)

@@ -1,12 +1,13 @@
 """What `render` shows: the picture of the present state with the paths flown so far."""
 
+from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Picture, Window
+from uas_coverage_env.draw import Picture, Window, window_possible
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import SwarmState
 
@@ -15,6 +16,15 @@ RENDER_FPS = 20
 
 _PICTURE_PX = 512
 _WINDOW_PX = 720
+
+
+def offered(modes: Sequence[str]) -> list[str]:
+    """The modes of `metadata["render_modes"]`, all of which checkers of environments try out.
+
+    "human" is among them only where a window can be opened; `render_mode="human"` says elsewhere
+    what is missing.
+    """
+    return [mode for mode in modes if mode != "human" or window_possible()]
 
 
 class Screen:

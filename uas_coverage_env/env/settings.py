@@ -20,6 +20,14 @@ from uas_coverage_env.world.disturbance import checked_disturbances
 _LONGEST = 100_000
 
 
+class UnknownArgumentError(ValueError, TypeError):
+    """An argument that there is not.
+
+    A ValueError like all that is wrong in settings; and Python's own TypeError, for libraries that
+    find out which arguments an environment takes (TorchRL's `GymEnv`).
+    """
+
+
 @dataclass(frozen=True)
 class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
@@ -35,6 +43,11 @@ class MissionSettings:
         reward: Terms that the reward is made of, see `RewardTerm`.
         disturbances: What pushes back, see `Disturbance`; None: what each scenario says; with ()
             nothing does.
+        mask_in_observation: With choices (waypoint), an observation is a dictionary of
+            `observation` and `action_mask`, for libraries that do not read infos; the mask is not
+            in the infos then.
+        flat_infos: Infos have no sub-dictionaries, but `reward_terms_home` and so on, for libraries
+            that make an array of every info (TorchRL).
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.
@@ -49,17 +62,24 @@ class MissionSettings:
     observation: tuple[ObservationBlock, ...] = OBSERVATION
     reward: tuple[RewardTerm, ...] = REWARD
     disturbances: tuple[Disturbance, ...] | None = None
+    mask_in_observation: bool = False
+    flat_infos: bool = False
 
     def __post_init__(self) -> None:
         kind_of(self.action)
         if self.dynamics not in get_args(Dynamics):
             allowed = ", ".join(get_args(Dynamics))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
-        for name in ("return_mode", "safety_filter"):
+        for name in ("return_mode", "safety_filter", "mask_in_observation", "flat_infos"):
             switch = getattr(self, name)
             if not isinstance(switch, bool | np.bool_):
                 raise ValueError(f"{name} is {switch!r}; it is True or False")
             object.__setattr__(self, name, bool(switch))
+        if self.mask_in_observation and not self.chooses:
+            raise ValueError(
+                f"mask_in_observation is True, and action {self.kind.name!r} has no choices to "
+                f'mask; take action="waypoint", or leave it out'
+            )
         cycles = self.max_cycles
         whole = isinstance(cycles, int | np.integer) and not isinstance(cycles, bool)
         if cycles is not None and (not whole or not 1 <= cycles <= _LONGEST):
@@ -86,7 +106,9 @@ class MissionSettings:
         known = [field.name for field in fields(cls)]
         for name in given:
             if name not in known:
-                raise ValueError(f"there is no argument {name!r}; there are {', '.join(known)}")
+                raise UnknownArgumentError(
+                    f"unexpected keyword argument {name!r}; there are {', '.join(known)}"
+                )
         return cls(**given)
 
     @property

@@ -7,25 +7,26 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import joint_action_of
+from uas_coverage_env.env.interface import absent, flat, observation_space, with_mask
 from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
-from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
-from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen
+from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, Command, SwarmState
 
 
 @with_tables
-class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
+class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
     """One agent flies several UAS that cover an area; `CoverageParallelEnv` for a single mind.
 
     Description:
@@ -38,7 +39,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     Observation Space:
         The observations of all UAS one after the other, flying or not; zero for UAS that the
-        mission does not have. Of each:
+        mission does not have. With `mask_in_observation` a `Dict` of it and the masks. Of each UAS:
 
         {observations}
 
@@ -49,8 +50,8 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     Infos:
         `reward_terms`, `covered` and `energy_Wh` of the swarm; `uas`, the infos of every UAS by
-        name as in `CoverageParallelEnv`; with the waypoint action `action_mask`, those of all UAS
-        one after the other.
+        name as in `CoverageParallelEnv`, with `status` -1 (absent) for UAS that the mission does
+        not have; with the waypoint action `action_mask`, those of all UAS one after the other.
 
     Starting State:
         That of `CoverageParallelEnv`.
@@ -70,7 +71,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
-        "render_modes": list(RENDER_MODES),
+        "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,
     }
 
@@ -81,18 +82,25 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         render_mode: str | None = None,
         **settings: Any,
     ) -> None:
+        self._spec: EnvSpec | None = None
         self._missions = MissionSequence(scenario, MissionSettings.of(settings))
         self._episode = self._missions.episode
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode
         self._begun = False
         self._n_uas = n_uas = self._missions.source.room.n_uas
-        low, high = (
-            np.tile(bounds, n_uas)
-            for bounds in observation_bounds(self._episode.settings.observation)
-        )
-        self.observation_space = spaces.Box(low, high, dtype=np.float32)
+        self.observation_space = observation_space(self._episode.settings, n_uas)
         self.action_space = self._episode.actions.joint_space(n_uas)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made the environment; `spec.to_json()` holds the scenario, too."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        fixed = self._missions.source.fixed or self._episode.settings.max_cycles is not None
+        self._spec = plain_spec(spec, self._episode.max_cycles if fixed else None)
 
     @property
     def scenario(self) -> Scenario:
@@ -101,7 +109,7 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin a new mission.
 
         Args:
@@ -118,9 +126,9 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         if self.render_mode is not None:
             self._screen.begin(self._episode.scenario)
             self._see()
-        return self._observation(), self._info(self._episode.report)
+        return self._observation(), self._info(self._told(self._episode.report))
 
-    def step(self, action: Any) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Fly all UAS for one step.
 
         Args:
@@ -137,13 +145,13 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         for name, row, asked in zip(episode.names, rows, episode.asked, strict=False):
             episode.actions.accept(name, row, asked)
         report = episode.step()
-        info = self._info(report)
+        told = self._told(report)
         flies = any(row[STATUS] == FLYING for row in report)
         truncated = flies and episode.steps >= episode.max_cycles
         if self.render_mode is not None:
             self._see()
-        reward = reduce(add, info["reward_terms"].values())
-        return self._observation(), reward, not flies, truncated, info
+        reward = reduce(add, told["reward_terms"].values())
+        return self._observation(), reward, not flies, truncated, self._info(told)
 
     @property
     def brief(self) -> MissionBrief:
@@ -195,32 +203,41 @@ class CoverageSwarmEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         if self.render_mode == "human":
             self.render()
 
-    def _observation(self) -> NDArray[np.float32]:
+    def _observation(self) -> Any:
         """(U · V,) with rows of zeros for UAS that the mission does not have."""
         seen = self._episode.observation.ravel()
         missing = self._n_uas * self._episode.observation.shape[1] - len(seen)
-        return np.pad(seen, (0, missing)) if missing else seen
+        seen = np.pad(seen, (0, missing)) if missing else seen
+        masks = self._episode.settings.mask_in_observation
+        return with_mask(seen, self._action_mask()) if masks else seen
 
     def _action_mask(self) -> NDArray[np.int8]:
-        """(U · choices,) a UAS that the mission does not have has no waypoint to choose."""
+        """(U · choices,) of all UAS."""
+        # a UAS that the mission does not have has no waypoint to choose
         nothing = np.full(K_WAYPOINTS, -1)
         missing = self._episode.settings.kind.masks(nothing).astype(np.int8)
         masks = [self._episode.infos.action_mask(i) for i in range(len(self._episode.names))]
         return np.concatenate(masks + [missing] * (self._n_uas - len(masks)))
 
-    def _info(self, report: list[list[float]]) -> dict[str, Any]:
+    def _told(self, report: list[list[float]]) -> dict[str, Any]:
         episode = self._episode
         # not Python's `sum`, which rounds in another way than a kernel since 3.12
         terms = [reduce(add, column) for column in zip(*episode.terms, strict=True)]
-        info: dict[str, Any] = {
+        uas = {
+            name: episode.infos.of(i, row, episode.terms[i])
+            for i, (name, row) in enumerate(zip(episode.names, report, strict=True))
+        }
+        for name in self._missions.source.names[len(uas) :]:
+            uas[name] = absent(uas[episode.names[0]])
+        told: dict[str, Any] = {
             "reward_terms": dict(zip(episode.settings.term_names, terms, strict=True)),
             "covered": int(report[0][COVERED]),
             "energy_Wh": reduce(add, [row[ENERGY] for row in report]),
-            "uas": {
-                name: episode.infos.of(i, row, episode.terms[i])
-                for i, (name, row) in enumerate(zip(episode.names, report, strict=True))
-            },
+            "uas": uas,
         }
-        if episode.settings.chooses:
-            info["action_mask"] = self._action_mask()
-        return info
+        if episode.settings.chooses and not episode.settings.mask_in_observation:
+            told["action_mask"] = self._action_mask()
+        return told
+
+    def _info(self, told: dict[str, Any]) -> dict[str, Any]:
+        return flat(told) if self._episode.settings.flat_infos else told

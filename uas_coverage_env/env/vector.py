@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -18,13 +18,21 @@ from uas_coverage_env.env.batch_kernel import (
     SWARM_FIRST_TERM,
     SWARM_REWARD,
 )
-from uas_coverage_env.env.memory import CONTACT, FILTERED, LIMITS, RETURNING, STATUS
-from uas_coverage_env.env.observation import observation_bounds
-from uas_coverage_env.env.screen import RENDER_FPS
+from uas_coverage_env.env.interface import flat, observation_space, with_mask
+from uas_coverage_env.env.memory import (
+    CONTACT,
+    CONTACT_WITH,
+    FILTERED,
+    LIMITS,
+    RETURNING,
+    STATUS,
+)
+from uas_coverage_env.env.screen import RENDER_FPS, offered
 from uas_coverage_env.env.sequence import check_options
+from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import Command
+from uas_coverage_env.world import ABSENT, Command
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
@@ -34,7 +42,7 @@ _MODES = {
 _OF_EACH_MISSION = ("action_masks", "brief", "scenario", "swarm_state")
 
 Arrays = tuple[
-    NDArray[np.float32],
+    Any,
     NDArray[np.float64],
     NDArray[np.bool_],
     NDArray[np.bool_],
@@ -42,7 +50,7 @@ Arrays = tuple[
 ]
 
 
-class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
+class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     """`num_envs` missions of `CoverageSwarmEnv`, flown by one compiled call.
 
     Spaces, order, observations, rewards, terminations and truncations are those of
@@ -74,10 +82,10 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
     Infos:
         Arrays with the number of the sub-environment as first axis, each with its mask `_name`:
         `reward_terms` (a dictionary of these), `covered` and `energy_Wh` of the swarm, `scenario`,
-        `action_mask` with the waypoint action; and of all UAS (num_envs, U): `status` (index in
-        `world.STATUS_NAMES`, -1 where a mission has no such UAS), `contact` (index in
-        `world.CONTACT_NAMES`), `limits_exceeded` (a mask, bit k for `vehicle.LIMIT_NAMES[k]`),
-        `returning`, and `filtered` with the safety filter.
+        `action_mask` with the waypoint action; and of all UAS (num_envs, U): `status` (`UasStatus`,
+        -1 where a mission has no such UAS), `contact` (`ContactKind`), `contact_with`,
+        `limits_exceeded`, `returning` as in `CoverageParallelEnv`, and `filtered` with the safety
+        filter.
 
     Args:
         num_envs: How many.
@@ -86,6 +94,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         threads: How many of numba's threads share the missions, see `CoverageBatch`.
         copy: Whether observations are arrays of their own. False: they are overwritten by the step
             after the next, which spares a copy.
+        max_episode_steps: Gymnasium's name for the setting `max_cycles`; the smaller holds.
         render_mode: None; "rgb_array": `render` returns a tuple of pictures, 512 x 512 pixels each,
             as Gymnasium's wrappers ask for; "rgb_array_tiled": one array (H, W, 3) that shows the
             first 16 missions side by side; "human": a window with these (extra `human`).
@@ -96,7 +105,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  # as Gymnasium declares it
-        "render_modes": list(BATCH_RENDER_MODES),
+        "render_modes": offered(BATCH_RENDER_MODES),
         "render_fps": RENDER_FPS,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -109,6 +118,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         copy: bool = True,
+        max_episode_steps: int | None = None,
         render_mode: str | None = None,
         **settings: Any,
     ) -> None:
@@ -119,6 +129,10 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
             raise ValueError(
                 f"autoreset_mode is {autoreset_mode!r}; it is one of {allowed}"
             ) from error
+        if max_episode_steps is not None:
+            cycles = settings.get("max_cycles") or max_episode_steps
+            settings["max_cycles"] = min(cycles, max_episode_steps)
+        self._spec: EnvSpec | None = None
         self._batch = CoverageBatch(
             num_envs,
             scenario,
@@ -127,24 +141,33 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
             **settings,
         )
         self.metadata = {**self.metadata, "autoreset_mode": mode}
+        self.autoreset_mode = mode
         self.num_envs = self._batch.num_envs
         self.render_mode = render_mode
         self._tiles = Tiles(self.num_envs, render_mode)
         self.copy = copy
         self._begun = False
         self._same_step = mode == AutoresetMode.SAME_STEP
+        self._masks_seen = self._batch.settings.mask_in_observation
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
         self._attributes: dict[str, tuple[Any, ...]] = {}
         n_uas = self._batch.n_uas
-        low, high = (
-            np.tile(bounds, n_uas)
-            for bounds in observation_bounds(self._batch.settings.observation)
-        )
-        self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
+        self.single_observation_space = observation_space(self._batch.settings, n_uas)
         self.single_action_space = self._batch.actions.joint_space(n_uas)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made the environment; `spec.to_json()` holds the scenarios, too."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        limits = {scenario.max_steps for scenario in self._batch.pool.scenarios}
+        fixed = self._batch.settings.max_cycles is not None or not self._batch.draws
+        self._spec = plain_spec(spec, limits.pop() if fixed and len(limits) == 1 else None)
 
     @property
     def batch(self) -> CoverageBatch:
@@ -156,7 +179,7 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin new missions.
 
         Args:
@@ -297,9 +320,10 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         """Close the window, if there is one."""
         self._tiles.close()
 
-    def _shown(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        flat = observation.reshape(self.num_envs, -1)
-        return flat.copy() if self.copy else flat
+    def _shown(self, observation: NDArray[np.float32]) -> Any:
+        seen = observation.reshape(self.num_envs, -1)
+        seen = seen.copy() if self.copy else seen
+        return with_mask(seen, self.action_masks()) if self._masks_seen else seen
 
     def _infos(
         self,
@@ -316,30 +340,42 @@ class CoverageVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any
         terms: dict[str, Any] = {}
         for column, name in enumerate(self._batch.settings.term_names, SWARM_FIRST_TERM):
             terms[name] = swarm[:, column]
-            terms[f"_{name}"] = mask
+        status = report[:, :, STATUS].astype(np.int64)
         infos = {
             "reward_terms": terms,
             "covered": swarm[:, SWARM_COVERED].astype(np.int64),
             "energy_Wh": swarm[:, SWARM_ENERGY],
             "scenario": self._batch.lanes.scenario * mask,
-            "status": report[:, :, STATUS].astype(np.int64),
+            "status": status,
             "contact": report[:, :, CONTACT].astype(np.int64),
+            "contact_with": np.where(status == ABSENT, -1, report[:, :, CONTACT_WITH]).astype(
+                np.int64
+            ),
             "limits_exceeded": report[:, :, LIMITS].astype(np.int64),
             "returning": report[:, :, RETURNING] > 0.0,
         }
         if self._batch.filters:
             infos["filtered"] = report[:, :, FILTERED] > 0.0
-        if self._batch.chooses:
-            masks = self._batch.actions.kind.masks(candidates).reshape(self.num_envs, -1)
-            infos["action_mask"] = (masks & mask[:, None]).astype(np.int8)
+        if self._batch.chooses and not self._masks_seen:
+            infos["action_mask"] = self._masks_of(candidates) * mask[:, None].astype(np.int8)
+        if self._batch.settings.flat_infos:
+            infos = flat(infos)
+        else:
+            terms.update({f"_{name}": mask for name in terms})
         infos.update({f"_{name}": mask for name in infos})
         return infos
+
+    def _masks_of(self, candidates: NDArray[np.int64]) -> NDArray[np.int8]:
+        masks = self._batch.actions.kind.masks(candidates)
+        return masks.reshape(self.num_envs, -1).astype(np.int8)
 
     def _add_final(self, infos: dict[str, Any], ended: NDArray[np.bool_]) -> None:
         final = self._batch.missions.final
         final_obs = np.full(self.num_envs, None, dtype=object)
+        masks = self._masks_of(final.candidates) if self._masks_seen else None
         for lane in np.flatnonzero(ended):
-            final_obs[lane] = final.observation[lane].ravel().copy()
+            seen = final.observation[lane].ravel().copy()
+            final_obs[lane] = seen if masks is None else with_mask(seen, masks[lane])
         infos["final_obs"], infos["_final_obs"] = final_obs, ended
         infos["final_info"] = self._infos(final.report, final.swarm, final.candidates, ended)
         infos["_final_info"] = ended

@@ -23,7 +23,13 @@ from uas_coverage_env.scenario.flood_village import flood_village
 from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
-from uas_coverage_env.scenario.source import MissionSource, Room, ScenarioGenerator, ScenarioLike
+from uas_coverage_env.scenario.source import (
+    MissionSource,
+    Room,
+    ScenarioGenerator,
+    ScenarioLike,
+    loaded_scenario,
+)
 
 __all__ = [
     "FAMILIES",
@@ -47,6 +53,7 @@ __all__ = [
     "flood_village",
     "generate_scenario",
     "load_scenario",
+    "loaded_scenario",
     "sample_scenario",
     "scenario_names",
     "warnings",

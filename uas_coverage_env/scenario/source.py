@@ -1,13 +1,13 @@
 """Where the missions of an environment come from: one scenario, or one drawn at each reset."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios
 from uas_coverage_env.scenario.load import is_path, load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
@@ -107,8 +107,8 @@ class MissionSource:
         """What an environment's `scenario=` means.
 
         Args:
-            missions: A scenario, its name or its file; the name of a family; a source; or any
-                `ScenarioGenerator`.
+            missions: A scenario, its name, its file or its plain data; the name of a family; a
+                source; or any `ScenarioGenerator`.
 
         Raises:
             InputError: There is no scenario or family of this name, or the file is wrong.
@@ -124,8 +124,10 @@ class MissionSource:
         if callable(missions):
             generator: Any = missions
             return cls(generator)
-        scenario = _loaded(missions)
-        return cls(_Always(scenario), **Room.of(scenario)._asdict())
+        scenario = loaded_scenario(missions)
+        n_uas, n_waypoints, n_moving = Room.of(scenario)
+        room = Room(n_uas, n_waypoints, max(_MOVING, n_moving))
+        return cls(_Always(scenario), **room._asdict())
 
     @property
     def fixed(self) -> bool:
@@ -140,18 +142,17 @@ class MissionSource:
         """
         return self.fitted(self._drawn(rng))
 
-    def fitted(self, scenario: str | Path | Scenario) -> Scenario:
+    def fitted(self, scenario: str | Path | Scenario | Mapping[str, Any]) -> Scenario:
         """A scenario as this environment flies it: agents have their names.
 
         Args:
-            scenario: A scenario, its name or its file.
+            scenario: A scenario, its name, its file or its plain data.
 
         Raises:
             InputError: There is no such scenario, or its file is wrong.
             ValueError: It does not fit.
         """
-        if not isinstance(scenario, Scenario):
-            scenario = _loaded(scenario)
+        scenario = loaded_scenario(scenario)
         has = Room.of(scenario)
         for name, noun, count, most in zip(Room._fields, _NOUNS, has, self.room, strict=True):
             if count > most:
@@ -177,13 +178,20 @@ class MissionSource:
         return scenario
 
 
-ScenarioLike = str | Path | Scenario | MissionSource | ScenarioGenerator
+ScenarioLike = str | Path | Scenario | Mapping[str, Any] | MissionSource | ScenarioGenerator
 """What environments take as `scenario=`, see `MissionSource.of`."""
 
 
-def _loaded(scenario: Any) -> Scenario:
+def loaded_scenario(scenario: str | Path | Scenario | Mapping[str, Any]) -> Scenario:
+    """A scenario of its name, its file or its plain data (a `scenario.json`, an `EnvSpec`).
+
+    Raises:
+        InputError: There is no such scenario, or something in it is wrong.
+    """
     if isinstance(scenario, Scenario):
         return scenario
+    if isinstance(scenario, Mapping):
+        return parse(scenario, Scenario, "scenario")
     if not is_path(scenario) and scenario not in scenario_names():
         raise InputError(
             f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, the "

@@ -1,6 +1,7 @@
 """A mission as it stands: arena, state and commands, contacts and coverage (`docs/rules.md`)."""
 
 from uas_coverage_env.world.arena import Arena, build_arena
+from uas_coverage_env.world.codes import CommandKind, ContactKind, UasStatus
 from uas_coverage_env.world.commands import (
     ACCELERATION,
     CLIMB,
@@ -52,9 +53,12 @@ __all__ = [
     "Acceleration",
     "Arena",
     "Command",
+    "CommandKind",
+    "ContactKind",
     "GoTo",
     "Mode",
     "SwarmState",
+    "UasStatus",
     "Velocity",
     "WorldState",
     "Wrench",

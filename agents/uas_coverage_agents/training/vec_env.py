@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
-from uas_coverage_env.env import CoverageBatch, observation_bounds
+from uas_coverage_env.env import ActionKind, CoverageBatch
+from uas_coverage_env.env.interface import observation_space, with_mask
 from uas_coverage_env.env.memory import STATUS
 from uas_coverage_env.env.state_dict import check_like, check_values
+from uas_coverage_env.env.tiles import Tiles
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING
 
@@ -50,11 +52,14 @@ class CoverageVecEnv(VecEnv):
         num_missions: How many.
         scenario: A scenario, its name or file, a sequence of these to draw from, or what draws
             them, see `CoverageVectorEnv`.
-        action: A name of `uas_coverage_env.env.ACTION_NAMES`.
+        action: A name of `uas_coverage_env.env.ACTION_NAMES`, or an `ActionKind`.
+        render_mode: None; "rgb_array": `render` returns one picture of the first 16 missions side
+            by side, as `VecVideoRecorder` asks for; "human": a window with it (extra `human`).
         **settings: See `uas_coverage_env.env.CoverageBatch`: dynamics, return_mode, safety_filter,
-            reward_weights, max_cycles.
+            reward_weights, max_cycles, mask_in_observation (then "MultiInputPolicy").
 
     Attributes:
+        autoreset_mode: A mission that ends begins anew in the same step.
         batch: What flies.
         num_missions: As given.
         n_uas: U, of the largest fleet.
@@ -68,7 +73,8 @@ class CoverageVecEnv(VecEnv):
         num_missions: int,
         scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
         *,
-        action: str = "velocity",
+        action: str | ActionKind = "velocity",
+        render_mode: str | None = None,
         **settings: Any,
     ) -> None:
         self.batch = CoverageBatch(
@@ -82,12 +88,16 @@ class CoverageVecEnv(VecEnv):
         self._actions: NDArray[Any] = np.zeros(0)
         self._begun_s = time.perf_counter()
         self._attributes: dict[str, list[Any]] = {}
-        low, high = observation_bounds()
+        tiled = "rgb_array_tiled" if render_mode == "rgb_array" else render_mode
+        self._tiles = Tiles(self.num_missions, tiled)
+        self._shows = render_mode
         super().__init__(
             self.num_missions * self.n_uas,
-            spaces.Box(low, high, dtype=np.float32),
+            observation_space(self.batch.settings),
             self.batch.actions.space(),
         )
+
+    autoreset_mode = AutoresetMode.SAME_STEP
 
     @property
     def alive(self) -> NDArray[np.bool_]:
@@ -101,7 +111,7 @@ class CoverageVecEnv(VecEnv):
         self._seeds = [int(seed) + lane // self.n_uas for lane in range(self.num_envs)]
         return self._seeds
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> Any:
         """Begin new missions in all lanes."""
         seeds = self._seeds[:: self.n_uas]
         observation = self.batch.reset(seeds)
@@ -109,6 +119,8 @@ class CoverageVecEnv(VecEnv):
         self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
+        self._tiles.forget(range(self.num_missions))
+        self._watch()
         return self._flat(observation)
 
     def step_async(self, actions: NDArray[Any]) -> None:
@@ -117,7 +129,7 @@ class CoverageVecEnv(VecEnv):
 
     def step_wait(
         self,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+    ) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Fly all missions for one step.
 
         Raises:
@@ -126,6 +138,7 @@ class CoverageVecEnv(VecEnv):
         batch = self.batch
         flew = batch.flying
         observation = batch.step(self._actions.reshape(self.num_missions, -1))
+        self._watch()
         lanes = batch.lanes
         over = (lanes.terminated | lanes.truncated)[:, None]
         # of a mission that is over, the world shows the next one already
@@ -137,8 +150,7 @@ class CoverageVecEnv(VecEnv):
         if ended.any():
             for lane, i in np.argwhere(ended).tolist():
                 info = infos[lane * self.n_uas + i]
-                last = batch.missions.final.observation if over[lane, 0] else observation
-                info["terminal_observation"] = last[lane, i].copy()
+                info["terminal_observation"] = self._last_seen(lane, i, bool(over[lane, 0]))
                 info["TimeLimit.truncated"] = bool(flies[lane, i])
                 if flew[lane, i]:
                     info["episode"] = self._episode(lane, i)
@@ -165,7 +177,7 @@ class CoverageVecEnv(VecEnv):
             "episode_lengths": self._lengths.copy(),
         }
 
-    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> Any:
         """Go on where an environment of the same arguments was.
 
         Returns:
@@ -198,7 +210,7 @@ class CoverageVecEnv(VecEnv):
             alive = self.alive.tolist()
             return [alive[lane] for lane in lanes]
         if attr_name == "render_mode":
-            return [None] * len(lanes)
+            return [self._shows] * len(lanes)
         if attr_name == "action_masks":
             self._check_choices()
         value = getattr(self, attr_name)
@@ -237,11 +249,45 @@ class CoverageVecEnv(VecEnv):
         """Whether lanes have what a wrapper adds: episodes are told as `Monitor` tells them."""
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
-    def close(self) -> None:
-        """Nothing is held that would have to be given back."""
+    def render(self, mode: str | None = None) -> Any:
+        """One picture of the first missions for "rgb_array"; the window for "human".
 
-    def _flat(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        return observation.reshape(self.num_envs, -1)
+        Args:
+            mode: Without effect: `render_mode` is said once.
+        """
+        return self._tiles.render(self.batch.swarm_state)
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """What `render` shows, as the only picture."""
+        return [self.render()]
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._tiles.close()
+
+    def _watch(self) -> None:
+        """Remember where the UAS are, for pictures with their paths; show them in the window."""
+        if self._shows is None:
+            return
+        batch = self.batch
+        self._tiles.see(batch.lanes.mission.tolist(), batch.scenario_of, batch.worlds.x[:, :, :3])
+        if self._shows == "human":
+            self.render()
+
+    def _last_seen(self, lane: int, i: int, over: bool) -> Any:
+        """What a UAS that ends has seen last; of a mission that is over, the next one is flown."""
+        batch = self.batch
+        last = batch.missions.final.observation if over else batch.observation
+        seen = last[lane, i].copy()
+        if not batch.settings.mask_in_observation:
+            return seen
+        kept = batch.missions.final.candidates if over else batch.learners.candidates
+        return with_mask(seen, batch.actions.kind.masks(kept[lane, i]))
+
+    def _flat(self, observation: NDArray[np.float32]) -> Any:
+        seen = observation.reshape(self.num_envs, -1)
+        masks = self.batch.settings.mask_in_observation
+        return with_mask(seen, self.action_masks()) if masks else seen
 
     def _episode(self, lane: int, i: int) -> dict[str, float]:
         return {
