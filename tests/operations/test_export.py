@@ -4,6 +4,7 @@ import json
 import math
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +16,8 @@ from qgc_loader import problems
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.cli import main
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.operations import ENDINGS, FORMATS, ExportOptions, Tolerances, make_export
 from uas_coverage_env.operations.exported import return_height_m
 from uas_coverage_env.operations.tracks import cut_path, distances_m, make_track
 from uas_coverage_env.scenario import Place, load_scenario
@@ -282,6 +283,25 @@ def test_what_is_no_flight_and_a_full_folder_are_refused(directory, tmp_path, ca
     (tmp_path / "mine.txt").write_text("mine")
     err = refused(capsys, directory, "--format", "qgc", "--out", str(tmp_path), *HERE)
     assert "is not empty" in err
+
+
+def test_files_of_another_export_are_not_left_beside_the_new_ones(directory, tmp_path, capsys):
+    out = str(tmp_path)
+    (tmp_path / "uas_9.plan").write_text("old")
+    err = refused(capsys, directory, "--format", "qgc", "--out", out, *HERE, "--overwrite")
+    assert "holds uas_9.plan of another export" in err
+    (tmp_path / "uas_9.plan").unlink()
+    for _ in range(2):
+        assert (
+            main(["export", directory, "--format", "csv", "--out", out, *HERE, "--overwrite"]) == 0
+        )
+    assert {name for kind in FORMATS for name in _endings(kind)} == set(ENDINGS)
+
+
+def _endings(kind):
+    flight = random_flight(1)
+    made = exported(flight, Place(latitude_deg=1, longitude_deg=2), kind)
+    return {Path(name).suffix for name in made.files if not name.startswith("report")}
 
 
 def test_a_flight_that_is_not_home_is_refused():

@@ -1,6 +1,7 @@
 """From drawings to a scenario: the same in each format, and one clear line where it cannot be."""
 
 import json
+import os
 import shutil
 import zipfile
 from contextlib import closing
@@ -16,7 +17,7 @@ pytest.importorskip("shapefile")
 import shapefile
 
 from uas_coverage_env.cli import main
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
 from uas_coverage_env.operations.drawing import MOST_CORNERS
 from uas_coverage_env.operations.town import GUESSED_OTHER_M, STOREY_M, height_m
@@ -279,6 +280,13 @@ def test_a_huge_file_and_an_archive_that_grows_are_refused(capsys):
     with zipfile.ZipFile("bomb.kmz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("doc.kml", b" " * 100_000_000)
     assert "unpacks to more than 20 MB" in refused(capsys, "bomb.kmz", *HOME)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="os.mkfifo is of POSIX systems")
+def test_a_pipe_is_refused_and_not_waited_for(capsys):
+    for name in ("pipe.geojson", "pipe.kml", "pipe.kmz", "pipe.plan"):
+        os.mkfifo(name)
+        assert "is not a plain file" in refused(capsys, name, *HOME)
 
 
 @pytest.mark.parametrize("cut", [10, 90, 110, 150])

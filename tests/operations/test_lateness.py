@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 pytest.importorskip("pyproj")
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.export import _check_slack
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.lateness import pairs_of

@@ -9,7 +9,7 @@ pytest.importorskip("shapely")
 import shapely
 from shapely.geometry import Point, Polygon, box
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.cameras import camera_names, load_camera
 from uas_coverage_env.operations.convex import convex_pieces, few_corners
 from uas_coverage_env.operations.layout import lay_waypoints

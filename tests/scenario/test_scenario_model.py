@@ -293,5 +293,7 @@ def test_a_place_on_the_earth_is_kept_in_the_file_and_absent_where_there_is_none
 @pytest.mark.parametrize("wrong", [{"latitude_deg": 90.1}, {"longitude_deg": -181}, {"x": 1}])
 def test_a_place_that_is_none_is_refused(wrong):
     good = {"latitude_deg": 1.0, "longitude_deg": 2.0}
+    data = small().model_dump(mode="json", by_alias=True)
+    assert parse(data | {"place": good}, Scenario, "").place is not None
     with pytest.raises(ValueError, match="place"):
-        parse(small().model_dump(mode="json", by_alias=True) | {"place": good | wrong}, Scenario, "")
+        parse(data | {"place": good | wrong}, Scenario, "")

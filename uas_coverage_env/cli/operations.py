@@ -11,8 +11,9 @@ import typer
 from rich.table import Table
 
 from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import Place, warnings
 
@@ -90,10 +91,8 @@ def import_area(
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
     made = make_scenario(read_drawings(areas), name, options)
-    made.scenario.to_file(out)
-    if made.credit:
-        text = out.read_text(encoding="utf-8")
-        out.write_text(f"# Buildings: {made.credit}\n{text}", encoding="utf-8")
+    text = f"# Buildings: {made.credit}\n" if made.credit else ""
+    write_atomically(out, (text + made.scenario.file_text()).encode())
     screen = console()
     for line in (*made.notes, f"scenario in {out}"):
         screen.print(line, markup=False)
@@ -135,7 +134,7 @@ def export(
 ) -> None:
     """Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`)."""
     with _extra():
-        from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
+        from uas_coverage_env.operations import ENDINGS, ExportOptions, Tolerances, make_export
     if out.is_dir() and any(out.iterdir()) and not overwrite:
         raise InputError(f"--out {out}: is not empty; give another or add --overwrite")
     latitude, longitude = _place("--place", place) if place else (0.0, 0.0)
@@ -147,7 +146,9 @@ def export(
         place=Place(latitude_deg=latitude, longitude_deg=longitude) if place else None,
     )
     made = make_export(Flight.load(directory), options)
-    prepare_folder(out)
+    left = {name for name in prepare_folder(out) if Path(name).suffix in ENDINGS} - set(made.files)
+    if left:
+        raise InputError(f"--out {out}: holds {min(left)} of another export; give another --out")
     write_files(out, {name: text.encode() for name, text in made.files.items()})
     screen = console()
     table = Table("UAS", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None)

@@ -6,7 +6,7 @@ Needs the extra `ops`.
 from uas_coverage_env.operations.cameras import Camera, camera_names, load_camera
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.export import Export, ExportOptions, make_export
-from uas_coverage_env.operations.formats import FORMATS
+from uas_coverage_env.operations.formats import ENDINGS, FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.make import Imported, ImportOptions, make_scenario
@@ -14,6 +14,7 @@ from uas_coverage_env.operations.reading import read_drawings
 from uas_coverage_env.operations.tracks import Tolerances
 
 __all__ = [
+    "ENDINGS",
     "FIRMWARE",
     "FORMATS",
     "Camera",

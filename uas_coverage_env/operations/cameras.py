@@ -5,7 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, RootModel
 
-from uas_coverage_env.files.strict_toml import InputError, StrictModel, read_toml
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.strict_toml import StrictModel, read_toml
 
 _SHIPPED = Path(__file__).with_name("cameras.toml")
 

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.plain_files import read_bytes
 
 Role = Literal["search", "no_fly", "fence"]
 
@@ -108,6 +110,21 @@ def take_off(source: str, position: Any, attributes: Mapping[str, Any]) -> TakeO
         raise InputError(f"{source} has the role of an area but is a point; draw a polygon")
     latitude, longitude = _degrees(source, [position])[0]
     return TakeOff(source, float(latitude), float(longitude))
+
+
+def content(path: Path) -> bytes:
+    """What a file holds, if it is a plain one and not larger than anything drawn.
+
+    Raises:
+        InputError: It is not, or cannot be read.
+    """
+    try:
+        return read_bytes(path, MOST_BYTES)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the path") from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
 
 
 def limited(source: str, things: Iterable[Drawn]) -> Iterator[Drawn]:

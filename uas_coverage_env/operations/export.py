@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.operations.exported import Exported, exported

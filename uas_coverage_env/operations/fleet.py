@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
 
 MOST_UAS = 50

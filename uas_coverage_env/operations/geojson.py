@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.operations.drawing import Drawn, polygon, take_off
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.operations.drawing import Drawn, content, polygon, take_off
 
 _WGS_84 = re.compile(r"CRS84|EPSG:+4326")
 
@@ -70,8 +70,9 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         InputError: It is none.
     """
+    text = content(path)
     try:
-        data = json.loads(path.read_text("utf-8-sig"), parse_constant=_refuse)
+        data = json.loads(text.decode("utf-8-sig"), parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)[:80]
         raise InputError(f"{path}: is not JSON ({reason}); export it again") from None

@@ -3,6 +3,7 @@
 Entities and document types are refused (defusedxml), archives are unpacked up to a limit.
 """
 
+import io
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -13,8 +14,8 @@ from xml.etree.ElementTree import Element, ParseError
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.operations.drawing import MOST_BYTES, Drawn, polygon, take_off
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.operations.drawing import MOST_BYTES, Drawn, content, polygon, take_off
 
 
 def read_kml(path: Path) -> Iterator[Drawn]:
@@ -23,7 +24,7 @@ def read_kml(path: Path) -> Iterator[Drawn]:
     Raises:
         InputError: The file cannot be used.
     """
-    yield from _drawn(path, path.read_bytes())
+    yield from _drawn(path, content(path))
 
 
 def read_kmz(path: Path) -> Iterator[Drawn]:
@@ -32,8 +33,9 @@ def read_kmz(path: Path) -> Iterator[Drawn]:
     Raises:
         InputError: The file cannot be used.
     """
+    packed = content(path)
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(io.BytesIO(packed)) as archive:
             names = [name for name in archive.namelist() if name.lower().endswith(".kml")]
             if not names:
                 raise InputError(f"{path}: holds no .kml; export it again")

@@ -14,7 +14,7 @@ from shapely.geometry import Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import nearest_points
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 
 MOST_WAYPOINTS = 2_000
 _DIVISIONS = 3

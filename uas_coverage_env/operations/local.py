@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.frame import LocalFrame
 

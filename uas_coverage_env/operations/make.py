@@ -9,7 +9,8 @@ from typing import Any
 import shapely
 from shapely.geometry import Point, Polygon
 
-from uas_coverage_env.files.strict_toml import InputError, parse
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.operations.cameras import load_camera
 from uas_coverage_env.operations.convex import polygons_of
 from uas_coverage_env.operations.drawing import Drawn

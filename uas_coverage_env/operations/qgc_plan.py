@@ -8,7 +8,7 @@ from typing import Any
 
 import pyproj
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.drawing import Drawn, polygon, take_off
 from uas_coverage_env.operations.geojson import read_json
 

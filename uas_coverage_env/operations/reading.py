@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.operations.drawing import MOST_BYTES, Drawn, DrawnPolygon, limited
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, limited
 from uas_coverage_env.operations.geojson import read_geojson
 from uas_coverage_env.operations.kml import read_kml, read_kmz
 from uas_coverage_env.operations.qgc_plan import read_plan
@@ -40,7 +40,6 @@ def read_drawings(paths: Sequence[Path]) -> list[Drawn]:
 
 
 def _read(path: Path) -> list[Drawn]:
-    check_size(path)
     if path.suffix.lower() not in READERS:
         known = ", ".join(READERS)
         raise InputError(f"{path}: unknown kind of file; save the area as {known}")
@@ -52,16 +51,3 @@ def or_example(path: Path, ending: str) -> Path:
     file = _EXAMPLES / f"{path.name}{ending}"
     is_name = len(path.parts) == 1 and not path.suffix and not path.exists()
     return file if is_name and file.is_file() else path
-
-
-def check_size(path: Path) -> None:
-    """Refuse what is no file, or too large to be meant.
-
-    Raises:
-        InputError: It is.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; check the path")
-    if path.stat().st_size > MOST_BYTES:
-        megabytes = MOST_BYTES // 1_000_000
-        raise InputError(f"{path}: is larger than {megabytes} MB; save the area alone")

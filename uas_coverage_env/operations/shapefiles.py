@@ -1,5 +1,6 @@
 """ESRI shapefiles: the polygons of a layer, in whatever coordinates its .prj names."""
 
+import io
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -9,8 +10,8 @@ import pyproj
 import shapefile
 from pyproj.exceptions import ProjError
 
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.operations.drawing import MOST_CORNERS, Drawn, polygon, take_off
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.operations.drawing import MOST_CORNERS, Drawn, content, polygon, take_off
 
 
 def read_shapefile(path: Path) -> Iterator[Drawn]:
@@ -23,12 +24,17 @@ def read_shapefile(path: Path) -> Iterator[Drawn]:
     if not projection.is_file():
         raise InputError(f"{path}: has no .prj beside it, so its units are unknown; add the file")
     try:
-        crs = pyproj.CRS.from_wkt(projection.read_text("utf-8", errors="replace"))
+        crs = pyproj.CRS.from_wkt(content(projection).decode("utf-8", "replace"))
         to_degrees = pyproj.Transformer.from_crs(crs, 4326, always_xy=True)
     except ProjError:
         raise InputError(f"{projection}: names no coordinate system; export it again") from None
+    parts = {
+        ending: io.BytesIO(content(path.with_suffix(f".{ending}")))
+        for ending in ("shp", "shx", "dbf")
+        if ending == "shp" or path.with_suffix(f".{ending}").is_file()
+    }
     try:
-        with closing(shapefile.Reader(str(path))) as reader:
+        with closing(shapefile.Reader(**parts)) as reader:
             for number, entry in enumerate(reader.iterShapeRecords()):
                 fields = entry.record.as_dict() if entry.record else {}
                 if entry.shape is not None:

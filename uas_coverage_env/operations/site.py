@@ -7,7 +7,7 @@ import shapely
 from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.convex import convex_pieces, hull_of
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.frame import LocalFrame

@@ -16,11 +16,11 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.convex import convex_pieces, polygons_of
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.geojson import features, read_json
-from uas_coverage_env.operations.reading import check_size, or_example
+from uas_coverage_env.operations.reading import or_example
 
 STOREY_M = 3.2
 ROOF_M = 2.0
@@ -86,7 +86,6 @@ def read_town(path: Path, frame: LocalFrame, area: Polygon) -> Town:
         InputError: The file cannot be used, or no building is anywhere near.
     """
     path = or_example(path, "_buildings.geojson")
-    check_size(path)
     if path.suffix.lower() not in (".geojson", ".json"):
         raise InputError(f"{path}: unknown kind of file; export the buildings as .geojson")
     data = read_json(path)

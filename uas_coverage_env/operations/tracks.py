@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
 from uas_coverage_env.flight.record import LANDED
 from uas_coverage_env.operations.room import Room, Surroundings

@@ -104,7 +104,10 @@ class Scenario(UncheckedScenario):
             uas["vehicle"] = vehicle.model_dump(mode="json")
         return data
 
+    def file_text(self) -> str:
+        """The text of a scenario file that `load_scenario` reads back as an equal scenario."""
+        return toml_text(self.model_dump(mode="json", by_alias=True))
+
     def to_file(self, path: str | Path) -> None:
         """Write a scenario file that `load_scenario` reads back as an equal scenario."""
-        data = self.model_dump(mode="json", by_alias=True)
-        write_atomically(Path(path), toml_text(data).encode())
+        write_atomically(Path(path), self.file_text().encode())

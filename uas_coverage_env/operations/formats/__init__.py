@@ -32,3 +32,6 @@ FORMATS: Mapping[str, Writer] = {
     "geojson": lambda scenario, one, *_: {".geojson": geojson_text(scenario, one)},
     "csv": lambda scenario, one, *_: {".csv": csv_text(scenario, one)},
 }
+
+ENDINGS = frozenset({".plan", ".waypoints", ".param", ".kml", ".geojson", ".csv"})
+"""Of the files of all formats."""
