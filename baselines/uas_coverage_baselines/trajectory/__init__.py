@@ -1,0 +1,1 @@
+"""`trajectory`: each UAS's whole mission as one convex program, flown as planned."""

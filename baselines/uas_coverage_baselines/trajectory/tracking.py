@@ -1,0 +1,64 @@
+"""The rest of a flight from where the UAS is, where that is not where it was planned to be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
+from uas_coverage_baselines.trajectory.fleet import Fleet
+from uas_coverage_baselines.trajectory.flight_model import reduced_state
+from uas_coverage_baselines.trajectory.mission_plan import Planned
+from uas_coverage_baselines.trajectory.program import Flight
+from uas_coverage_baselines.trajectory.retiming import retimed
+from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_env.world import SwarmState
+
+FloatArray = NDArray[np.float64]
+
+_LOOSE = np.array([1.5, 1.4, 1.3, 1.2, 1.12, 1.06])  # limits of the first steps
+_LATER = (0, 1, 2, 4)  # steps
+
+
+def tracked(
+    fleet: Fleet,
+    uas: int,
+    planned: Planned,
+    swarm: SwarmState,
+    others_m: Mapping[int, FloatArray],
+    movers: Sequence[Body],
+) -> Planned | None:
+    """The same visits from here, in time or a little later; None where that is not possible.
+
+    Args:
+        fleet: The mission.
+        uas: Index of the UAS.
+        planned: What it was to do.
+        swarm: Where it is.
+        others_m: (N+1, 3) paths of the others from now on.
+        movers: What moves.
+    """
+    done = swarm.step - planned.course.begin
+    flight, left = planned.flight, planned.open_visits(swarm.step, swarm.uncovered)
+    steps = flight.steps - done
+    if steps < 2:
+        return None
+    route, visits = planned.route[left], flight.visits[left] - done
+    rest = Flight(
+        visits,
+        flight.x[done:],
+        flight.u[done:],
+        flight.costate[done:],
+        flight.violation,
+        flight.missed_m[left],
+    )
+    start = reduced_state(swarm.x[uas])
+    program = fleet.program(uas, others_m, movers, None, _LOOSE)
+    for later in _LATER:
+        new = retimed(program, start, route, rest, visits + later, steps + later)
+        if new.is_clear and trouble_alone(fleet, uas, swarm.x[uas], new, loose=True) is None:
+            course = course_of(fleet, uas, swarm.step, swarm.x[uas], new)
+            return Planned(route, new, course)
+    return None
