@@ -131,6 +131,11 @@ def braked(fleet: Fleet, uas: int, course: Course, followed: int) -> Course:
     )
 
 
+def hover_inputs(fleet: Fleet, uas: int, x: FloatArray) -> FloatArray:
+    """(5,) inputs that brake, and hold a hover."""
+    return _brake(fleet.arena.vehicles[uas], np.ascontiguousarray(x), 1)[1][0]
+
+
 @allocating_kernel
 def _brake(vehicle, start, steps):
     """States after each step (steps, 14) and inputs (steps, 5) of braking from a state."""

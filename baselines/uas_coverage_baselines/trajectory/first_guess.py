@@ -133,7 +133,33 @@ def guess_path(
         if target >= 0:
             marks.append(len(points) - 1)
     corners = np.array(points)
-    away = np.diff(corners, axis=0)
+    path_m, at_s, marks_at = _timed(corners, marks, space, speeds)
+    at_s[1:] += _SET_OFF_S
+    n_steps = int(np.ceil((at_s[-1] + _SETTLE_S) / dt_s))
+    clock_s = dt_s * np.arange(n_steps + 1)
+    sampled_m = np.column_stack([np.interp(clock_s, at_s, path_m[:, a]) for a in range(3)])
+    visits = np.clip(np.round(at_s[marks_at] / dt_s).astype(np.int64), 1, n_steps - 1)
+    return Guess(sampled_m, visits)
+
+
+def _timed(
+    corners: FloatArray, marks: list[int], space: Space, speeds: Speeds
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Places along corners, raised over what they meet; their times; and where the marks are.
+
+    Climbs begin and descents end far enough away to be flown on the way, but start and end are
+    left, and reached, straight up and down where they must be.
+    """
+    dense, first = _dense(corners)
+    top_m = _needed_m(dense, space)
+    step_m = np.hypot(*np.diff(dense[:, :2], axis=0).T)
+    for n in range(len(top_m) - 2, -1, -1):
+        top_m[n] = max(top_m[n], top_m[n + 1] - speeds.up / speeds.level * step_m[n])
+    for n in range(1, len(top_m)):
+        top_m[n] = max(top_m[n], top_m[n - 1] - speeds.down / speeds.level * step_m[n - 1])
+    raised = np.column_stack([dense[:, :2], -top_m])
+    path_m = np.vstack([corners[:1], raised, corners[-1:]])
+    away = np.diff(path_m, axis=0)
     seconds = np.maximum.reduce(
         [
             np.hypot(away[:, 0], away[:, 1]) / speeds.level,
@@ -141,30 +167,24 @@ def guess_path(
             away[:, 2] / speeds.down,
         ]
     )
-    at_s = np.concatenate([[0.0], np.cumsum(seconds)])
-    at_s[1:] += _SET_OFF_S
-    n_steps = int(np.ceil((at_s[-1] + _SETTLE_S) / dt_s))
-    clock_s = dt_s * np.arange(n_steps + 1)
-    path_m = np.column_stack([np.interp(clock_s, at_s, corners[:, a]) for a in range(3)])
-    _lift(path_m, space, speeds, dt_s)
-    visits = np.clip(np.round(at_s[marks] / dt_s).astype(np.int64), 1, n_steps - 1)
-    return Guess(path_m, visits)
+    return path_m, np.concatenate([[0.0], np.cumsum(seconds)]), first[marks] + 1
+
+
+def _dense(corners: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Places a few metres apart along corners, and at which of them each corner is."""
+    away = np.diff(corners, axis=0)
+    pieces = np.maximum((np.hypot(away[:, 0], away[:, 1]) / _DENSE_M).astype(np.int64), 1)
+    parts = [
+        p + np.linspace(0.0, 1.0, k, endpoint=False)[:, None] * step
+        for p, step, k in zip(corners[:-1], away, pieces, strict=True)
+    ]
+    return np.vstack([*parts, corners[-1:]]), np.concatenate([[0], np.cumsum(pieces)])
 
 
 def _way_s(corners: FloatArray, space: Space, speeds: Speeds) -> float:
     """Flight time along corners; what has to be climbed over takes as long as it takes."""
-    away = np.diff(corners, axis=0)
-    length_m = np.hypot(away[:, 0], away[:, 1])
-    pieces = np.maximum((length_m / _DENSE_M).astype(int), 1)
-    dense = np.vstack(
-        [
-            *(
-                p + np.linspace(0, 1, k, endpoint=False)[:, None] * step
-                for p, step, k in zip(corners[:-1], away, pieces, strict=True)
-            ),
-            corners[-1:],
-        ]
-    )
+    dense, _ = _dense(corners)
+    length_m = np.hypot(*np.diff(corners[:, :2], axis=0).T)
     top_m = _needed_m(dense, space).max()
     first_m, last_m = -corners[0, 2], -corners[-1, 2]
     climb_s = max(top_m - first_m, 0.0) / speeds.up + max(top_m - last_m, 0.0) / speeds.down
@@ -197,16 +217,6 @@ def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
         lifted = inside & (over_m < ceiling_m)
         top_m[lifted] = np.maximum(top_m[lifted], over_m)
     return top_m
-
-
-def _lift(path_m: FloatArray, space: Space, speeds: Speeds, dt_s: float) -> None:
-    """Raise a path over what it meets, climbing and descending in time."""
-    top_m = _needed_m(path_m, space)
-    for n in range(len(top_m) - 2, -1, -1):
-        top_m[n] = max(top_m[n], top_m[n + 1] - speeds.up * dt_s)
-    for n in range(1, len(top_m)):
-        top_m[n] = max(top_m[n], top_m[n - 1] - speeds.down * dt_s)
-    path_m[1:, 2] = -top_m[1:]
 
 
 def _delayed(guess: Guess, earliest: IntArray) -> Guess:

@@ -23,6 +23,7 @@ IntArray = NDArray[np.int64]
 _LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
 _LANDING_S = 4.0
 _SPARE_S = 6.0  # of the battery, left in routes
+_ROOM = 0.06  # share of the limits left to tracking where the plant is not the model
 _LATER_STEPS = 12  # to make way for another
 
 
@@ -72,6 +73,13 @@ class Fleet:
                 self.radius_m,
             )
             for u, uas in enumerate(brief.uas)
+        ]
+
+    def leave_room(self) -> None:
+        """Plan with part of the limits from now on: what flies is not what is planned with."""
+        self.programs = [
+            replace(program, model=flight_model(self.arena.vehicles[u], _ROOM))
+            for u, program in enumerate(self.programs)
         ]
 
     def keep_m(self, i: int, j: int) -> float:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from uas_coverage_baselines.routing import empty_routes
-from uas_coverage_baselines.trajectory.course import Course
+from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
     Effort,
@@ -30,10 +31,11 @@ BoolArray = NDArray[np.bool_]
 
 _AS_PLANNED = 1e-6  # of states
 _AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
-_HOME_AFTER_S = 12.0  # without a plan for so long a UAS flies home
+_HOME_AFTER_S = 30.0  # without a plan for so long a UAS flies home
 _PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is flown has to
-_OPENS_SHARE = 0.75  # of the work that is not blocked: so late is what is blocked visited at first
+_OPENS_SHARE = 0.85  # of the work that is not blocked: so late is what is blocked visited at first
 _OPENS_S = 26.0  # and later: so long from now
+_SHARE2 = 0.75
 _SOON_S = 22.0  # a visit to what is still blocked so soon is put off
 
 
@@ -48,7 +50,7 @@ class TrajectoryOptions(PlannerOptions):
     weight_energy: float = Field(
         default=0.4,
         ge=0.0,
-        le=100.0,
+        le=2.0,
         description="worth of a second of each UAS's flight against one of the mission",
     )
     margin_m: float = Field(
@@ -86,7 +88,7 @@ class Trajectory:
         quick.reset(brief, 0)
         swarm = first_sight(brief)
         quick.act(swarm)
-        quick._safeguard.evade([0], {}, True)
+        quick._safeguard.evade([0], {}, [0])
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts."""
@@ -97,6 +99,7 @@ class Trajectory:
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._plan: MissionPlan | None = None
+        self._is_disturbed = False
         self._without_plan_since = np.full(len(brief.uas), -1)
         swarm = first_sight(brief)
         self._world.update(swarm)
@@ -146,7 +149,8 @@ class Trajectory:
             if course is None or (not as_planned and hovers and waits_s >= _HOME_AFTER_S):
                 rest.append(u)
                 continue
-            u_now = course.u[0] if len(course.u) else self._safeguard.hover(u)
+            holds = hover_inputs(self._fleet, u, swarm.x[u])
+            u_now = course.u[0] if len(course.u) else holds
             flown[u] = u_now
             mode = "covering" if self._has_work(u, swarm) else "return"
             commands[name] = Wrench(*(float(value) for value in u_now[:4]), mode=mode)
@@ -155,11 +159,12 @@ class Trajectory:
             late = [
                 u for u in rest if dt_s * (step - self._without_plan_since[u]) >= _HOME_AFTER_S
             ]
-            inputs = self._safeguard.evade(rest, flown, set(late) == set(rest))
+            inputs = self._safeguard.evade(rest, flown, late)
             for u in rest:
                 self._safeguard.backups.pop(u, None)
                 wrench = (float(value) for value in inputs[u][:4])
-                commands[swarm.names[u]] = Wrench(*wrench, mode="return")
+                mode = "return" if u in late else "covering"
+                commands[swarm.names[u]] = Wrench(*wrench, mode=mode)
         self.last_decision = Decision(
             predicted_m, fallback=fallback is not None, reason=fallback
         )
@@ -183,6 +188,11 @@ class Trajectory:
             rest = planned.course.rest(swarm.step)
             if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
                 continue
+            if not self._is_disturbed:
+                self._is_disturbed = True
+                self._fleet.leave_room()
+                self._planned = {}
+                return
             others = {
                 k: other.course.rest(swarm.step).path_m(10**6)
                 for k, other in self._planned.items()
@@ -254,6 +264,9 @@ class Trajectory:
 
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
         first = self._plan is None
+        self._before = {
+            u: replace(p, course=p.course.rest(swarm.step)) for u, p in self._planned.items()
+        }
         flying = swarm.status == FLYING
         opens = self._opens(movers)
         earliest = np.where(opens > 0, opens, 0)
@@ -289,7 +302,8 @@ class Trajectory:
         """Steps after which what is blocked for nobody knows how long is planned to be visited."""
         from uas_coverage_baselines.routing import SearchEffort, improve_routes
 
-        wait_s = _OPENS_S
+        rest = [p.course.end - p.course.begin for p in self._before.values()]
+        wait_s = max(_OPENS_S, _SHARE2 * self._brief.dt_s * float(np.mean(rest or [0.0])))
         if first:
             others = Moment(
                 moment.x, moment.may_work, moment.uncovered & ~unknown, 0 * moment.earliest, 0.0

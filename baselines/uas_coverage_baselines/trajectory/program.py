@@ -158,7 +158,8 @@ class FlightProgram:
     def spare_m(self, path_m: FloatArray) -> float:
         """Distance beyond what is kept from all that stands or moves, along a path (N+1, 3)."""
         path_m = np.ascontiguousarray(path_m)
-        spare = float(spare_fixed_m(self.space, path_m))
+        outside_m = path_m[1:-1] @ self.space.fence_normals.T + self.space.fence_offsets_m
+        spare = min(float(spare_fixed_m(self.space, path_m)), -float(outside_m.max(initial=-np.inf)))
         return min(spare, self.spare_from_bodies_m(path_m))
 
     def spare_from_bodies_m(self, path_m: FloatArray) -> float:

@@ -11,7 +11,7 @@ and safety filter are asked, here, before the command is given.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,12 +131,8 @@ class Safeguard:
                 return trial
         return None
 
-    def hover(self, uas: int) -> FloatArray:
-        """(5,) inputs that hold still."""
-        return self.evade([uas], {}, False)[uas]
-
     def evade(
-        self, uas: list[int], flown: Mapping[int, FloatArray], go_home: bool
+        self, uas: Collection[int], flown: Mapping[int, FloatArray], homeward: Collection[int]
     ) -> dict[int, FloatArray]:
         """(5,) inputs for a step of each UAS for which there is nothing verified.
 
@@ -146,7 +142,7 @@ class Safeguard:
         Args:
             uas: Indices of these UAS.
             flown: (5,) inputs of the others.
-            go_home: Whether they fly home; else they brake.
+            homeward: Those of `uas` that fly home; the others brake.
         """
         arena, state = self._world.arena, self._world.state
         outcome = np.zeros(len(state.status), OUTCOME_DTYPE)
@@ -154,11 +150,11 @@ class Safeguard:
         for u, inputs in flown.items():
             outcome["applied_command"]["kind"][u] = WRENCH
             outcome["applied_command"]["values"][u] = inputs[:4]
-        if go_home:
-            outcome["applied_command"]["kind"][uas] = GO_TO
-            outcome["applied_command"]["values"][uas, 0] = HOME
+        for u in homeward:
+            outcome["applied_command"]["kind"][u] = GO_TO
+            outcome["applied_command"]["values"][u, 0] = HOME
         wrenches = np.zeros((len(outcome), 5))
-        codes = assistants(False, True)
+        codes = assistants(return_mode=False, safety_filter=True)
         at_sample = state._replace(step=np.zeros(1, np.int64))  # the arena knows the present only
         _assisted(codes, arena, at_sample, outcome, wrenches)
         return {u: wrenches[u] for u in uas}
