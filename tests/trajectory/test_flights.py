@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from fleets import TOWER, every_waypoint, field, fleet_of, start_of
+from small_fleets import TOWER, every_waypoint, field, fleet_of, start_of
 from small_worlds import box, meadow, waypoint
 from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
-from uas_coverage_baselines.trajectory.fleet import make_way
 from uas_coverage_baselines.trajectory.first_guess import first_flight
+from uas_coverage_baselines.trajectory.fleet import make_way
 from uas_coverage_baselines.trajectory.retiming import quickest, retimed, stretches, worth
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 
@@ -47,9 +47,7 @@ def test_the_straight_segments_of_a_flight_clear_the_hulls(flown):
     for hull, obstacle in zip(fleet.brief.hulls, fleet.brief.obstacles, strict=True):
         least_m = fleet.brief.uas[0].radius_m + obstacle.safe_distance_m
         for p, q in zip(flight.path_m[:-1], flight.path_m[1:], strict=True):
-            clearance_m = segment_clearance(
-                hull.normals, hull.offsets_m, 0, hull.n_faces, *p, *q
-            )
+            clearance_m = segment_clearance(hull.normals, hull.offsets_m, 0, hull.n_faces, *p, *q)
             assert clearance_m >= least_m
 
 
@@ -67,9 +65,7 @@ def test_shadow_prices_name_the_stretch_in_which_time_is_missing(flown):
     longest = int(np.argmax(lengths[:-1]))
     visits = flight.visits.copy()
     visits[order[longest:]] -= 3
-    squeezed = retimed(
-        fleet.programs[0], start_of(swarm), route, flight, visits, flight.steps - 3
-    )
+    squeezed = retimed(fleet.programs[0], start_of(swarm), route, flight, visits, flight.steps - 3)
     assert squeezed.violation > 0.5
     assert int(np.argmax(worth(squeezed).gain)) == longest
 

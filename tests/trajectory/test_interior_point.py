@@ -7,8 +7,9 @@ from uas_coverage_baselines.trajectory.flight_model import (
     VELOCITY,
     flight_model,
 )
-from uas_coverage_baselines.trajectory.interior_point import SoftRows, solve
+from uas_coverage_baselines.trajectory.interior_point import solve
 from uas_coverage_baselines.trajectory.riccati import Factors, factor, newton_step
+from uas_coverage_baselines.trajectory.rows import SoftRows
 
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle, vehicle_names
 
@@ -23,7 +24,7 @@ def model():
 
 
 def goal_rows(steps, goal_m, radius_m=2.0, *planes):
-    """Be within a radius of a place, slowly, at the last step; planes are (stage, normal, bound)."""
+    """Be near a place, slowly, at the last step; planes are (stage, normal, bound)."""
     n = len(planes)
     return SoftRows(
         np.array([steps, steps, *(stage for stage, _, _ in planes)], np.int64),
@@ -94,7 +95,8 @@ def test_its_optimum_is_that_of_a_dense_reference_solver(model, steps, goal_m):
     solution = solved(model, rows, steps)
     assert solution.converged
     # violations of balls are priced by (|y|² - b²) / 2b in the program
-    away = [solution.x[stage, rows.states[k]] - rows.vector[k] for k, stage in enumerate(rows.stage)]
+    at = solution.x[rows.stage[:, None], rows.states]
+    away = at - rows.vector
     priced = solution.violation.copy()
     for k in np.flatnonzero(rows.ball):
         value = 0.5 * (away[k] @ away[k] - rows.bound[k] ** 2) / rows.bound[k]
@@ -178,9 +180,7 @@ def test_a_newton_step_solves_the_dense_system_of_its_optimality_conditions(mode
         Q[n] = root @ root.T
     R = rng.uniform(0.5, 2.0, (N, n_u))
     q, r, d = rng.normal(size=(N + 1, n_x)), rng.normal(size=(N, n_u)), rng.normal(size=(N, n_x))
-    factors = Factors(
-        np.zeros((N + 1, n_x, n_x)), np.zeros((N, n_u, n_x)), np.zeros((N, n_u, n_u))
-    )
+    factors = Factors(np.zeros((N + 1, n_x, n_x)), np.zeros((N, n_u, n_x)), np.zeros((N, n_u, n_u)))
     dx, du, costate = np.zeros((N + 1, n_x)), np.zeros((N, n_u)), np.zeros((N, n_x))
     factor(model.A, model.B, Q, R, factors)
     newton_step(model.A, model.B, factors, q, r, d, dx, du, costate)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import uas_coverage_baselines.trajectory.program as program_module
-from fleets import FIELD, HOUSE, TOWER, field
+from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import meadow, mover
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
@@ -98,9 +98,11 @@ def test_a_solver_that_dies_in_flight_changes_nothing_of_what_was_verified(small
     watched = Watched(TrajectoryOptions(**QUICK))
     whole = rollout(small_town, watched)
     before_take_off = solver.calls
-    solver.calls, solver._fails = 0, lambda n, found: (
-        found._replace(converged=False) if n > before_take_off else found
-    )
+
+    def dies(calls, found):
+        return found._replace(converged=False) if calls > before_take_off else found
+
+    Breakable(monkeypatch, dies)
     np.testing.assert_array_equal(rollout(small_town, planner()).x, whole.x)
 
 

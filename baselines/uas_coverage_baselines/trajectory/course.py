@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.flight_model import rollout
 from uas_coverage_baselines.trajectory.fleet import Fleet
+from uas_coverage_baselines.trajectory.flight_model import rollout
 from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.space import apart_m, spare_of_rules_m
 from uas_coverage_env.compiled.kernels import allocating_kernel

@@ -177,9 +177,7 @@ class Fleet:
         return flights
 
 
-def make_way(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight
-) -> Flight:
+def make_way(program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight) -> Flight:
     """The flight clear of all bodies: as it is, bent, or some steps later; else as it is."""
     if program.spare_from_bodies_m(flight.path_m) >= 0.0 or not flight.is_clear:
         return flight

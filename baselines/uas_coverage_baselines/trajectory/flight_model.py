@@ -89,7 +89,8 @@ def flight_model(vehicle: np.record, kept_back: float = _KEPT_BACK) -> FlightMod
         dt_s=float(vehicle.dt_s),
         A=A,
         B=B,
-        norms=share * np.array([vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps]),
+        norms=share
+        * np.array([vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps]),
         vertical=share * np.array([vehicle.v_up_max_mps, vehicle.v_down_max_mps]),
         input_low=share * np.array([-alpha[0], -alpha[1], vehicle.lift_min_N]),
         input_high=share * np.array([alpha[0], alpha[1], vehicle.lift_max_N]),

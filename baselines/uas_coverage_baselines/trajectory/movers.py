@@ -1,4 +1,4 @@
-"""Moving obstacles as far as a planner can know them: where they go if they go on as they go now."""
+"""Moving obstacles as far as a planner knows them: where they go if they go on as they go now."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from uas_coverage_baselines.routing import empty_routes
+from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
@@ -20,6 +20,7 @@ from uas_coverage_baselines.trajectory.mission_plan import (
 )
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
+from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.tracking import tracked
 from uas_coverage_env.flight import PlannerOptions
 from uas_coverage_env.flight.planner import Decision
@@ -33,9 +34,9 @@ _AS_PLANNED = 1e-6  # of states
 _AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
 _HOME_AFTER_S = 30.0  # without a plan for so long a UAS flies home
 _PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is flown has to
-_OPENS_SHARE = 0.85  # of the work that is not blocked: so late is what is blocked visited at first
-_OPENS_S = 26.0  # and later: so long from now
-_SHARE2 = 0.75
+_OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first
+_OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
+_OPENS_AGAIN_S = 26.0  # and at least so long
 _SOON_S = 22.0  # a visit to what is still blocked so soon is put off
 
 
@@ -156,18 +157,14 @@ class Trajectory:
             commands[name] = Wrench(*(float(value) for value in u_now[:4]), mode=mode)
             predicted_m[name] = course.path_m(max(len(course.u), 1))
         if rest:
-            late = [
-                u for u in rest if dt_s * (step - self._without_plan_since[u]) >= _HOME_AFTER_S
-            ]
+            late = [u for u in rest if dt_s * (step - self._without_plan_since[u]) >= _HOME_AFTER_S]
             inputs = self._safeguard.evade(rest, flown, late)
             for u in rest:
                 self._safeguard.backups.pop(u, None)
                 wrench = (float(value) for value in inputs[u][:4])
                 mode = "return" if u in late else "covering"
                 commands[swarm.names[u]] = Wrench(*wrench, mode=mode)
-        self.last_decision = Decision(
-            predicted_m, fallback=fallback is not None, reason=fallback
-        )
+        self.last_decision = Decision(predicted_m, fallback=fallback is not None, reason=fallback)
         return commands
 
     def _stays(self, uas: int, swarm: SwarmState) -> bool:
@@ -205,7 +202,7 @@ class Trajectory:
             else:
                 self._planned[u] = new
 
-    def _bodies(self, movers: Movers, uas: int):
+    def _bodies(self, movers: Movers, uas: int) -> list[Body]:
         margin_m = self.options.moving_margin_m + _PLAN_MARGIN_M
         return movers.bodies(self._brief.uas[uas].radius_m, margin_m)
 
@@ -219,9 +216,7 @@ class Trajectory:
         flying = swarm.status == FLYING
         assert self._plan is not None
         missing = [
-            u
-            for u in np.flatnonzero(flying & self._may_fly).tolist()
-            if u not in self._planned
+            u for u in np.flatnonzero(flying & self._may_fly).tolist() if u not in self._planned
         ]
         waited = self._brief.dt_s * (swarm.step - self._planned_at) >= _AGAIN_S
         if missing and (waited or any(u in self._had for u in missing)):
@@ -300,10 +295,10 @@ class Trajectory:
 
     def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort, first: bool) -> int:
         """Steps after which what is blocked for nobody knows how long is planned to be visited."""
-        from uas_coverage_baselines.routing import SearchEffort, improve_routes
-
         rest = [p.course.end - p.course.begin for p in self._before.values()]
-        wait_s = max(_OPENS_S, _SHARE2 * self._brief.dt_s * float(np.mean(rest or [0.0])))
+        wait_s = max(
+            _OPENS_AGAIN_S, _OPENS_AGAIN_SHARE * self._brief.dt_s * float(np.mean(rest or [0.0]))
+        )
         if first:
             others = Moment(
                 moment.x, moment.may_work, moment.uncovered & ~unknown, 0 * moment.earliest, 0.0

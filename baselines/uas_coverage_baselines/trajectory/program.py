@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY, FlightModel
-from uas_coverage_baselines.trajectory.interior_point import SoftRows, solve
+from uas_coverage_baselines.trajectory.interior_point import solve
+from uas_coverage_baselines.trajectory.rows import SoftRows
 from uas_coverage_baselines.trajectory.space import (
     Body,
     Space,
@@ -159,7 +160,9 @@ class FlightProgram:
         """Distance beyond what is kept from all that stands or moves, along a path (N+1, 3)."""
         path_m = np.ascontiguousarray(path_m)
         outside_m = path_m[1:-1] @ self.space.fence_normals.T + self.space.fence_offsets_m
-        spare = min(float(spare_fixed_m(self.space, path_m)), -float(outside_m.max(initial=-np.inf)))
+        spare = min(
+            float(spare_fixed_m(self.space, path_m)), -float(outside_m.max(initial=-np.inf))
+        )
         return min(spare, self.spare_from_bodies_m(path_m))
 
     def spare_from_bodies_m(self, path_m: FloatArray) -> float:

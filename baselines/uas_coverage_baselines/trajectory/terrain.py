@@ -7,6 +7,8 @@ time with what rises above the usual waypoint made tall.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,7 +65,7 @@ class Terrain:
             end_m: (3,).
         """
         found = [_corners(arena, row, start_m, end_m) for arena in self._arenas]
-        if len(found) > 1 and len(found[0]) == len(found[1]) and np.allclose(*found):
+        if len(found) > 1 and len(found[0]) == len(found[1]) and np.allclose(found[0], found[1]):
             found.pop()
         return found
 
@@ -101,5 +103,6 @@ def _raised(brief: MissionBrief) -> MissionBrief | None:
             obstacles.append(obstacle)
     if not changed:
         return None
-    fields = {name: getattr(brief, name) for name in MissionBrief.model_fields}
-    return MissionBrief.model_construct(**(fields | {"obstacles": tuple(obstacles)}))
+    known: dict[str, Any] = {name: getattr(brief, name) for name in MissionBrief.model_fields}
+    known["obstacles"] = tuple(obstacles)
+    return MissionBrief.model_construct(**known)
