@@ -154,6 +154,7 @@ class Fleet:
         routes: Mapping[int, IntArray],
         movers: Mapping[int, Sequence[Body]],
         budget: int,
+        known: Mapping[int, Flight],
     ) -> dict[int, Flight]:
         """Each UAS's quickest flight; a shorter one makes way for those that fly longer.
 
@@ -162,13 +163,17 @@ class Fleet:
             routes: Waypoints of each UAS that is to fly.
             movers: What moves, as each sees it.
             budget: Programs to solve for each, about.
+            known: Flights along these routes that need no search where they still may be flown.
         """
         earliest = moment.earliest if moment.earliest.any() else None
         alone = {}
         for u, route in routes.items():
             program = self.program(u, {}, movers[u], earliest)
             start = reduced_state(moment.x[u])
-            alone[u] = quickest(program, self.terrain, u, start, route, budget)
+            if u in known and program.allows(route, known[u]):
+                alone[u] = known[u]
+            else:
+                alone[u] = quickest(program, self.terrain, u, start, route, budget)
         flights: dict[int, Flight] = {}
         for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
             paths_m = {k: flight.path_m for k, flight in flights.items()}

@@ -70,6 +70,22 @@ class Planned:
         """(K,) which visits are still to come and needed."""
         return uncovered[self.route] & (self.flight.visits + self.course.begin > step)
 
+    def rest(self, step: int, uncovered: NDArray[np.bool_]) -> tuple[IntArray, Flight]:
+        """The route that is left at a sample, in order of time, and the flight along it."""
+        left, done = self.open_visits(step, uncovered), step - self.course.begin
+        flight = self.flight
+        route, visits, missed_m = self.route[left], flight.visits[left], flight.missed_m[left]
+        order = np.argsort(visits, kind="stable")
+        rest = Flight(
+            visits[order] - done,
+            flight.x[done:],
+            flight.u[done:],
+            flight.costate[done:],
+            flight.violation,
+            missed_m[order],
+        )
+        return route[order], rest
+
 
 @dataclass(frozen=True)
 class MissionPlan:
@@ -96,6 +112,7 @@ def plan_mission(
     effort: Effort,
     seed: int,
     kept: Routes | None = None,
+    flown: Mapping[int, tuple[IntArray, Flight]] | None = None,
 ) -> MissionPlan:
     """The best plan found; the same arguments give the same plan.
 
@@ -107,6 +124,7 @@ def plan_mission(
         effort: How much to search.
         seed: Of the order search.
         kept: An order to begin from; none before take-off.
+        flown: Routes and flights from here that are as good as planned already.
     """
     less_s = np.zeros(len(moment.x))
     best: MissionPlan | None = None
@@ -117,7 +135,7 @@ def plan_mission(
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
                 known.add(key)
-                plan = _flown(fleet, moment, step, movers, effort, order)
+                plan = _flown(fleet, moment, step, movers, effort, order, flown or {})
                 if best is None or plan.cost_s < best.cost_s:
                     best = plan
         assert best is not None
@@ -130,7 +148,7 @@ def plan_mission(
 
 
 def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -> list[Routes]:
-    found = []
+    found = [] if kept is None else [improve_routes(task, kept, SearchEffort(0), 0)]
     for k in range(effort.orders):
         begin = empty_routes(task.n_uas) if kept is None else kept
         search = SearchEffort(
@@ -149,6 +167,7 @@ def _flown(
     movers: Mapping[int, Sequence[Body]],
     effort: Effort,
     order: Routes,
+    flown: Mapping[int, tuple[IntArray, Flight]],
 ) -> MissionPlan:
     """An order with its flights and courses, as far as they are verified."""
     at_start = step == 0
@@ -157,7 +176,12 @@ def _flown(
         for u, route in enumerate(order.routes)
         if moment.may_work[u] and (len(route) or not at_start)
     }
-    flights = fleet.flights(moment, routes, movers, effort.programs)
+    known = {
+        u: flown[u][1]
+        for u, route in routes.items()
+        if u in flown and np.array_equal(flown[u][0], route)
+    }
+    flights = fleet.flights(moment, routes, movers, effort.programs, known)
     planned: dict[int, Planned] = {}
     troubles: dict[int, str] = {}
     for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):

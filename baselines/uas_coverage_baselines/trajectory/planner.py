@@ -117,7 +117,7 @@ class Trajectory:
         if reason is not None:
             self._make_plan(swarm, movers)
         courses = {u: p.course.rest(swarm.step) for u, p in self._planned.items()}
-        chosen = self._safeguard.chosen(swarm.step, swarm.x, courses, movers)
+        chosen = self._safeguard.chosen(swarm, courses, movers)
         return self._commands(swarm, flying, chosen, reason)
 
     def _commands(
@@ -258,10 +258,8 @@ class Trajectory:
         return known
 
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
-        first = self._plan is None
-        self._before = {
-            u: replace(p, course=p.course.rest(swarm.step)) for u, p in self._planned.items()
-        }
+        first, self._step = self._plan is None, swarm.step
+        flown = {u: p.rest(swarm.step, swarm.uncovered) for u, p in self._planned.items()}
         flying = swarm.status == FLYING
         opens = self._opens(movers)
         earliest = np.where(opens > 0, opens, 0)
@@ -276,13 +274,12 @@ class Trajectory:
             options.weight_energy,
         )
         if unknown.any():
-            moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort, first)
+            moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
         kept = None
         if self._plan is not None:
             kept = self._plan.order
-        plan = plan_mission(
-            self._fleet, moment, swarm.step, bodies, effort, self._seed + swarm.step, kept
-        )
+        seed = self._seed + swarm.step
+        plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)
         self._plan, self._planned = plan, dict(plan.planned)
         self._planned_at, self._seen_velocity_mps = swarm.step, movers.velocity_mps.copy()
         self._blocked = opens > 0
@@ -293,19 +290,15 @@ class Trajectory:
         self._ends = {u: p.course.end for u, p in plan.planned.items()}
         self._had = set(plan.planned)
 
-    def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort, first: bool) -> int:
-        """Steps after which what is blocked for nobody knows how long is planned to be visited."""
-        rest = [p.course.end - p.course.begin for p in self._before.values()]
-        wait_s = max(
-            _OPENS_AGAIN_S, _OPENS_AGAIN_SHARE * self._brief.dt_s * float(np.mean(rest or [0.0]))
-        )
-        if first:
-            others = Moment(
-                moment.x, moment.may_work, moment.uncovered & ~unknown, 0 * moment.earliest, 0.0
-            )
-            task = self._fleet.task(others, np.zeros(len(moment.x)))
-            order = improve_routes(
-                task, empty_routes(task.n_uas), SearchEffort(effort.moves), self._seed
-            )
-            wait_s = max(wait_s, _OPENS_SHARE * float(order.seconds.mean()))
-        return round(wait_s / self._brief.dt_s)
+    def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort) -> int:
+        """Steps after which a visit to what is blocked is planned, until more is known."""
+        dt_s = self._brief.dt_s
+        if self._plan is not None:
+            rest_s = [dt_s * len(p.course.rest(self._step).u) for p in self._planned.values()]
+            later_s = _OPENS_AGAIN_SHARE * float(np.mean(rest_s or [0.0]))
+            return round(max(_OPENS_AGAIN_S, later_s) / dt_s)
+        others = moment.uncovered & ~unknown
+        task = self._fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
+        search = SearchEffort(effort.moves)
+        order = improve_routes(task, empty_routes(task.n_uas), search, self._seed)
+        return round(max(_OPENS_AGAIN_S, _OPENS_SHARE * float(order.seconds.mean())) / dt_s)

@@ -156,6 +156,11 @@ class FlightProgram:
             flight = Flight(visits, x, u, found.costate, max(violation, 0.5), missed_m)
         return flight
 
+    def allows(self, route: IntArray, flight: Flight) -> bool:
+        """Whether a flight that was clear is so of these bodies, too, and visits in time."""
+        in_time = self.earliest is None or bool((flight.visits >= self.earliest[route]).all())
+        return in_time and flight.is_clear and self.spare_from_bodies_m(flight.path_m) >= 0.0
+
     def spare_m(self, path_m: FloatArray) -> float:
         """Distance beyond what is kept from all that stands or moves, along a path (N+1, 3)."""
         path_m = np.ascontiguousarray(path_m)

@@ -25,7 +25,7 @@ from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import Range, WorldView
-from uas_coverage_env.world import FLYING, GO_TO, HOME, WRENCH
+from uas_coverage_env.world import FLYING, GO_TO, HOME, WRENCH, SwarmState
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 
 FloatArray = NDArray[np.float64]
@@ -50,13 +50,12 @@ class Safeguard:
         self.backups: dict[int, Course] = {}
 
     def chosen(
-        self, step: int, x: FloatArray, wanted: Mapping[int, Course], movers: Movers
+        self, swarm: SwarmState, wanted: Mapping[int, Course], movers: Movers
     ) -> dict[int, tuple[Course, bool]]:
         """What each UAS flies from now on: its course, or what is left of its backup trajectory.
 
         Args:
-            step: Number of the sample.
-            x: (U, 14) states.
+            swarm: Where the UAS are.
             wanted: Courses of UAS that have one, from this sample on and verified.
             movers: What moves, as it is seen.
 
@@ -64,11 +63,14 @@ class Safeguard:
             For each UAS for which there is something verified: that, and whether it follows its
             course. UAS for which there is nothing are left out.
         """
-        held = {
-            u: rest
-            for u, backup in self.backups.items()
-            if self._holds(u, rest := backup.rest(step), x[u], movers)
-        }
+        step, x = swarm.step, swarm.x
+        held = {}
+        for u in np.flatnonzero(swarm.status == FLYING).tolist():
+            backup = self.backups[u].rest(step) if u in self.backups else None
+            if backup is not None and self._holds(u, backup, x[u], movers):
+                held[u] = backup
+            elif u not in wanted and (stop := self._stop(u, step, x[u], movers)) is not None:
+                held[u] = stop
         renewed = {u: self._continuation(u, course, movers) for u, course in wanted.items()}
         fresh = {u: course for u, course in renewed.items() if course is not None}
         together = held | fresh
@@ -98,6 +100,14 @@ class Safeguard:
             for k, i in enumerate(names)
             for j in names[k + 1 :]
         )
+
+    def _stop(self, uas: int, step: int, x: FloatArray, movers: Movers) -> Course | None:
+        """To brake at once, where that is clear of all that stands and of what moves."""
+        here = Course(step, np.ascontiguousarray(x[None]), np.zeros((0, 5)), False)
+        stop = braked(self._fleet, uas, here, 0)
+        path_m = np.ascontiguousarray(stop.x[:, :3])
+        is_clear = float(spare_of_rules_m(self._fleet.programs[uas].space, path_m, False)) >= 0.0
+        return stop if is_clear and self._is_clear(uas, stop, movers) else None
 
     def _holds(self, uas: int, backup: Course, x: FloatArray, movers: Movers) -> bool:
         """Whether what is left of a backup trajectory begins here and is clear of what is seen."""

@@ -17,7 +17,6 @@ from uas_coverage_baselines.trajectory.flight_model import (
     reduced_state,
 )
 from uas_coverage_baselines.trajectory.mission_plan import Planned
-from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.retiming import retimed
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_env.world import SwarmState
@@ -55,26 +54,16 @@ def tracked(
         others_m: (N+1, 3) paths of the others from now on.
         movers: What moves.
     """
-    done = swarm.step - planned.course.begin
-    flight, left = planned.flight, planned.open_visits(swarm.step, swarm.uncovered)
-    steps = flight.steps - done
+    route, rest = planned.rest(swarm.step, swarm.uncovered)
+    steps = rest.steps
     if steps < 2:
         return None
-    route, visits = planned.route[left], flight.visits[left] - done
-    rest = Flight(
-        visits,
-        flight.x[done:],
-        flight.u[done:],
-        flight.costate[done:],
-        flight.violation,
-        flight.missed_m[left],
-    )
     start = reduced_state(swarm.x[uas])
     program = fleet.program(uas, others_m, movers, None)
     model = flight_model(fleet.arena.vehicles[uas], _KEPT_BACK)
     program = replace(program, model=model, loose=_loose(model, start))
     for later in _LATER:
-        new = retimed(program, start, route, rest, visits + later, steps + later)
+        new = retimed(program, start, route, rest, rest.visits + later, steps + later)
         if new.is_clear and trouble_alone(fleet, uas, swarm.x[uas], new, loose=True) is None:
             course = course_of(fleet, uas, swarm.step, swarm.x[uas], new)
             return Planned(route, new, course)
