@@ -49,7 +49,7 @@ class TrajectoryOptions(PlannerOptions):
         default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
     )
     weight_energy: float = Field(
-        default=0.4,
+        default=0.6,
         ge=0.0,
         le=2.0,
         description="worth of a second of each UAS's flight against one of the mission",
@@ -259,10 +259,13 @@ class Trajectory:
 
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
         first, self._step = self._plan is None, swarm.step
-        flown = {u: p.rest(swarm.step, swarm.uncovered) for u, p in self._planned.items()}
         flying = swarm.status == FLYING
         opens = self._opens(movers)
         earliest = np.where(opens > 0, opens, 0)
+        # a flight that had to wait for something may be shorter now
+        waits = (opens > 0) if first else (opens > 0) | self._blocked
+        left = {u: p.rest(swarm.step, swarm.uncovered) for u, p in self._planned.items()}
+        flown = {u: rest for u, rest in left.items() if not waits[rest[0]].any()}
         moment = Moment(swarm.x, flying, swarm.uncovered, earliest, swarm.time_s)
         bodies = {u: self._bodies(movers, u) for u in range(len(swarm.x))}
         unknown = (opens >= NEVER) & swarm.uncovered
