@@ -1,0 +1,5 @@
+"""`trajectory`: each UAS's whole mission as one trajectory, flown as planned."""
+
+from uas_coverage_baselines.trajectory.planner import Trajectory, TrajectoryOptions
+
+__all__ = ["Trajectory", "TrajectoryOptions"]

@@ -1,0 +1,198 @@
+"""Flights of the whole fleet: who visits what, each UAS's flight, and clear of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.routing import RoutingTask
+from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
+from uas_coverage_baselines.trajectory.program import Flight, FlightProgram, Landing
+from uas_coverage_baselines.trajectory.retiming import quickest, retimed, shifted, stretches
+from uas_coverage_baselines.trajectory.space import Body, space_of
+from uas_coverage_baselines.trajectory.terrain import Terrain
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.vehicle import DOD, VX, VY
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
+_LANDING_S = 4.0
+_SPARE_S = 6.0  # of the battery, left in routes
+_ROOM = 0.06  # share of the limits left to tracking where the plant is not the model
+_LATER_STEPS = 12  # to make way for another
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a fleet is planned from.
+
+    Attributes:
+        x: (U, 14) states.
+        may_work: (U,) flies, and may be sent to waypoints.
+        uncovered: (W,).
+        earliest: (W,) steps from now before which a waypoint is not to be visited.
+        time_s: Since the start.
+    """
+
+    x: FloatArray
+    may_work: NDArray[np.bool_]
+    uncovered: NDArray[np.bool_]
+    earliest: IntArray
+    time_s: float
+
+
+class Fleet:
+    """What stays the same of a mission: legs, vehicles, spaces.
+
+    Args:
+        brief: The mission.
+        margin_m: Planned beyond the distances that count as a breach.
+    """
+
+    def __init__(self, brief: MissionBrief, margin_m: float) -> None:
+        self.brief, self.margin_m = brief, margin_m
+        self.terrain = Terrain(brief)
+        arena = self.terrain.arena
+        self.arena = arena
+        self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
+        self.radius_m = np.array([w.radius_m for w in brief.waypoints], float)
+        self._weight = np.array([w.weight for w in brief.waypoints], float)
+        self.programs = [
+            FlightProgram(
+                flight_model(arena.vehicles[u]),
+                space_of(arena, u, margin_m),
+                Landing(
+                    np.array(uas.start_m, float), brief.landing_distance_m, brief.landing_speed_mps
+                ),
+                self.waypoints_m,
+                self.radius_m,
+            )
+            for u, uas in enumerate(brief.uas)
+        ]
+
+    def leave_room(self) -> None:
+        """Plan with part of the limits from now on: what flies is not what is planned with."""
+        self.programs = [
+            replace(program, model=flight_model(self.arena.vehicles[u], _ROOM))
+            for u, program in enumerate(self.programs)
+        ]
+
+    def keep_m(self, i: int, j: int) -> float:
+        """The separation of two UAS that the rules ask for."""
+        uas = self.brief.uas
+        return uas[i].radius_m + uas[j].radius_m + self.brief.uas_safe_distance_m
+
+    def battery_s(self, x: FloatArray) -> FloatArray:
+        """(U,) seconds that each battery lasts at full speed."""
+        uas = self.arena.uas
+        return (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
+
+    def task(self, moment: Moment, less_s: FloatArray) -> RoutingTask:
+        """The routing problem of a moment.
+
+        Args:
+            moment: Where everything is.
+            less_s: (U,) taken off the budgets: what routes took more than expected.
+        """
+        terrain, legs, x = self.terrain, self.terrain.legs, moment.x
+        n_uas, until_s = len(x), self.brief.max_steps * self.brief.dt_s
+        first_s = np.array([terrain.from_here_s(u, x[u, :3]) for u in range(n_uas)])
+        idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
+        budget_s = np.minimum(self.battery_s(x), until_s - moment.time_s) - _SPARE_S - less_s
+        may = moment.may_work
+        return RoutingTask(
+            open_waypoints=np.flatnonzero(moment.uncovered),
+            first_s=_LEGS * first_s,
+            between_s=_LEGS * terrain.between_s,
+            kind=legs.kind,
+            home_s=_LEGS * terrain.home_s + _LANDING_S,
+            idle_s=np.where(may, idle_s, 0.0),
+            position_m=np.ascontiguousarray(x[:, :2]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
+            speed_mps=legs.speed_mps,
+            acceleration_mps2=legs.acceleration_mps2,
+            start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
+            waypoints_m=self.waypoints_m,
+            turn_s=legs.turn_s,
+            neighbours=legs.neighbours,
+            weight=self._weight,
+            not_before_s=self.brief.dt_s * moment.earliest.astype(float),
+            budget_s=np.where(may, budget_s, -np.inf),
+        )
+
+    def program(
+        self,
+        uas: int,
+        paths_m: Mapping[int, FloatArray],
+        movers: Sequence[Body],
+        earliest: IntArray | None,
+        loose: FloatArray | None = None,
+    ) -> FlightProgram:
+        """The program of a UAS, clear of the paths of others and of what moves."""
+        bodies = [
+            Body(np.ascontiguousarray(path_m), keep_m, keep_m)
+            for other, path_m in paths_m.items()
+            if other != uas
+            for keep_m in [self.keep_m(uas, other) + self.margin_m]
+        ]
+        return replace(
+            self.programs[uas],
+            bodies=(*bodies, *movers),
+            earliest=earliest,
+            loose=loose,
+            solved=0,
+        )
+
+    def flights(
+        self,
+        moment: Moment,
+        routes: Mapping[int, IntArray],
+        movers: Mapping[int, Sequence[Body]],
+        budget: int,
+        known: Mapping[int, Flight],
+    ) -> dict[int, Flight]:
+        """Each UAS's quickest flight; a shorter one makes way for those that fly longer.
+
+        Args:
+            moment: Where everything is.
+            routes: Waypoints of each UAS that is to fly.
+            movers: What moves, as each sees it.
+            budget: Programs to solve for each, about.
+            known: Flights along these routes that need no search where they still may be flown.
+        """
+        earliest = moment.earliest if moment.earliest.any() else None
+        alone = {}
+        for u, route in routes.items():
+            program = self.program(u, {}, movers[u], earliest)
+            start = reduced_state(moment.x[u])
+            if u in known and program.allows(route, known[u]):
+                alone[u] = known[u]
+            else:
+                alone[u] = quickest(program, self.terrain, u, start, route, budget)
+        flights: dict[int, Flight] = {}
+        for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
+            paths_m = {k: flight.path_m for k, flight in flights.items()}
+            program = self.program(u, paths_m, movers[u], earliest)
+            flights[u] = make_way(program, reduced_state(moment.x[u]), routes[u], alone[u])
+        return flights
+
+
+def make_way(program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight) -> Flight:
+    """The flight clear of all bodies: as it is, bent, or some steps later; else as it is."""
+    if program.spare_from_bodies_m(flight.path_m) >= 0.0 or not flight.is_clear:
+        return flight
+    for later in range(_LATER_STEPS):
+        order, lengths = stretches(flight)
+        wait_in = [0, *(range(1, len(lengths), 3) if later else ())]
+        for stretch in wait_in:
+            visits = shifted(flight.visits, order, stretch, later)
+            steps = flight.steps + later
+            new = retimed(program, start, route, flight, visits, steps, rounds=4)
+            if new.is_clear:
+                return new
+    return flight

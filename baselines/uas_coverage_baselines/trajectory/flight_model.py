@@ -1,0 +1,138 @@
+"""The vehicle as the convex program sees it: a linear map, and the sets of inputs and states.
+
+Of the 14 states of the LPV model the program takes 10: of each horizontal axis position, velocity,
+tilt and rate, positive along the axis; then down and its rate. The heading is held by the inner
+loop, and the battery follows from the flight (`rollout`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.vehicle import (
+    LIFT,
+    PHI,
+    TAU_X,
+    TAU_Y,
+    THETA,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    X,
+    Y,
+    Z,
+    lpv_step,
+    velocity_climb_wrench,
+    write_limited,
+)
+from uas_coverage_env.vehicle.limits import N_LIMITS
+
+FloatArray = NDArray[np.float64]
+
+N_X, N_U = 10, 3
+POSITION = np.array([0, 4, 8])
+VELOCITY = np.array([1, 5, 9])
+NORMS = np.array([[1, 5], [2, 6], [3, 7]])
+"""Pairs of states whose norms are limited: velocity, tilt, rate."""
+
+_KEPT_BACK = 2e-4  # share of each limit that is left to the tolerance of the solver
+_ACCELERATION_WEIGHT, _LIFT_WEIGHT = 2e-3, 2e-5  # on squared inputs: break ties, cost no time
+
+
+class FlightModel(NamedTuple):
+    """x(n+1) = A x(n) + B u(n), and what is allowed of x and u.
+
+    Inputs are the angular accelerations that push north and east [rad/s²], and the lift [N].
+    """
+
+    dt_s: float
+    A: FloatArray
+    """(10, 10), upper triangular in blocks of 4, 4 and 2."""
+    B: FloatArray
+    """(10, 3), each column in its block."""
+    norms: FloatArray
+    """(3,) largest horizontal velocity [m/s], tilt [rad] and tilt rate [rad/s]."""
+    vertical: FloatArray
+    """(2,) largest climb and descent [m/s]."""
+    input_low: FloatArray
+    """(3,)"""
+    input_high: FloatArray
+    """(3,)"""
+    input_weight: FloatArray
+    """(3,) cost of squared inputs."""
+
+
+def flight_model(vehicle: np.record, kept_back: float = _KEPT_BACK) -> FlightModel:
+    """The model of a compiled vehicle.
+
+    Args:
+        vehicle: Record of VEHICLE_DTYPE.
+        kept_back: Share of each limit that is not used.
+    """
+    A, B = np.zeros((N_X, N_X)), np.zeros((N_X, N_U))
+    for axis in range(2):
+        rows = slice(4 * axis, 4 * axis + 4)
+        A[rows, rows], B[rows, axis] = vehicle.axis_A, vehicle.axis_B
+    A[8:, 8:], B[8:, 2] = vehicle.vertical_A, vehicle.vertical_B
+    share = 1.0 - kept_back
+    alpha = [
+        min(vehicle.torque_max_Nm[a] / vehicle.inertia_kgm2[a], vehicle.alpha_xy_max_radps2)
+        for a in (1, 0)  # pitch pushes north, roll pushes east
+    ]
+    return FlightModel(
+        dt_s=float(vehicle.dt_s),
+        A=A,
+        B=B,
+        norms=share
+        * np.array([vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps]),
+        vertical=share * np.array([vehicle.v_up_max_mps, vehicle.v_down_max_mps]),
+        input_low=share * np.array([-alpha[0], -alpha[1], vehicle.lift_min_N]),
+        input_high=share * np.array([alpha[0], alpha[1], vehicle.lift_max_N]),
+        input_weight=np.array([_ACCELERATION_WEIGHT, _ACCELERATION_WEIGHT, _LIFT_WEIGHT]),
+    )
+
+
+def reduced_state(x: FloatArray) -> FloatArray:
+    """(10,) of the program, of a state (14,)."""
+    return np.array(
+        [x[X], x[VX], -x[THETA], -x[WY], x[Y], x[VY], x[PHI], x[WX], x[Z], x[VZ]], np.float64
+    )
+
+
+@allocating_kernel
+def rollout(vehicle, start, inputs):
+    """Fly inputs of the program in the LPV model, as the world does.
+
+    Args:
+        vehicle: Record of VEHICLE_DTYPE.
+        start: (14,) state.
+        inputs: (N, 3).
+
+    Returns:
+        States (N+1, 14), inputs of the world (N, 5), and (N_LIMITS,) the share of each limit that
+        is used at most; of the last, a lower limit, the share that the limit has of what is left.
+    """
+    n_steps = len(inputs)
+    x, u = np.empty((n_steps + 1, start.shape[0])), np.zeros((n_steps, 5))
+    reference, values = np.empty(2), np.empty(N_LIMITS)
+    used = np.zeros(N_LIMITS)
+    x[0] = start
+    for n in range(n_steps):
+        reference[0], reference[1] = x[n, VX], x[n, VY]
+        # the heading is held by the inner loop; lift and the other torques are the program's
+        velocity_climb_wrench(vehicle, x[n], reference, x[n, VX], x[n, VY], 0.0, u[n])
+        u[n, LIFT] = inputs[n, 2]
+        u[n, TAU_X] = inputs[n, 1] * vehicle.inertia_kgm2[0]
+        u[n, TAU_Y] = -inputs[n, 0] * vehicle.inertia_kgm2[1]
+        voltage, current = lpv_step(vehicle, x[n], u[n], x[n + 1])
+        write_limited(x[n + 1], voltage, current, False, values)
+        for k in range(N_LIMITS - 1):
+            used[k] = max(used[k], values[k] / vehicle.bounds[k])
+        used[N_LIMITS - 1] = max(used[N_LIMITS - 1], vehicle.bounds[N_LIMITS - 1] / voltage)
+    return x, u, used

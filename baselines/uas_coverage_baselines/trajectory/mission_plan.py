@@ -1,0 +1,202 @@
+"""A plan of the whole mission: an order, and a verified course for each UAS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.routing import (
+    Routes,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
+from uas_coverage_baselines.trajectory.course import (
+    Course,
+    are_apart,
+    course_of,
+    trouble_alone,
+)
+from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
+from uas_coverage_baselines.trajectory.program import Flight
+from uas_coverage_baselines.trajectory.space import Body
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_LEFT_OUT_S = 120.0  # of a waypoint of weight 1, as in the order search
+_UNFLOWN_S = 1000.0
+_BATTERY = "the battery does not last"
+_BUDGETS = 3
+_SHORTER = 0.04  # of the battery, taken off a budget that did not last
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much to search; nothing of it is a time.
+
+    Attributes:
+        orders: Searches for an order, each with flights of its own.
+        moves: Of each search.
+        programs: Solved for each flight, about.
+        total_weight: Worth of a second of each UAS's flight against one of the mission.
+    """
+
+    orders: int
+    moves: int
+    programs: int
+    total_weight: float
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What one UAS is to do.
+
+    Attributes:
+        route: (K,) waypoints.
+        flight: Along them; its visits count from the course's first sample.
+        course: The same as the world flies it.
+    """
+
+    route: IntArray
+    flight: Flight
+    course: Course
+
+    def open_visits(self, step: int, uncovered: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(K,) which visits are still to come and needed."""
+        return uncovered[self.route] & (self.flight.visits + self.course.begin > step)
+
+    def rest(self, step: int, uncovered: NDArray[np.bool_]) -> tuple[IntArray, Flight]:
+        """The route that is left at a sample, in order of time, and the flight along it."""
+        left, done = self.open_visits(step, uncovered), step - self.course.begin
+        flight = self.flight
+        route, visits, missed_m = self.route[left], flight.visits[left], flight.missed_m[left]
+        order = np.argsort(visits, kind="stable")
+        rest = Flight(
+            visits[order] - done,
+            flight.x[done:],
+            flight.u[done:],
+            flight.costate[done:],
+            flight.violation,
+            missed_m[order],
+        )
+        return route[order], rest
+
+
+@dataclass(frozen=True)
+class MissionPlan:
+    """The plans of the UAS that have one.
+
+    Attributes:
+        planned: By index of the UAS.
+        order: Of the search.
+        cost_s: What is minimised.
+        troubles: Why a UAS has no plan, by its index.
+    """
+
+    planned: Mapping[int, Planned]
+    order: Routes
+    cost_s: float
+    troubles: Mapping[int, str]
+
+
+def plan_mission(
+    fleet: Fleet,
+    moment: Moment,
+    step: int,
+    movers: Mapping[int, Sequence[Body]],
+    effort: Effort,
+    seed: int,
+    kept: Routes | None = None,
+    flown: Mapping[int, tuple[IntArray, Flight]] | None = None,
+) -> MissionPlan:
+    """The best plan found; the same arguments give the same plan.
+
+    Args:
+        fleet: The mission.
+        moment: From where.
+        step: Number of the sample.
+        movers: What moves, as each UAS sees it.
+        effort: How much to search.
+        seed: Of the order search.
+        kept: An order to begin from; none before take-off.
+        flown: Routes and flights from here that are as good as planned already.
+    """
+    less_s = np.zeros(len(moment.x))
+    best: MissionPlan | None = None
+    for _ in range(_BUDGETS):
+        task = fleet.task(moment, less_s)
+        known: set[tuple[bytes, ...]] = set()
+        for order in _orders(task, effort, seed, kept):
+            key = tuple(route.tobytes() for route in order.routes)
+            if key not in known:
+                known.add(key)
+                plan = _flown(fleet, moment, step, movers, effort, order, flown or {})
+                if best is None or plan.cost_s < best.cost_s:
+                    best = plan
+        assert best is not None
+        too_long = [u for u, why in best.troubles.items() if why == _BATTERY]
+        if not too_long:
+            return best
+        less_s[too_long] += _SHORTER * fleet.battery_s(moment.x)[too_long]
+    assert best is not None
+    return best
+
+
+def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -> list[Routes]:
+    found = [] if kept is None else [improve_routes(task, kept, SearchEffort(0), 0)]
+    for k in range(effort.orders):
+        begin = empty_routes(task.n_uas) if kept is None else kept
+        search = SearchEffort(
+            effort.moves,
+            hottest_s=4.0 if kept is None or k else 1.5,
+            total_weight=effort.total_weight,
+        )
+        found.append(improve_routes(task, begin, search, seed + k))
+    return sorted(found, key=lambda order: order.cost_s)
+
+
+def _flown(
+    fleet: Fleet,
+    moment: Moment,
+    step: int,
+    movers: Mapping[int, Sequence[Body]],
+    effort: Effort,
+    order: Routes,
+    flown: Mapping[int, tuple[IntArray, Flight]],
+) -> MissionPlan:
+    """An order with its flights and courses, as far as they are verified."""
+    at_start = step == 0
+    routes = {
+        u: route
+        for u, route in enumerate(order.routes)
+        if moment.may_work[u] and (len(route) or not at_start)
+    }
+    known = {
+        u: flown[u][1]
+        for u, route in routes.items()
+        if u in flown and np.array_equal(flown[u][0], route)
+    }
+    flights = fleet.flights(moment, routes, movers, effort.programs, known)
+    planned: dict[int, Planned] = {}
+    troubles: dict[int, str] = {}
+    for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):
+        why = trouble_alone(fleet, u, moment.x[u], flights[u])
+        course = course_of(fleet, u, step, moment.x[u], flights[u])
+        if why is None and not all(
+            are_apart(fleet, u, k, course, other.course) for k, other in planned.items()
+        ):
+            why = "too near to another UAS"
+        if why is None:
+            planned[u] = Planned(routes[u], flights[u], course)
+        else:
+            troubles[u] = why
+    seconds = fleet.brief.dt_s * np.array([p.flight.steps for p in planned.values()] or [0.0])
+    cost_s = float(seconds.max() + effort.total_weight * seconds.sum())
+    cost_s += _LEFT_OUT_S * sum(fleet.brief.waypoints[w].weight for w in order.left_out)
+    cost_s += _UNFLOWN_S * len(troubles)
+    return MissionPlan(planned, order, cost_s, troubles)

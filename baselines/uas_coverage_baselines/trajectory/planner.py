@@ -1,0 +1,307 @@
+"""The planner `trajectory`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
+from uas_coverage_baselines.trajectory.course import Course, hover_inputs
+from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
+from uas_coverage_baselines.trajectory.mission_plan import (
+    Effort,
+    MissionPlan,
+    Planned,
+    plan_mission,
+)
+from uas_coverage_baselines.trajectory.movers import NEVER, Movers
+from uas_coverage_baselines.trajectory.safeguard import Safeguard
+from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_baselines.trajectory.tracking import tracked
+from uas_coverage_env.flight import PlannerOptions
+from uas_coverage_env.flight.planner import Decision
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.world import FLYING, Command, GoTo, SwarmState, Wrench
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+_AS_PLANNED = 1e-6  # of states
+_AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
+_HOME_AFTER_S = 30.0  # without a plan for so long a UAS flies home
+_PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is flown has to
+_OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first
+_OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
+_OPENS_AGAIN_S = 26.0  # and at least so long
+_SOON_S = 22.0  # a visit to what is still blocked so soon is put off
+
+
+class TrajectoryOptions(PlannerOptions):
+    """Options of `trajectory`."""
+
+    orders: int = Field(default=3, ge=1, le=100, description="orders searched before take-off")
+    moves: int = Field(default=300_000, ge=0, description="changes tried in each search")
+    programs: int = Field(
+        default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
+    )
+    weight_energy: float = Field(
+        default=0.6,
+        ge=0.0,
+        le=2.0,
+        description="worth of a second of each UAS's flight against one of the mission",
+    )
+    margin_m: float = Field(
+        default=0.3,
+        ge=0.0,
+        le=10.0,
+        description="added to every clearance, for the path between samples",
+    )
+    moving_margin_m: float = Field(
+        default=3.0,
+        ge=0.0,
+        le=50.0,
+        description="added for a moving obstacle's next change of velocity",
+    )
+
+
+class Trajectory:
+    """Plans each UAS's whole mission as one trajectory, and flies it as planned.
+
+    An order of the waypoints is searched, the flights along it are convex programs that are made
+    shorter as long as nothing is violated, and what is flown is verified with a backup trajectory.
+    Plans are made anew where the state is another, or something moves otherwise. There is no clock
+    in any of it: the same seed flies the same mission.
+    """
+
+    Options = TrajectoryOptions
+
+    def __init__(self, options: TrajectoryOptions | None = None) -> None:
+        self.options = options or TrajectoryOptions()
+        self.last_decision: Decision | None = None
+
+    def warm_up(self, brief: MissionBrief) -> None:
+        """Compile everything."""
+        quick = Trajectory(TrajectoryOptions(orders=1, moves=10, programs=3))
+        quick.reset(brief, 0)
+        swarm = first_sight(brief)
+        quick.act(swarm)
+        quick._safeguard.evade([0], {}, [0])
+
+    def reset(self, brief: MissionBrief, seed: int) -> None:
+        """Plan the mission from the starts."""
+        self._brief, self._seed = brief, seed
+        self._world = WorldView(brief)
+        self._fleet = Fleet(brief, self.options.margin_m)
+        self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
+        self._radius_m = max(uas.radius_m for uas in brief.uas)
+        self._planned: dict[int, Planned] = {}
+        self._plan: MissionPlan | None = None
+        self._is_disturbed = False
+        self._without_plan_since = np.full(len(brief.uas), -1)
+        swarm = first_sight(brief)
+        self._world.update(swarm)
+        self._make_plan(swarm, Movers.seen(brief, swarm))
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Fly on as planned, and plan anew where that is not possible or no longer right."""
+        self._world.update(swarm)
+        movers = Movers.seen(self._brief, swarm)
+        flying = swarm.status == FLYING
+        self._planned = {u: planned for u, planned in self._planned.items() if flying[u]}
+        self._follow(swarm, movers)
+        reason = self._why_plan_anew(swarm, movers)
+        if reason is not None:
+            self._make_plan(swarm, movers)
+        courses = {u: p.course.rest(swarm.step) for u, p in self._planned.items()}
+        chosen = self._safeguard.chosen(swarm, courses, movers)
+        return self._commands(swarm, flying, chosen, reason)
+
+    def _commands(
+        self,
+        swarm: SwarmState,
+        flying: BoolArray,
+        chosen: Mapping[int, tuple[Course, bool]],
+        reason: str | None,
+    ) -> Mapping[str, Command]:
+        step, dt_s = swarm.step, self._brief.dt_s
+        commands: dict[str, Command] = {}
+        predicted_m: dict[str, FloatArray] = {}
+        flown: dict[int, FloatArray] = {}
+        rest: list[int] = []
+        fallback = None
+        for u in np.flatnonzero(flying).tolist():
+            name = swarm.names[u]
+            course, as_planned = chosen.get(u, (None, False))
+            if self._stays(u, swarm):
+                commands[name] = GoTo(None, "return")
+                continue
+            if not as_planned:
+                fallback = fallback or reason or "no backup trajectory"
+                if self._without_plan_since[u] < 0:
+                    self._without_plan_since[u] = step
+            else:
+                self._without_plan_since[u] = -1
+            waits_s = dt_s * (step - self._without_plan_since[u])
+            hovers = course is None or not len(course.u)
+            if course is None or (not as_planned and hovers and waits_s >= _HOME_AFTER_S):
+                rest.append(u)
+                continue
+            holds = hover_inputs(self._fleet, u, swarm.x[u])
+            u_now = course.u[0] if len(course.u) else holds
+            flown[u] = u_now
+            mode = "covering" if self._has_work(u, swarm) else "return"
+            commands[name] = Wrench(*(float(value) for value in u_now[:4]), mode=mode)
+            predicted_m[name] = course.path_m(max(len(course.u), 1))
+        if rest:
+            late = [u for u in rest if dt_s * (step - self._without_plan_since[u]) >= _HOME_AFTER_S]
+            inputs = self._safeguard.evade(rest, flown, late)
+            for u in rest:
+                self._safeguard.backups.pop(u, None)
+                wrench = (float(value) for value in inputs[u][:4])
+                mode = "return" if u in late else "covering"
+                commands[swarm.names[u]] = Wrench(*wrench, mode=mode)
+        self.last_decision = Decision(predicted_m, fallback=fallback is not None, reason=fallback)
+        return commands
+
+    def _stays(self, uas: int, swarm: SwarmState) -> bool:
+        """Whether a UAS has nothing to do and is at home still, or should have landed."""
+        if uas in self._planned:
+            return self._planned[uas].course.end <= swarm.step
+        return not swarm.departed[uas] and not self._has_work(uas, swarm) and swarm.step == 0
+
+    def _has_work(self, uas: int, swarm: SwarmState) -> bool:
+        planned = self._planned.get(uas)
+        if planned is None:
+            return self._plan is not None and uas in self._plan.troubles
+        return bool(planned.open_visits(swarm.step, swarm.uncovered).any())
+
+    def _follow(self, swarm: SwarmState, movers: Movers) -> None:
+        """Courses from where the UAS are, where that is not where they were planned to be."""
+        for u, planned in list(self._planned.items()):
+            rest = planned.course.rest(swarm.step)
+            if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
+                continue
+            if not self._is_disturbed:
+                self._is_disturbed = True
+                self._fleet.leave_room()
+                self._planned = {}
+                return
+            others = {
+                k: other.course.rest(swarm.step).path_m(10**6)
+                for k, other in self._planned.items()
+                if k != u
+            }
+            bodies = self._bodies(movers, u)
+            new = tracked(self._fleet, u, planned, swarm, others, bodies)
+            if new is None:
+                del self._planned[u]
+            else:
+                self._planned[u] = new
+
+    def _bodies(self, movers: Movers, uas: int) -> list[Body]:
+        margin_m = self.options.moving_margin_m + _PLAN_MARGIN_M
+        return movers.bodies(self._brief.uas[uas].radius_m, margin_m)
+
+    def _opens(self, movers: Movers) -> NDArray[np.int64]:
+        """(W,) steps from now at which what moves lets waypoints be covered."""
+        margin_m = self.options.moving_margin_m + _PLAN_MARGIN_M
+        fleet = self._fleet
+        return movers.open_from(fleet.waypoints_m, fleet.radius_m, self._radius_m, margin_m)
+
+    def _why_plan_anew(self, swarm: SwarmState, movers: Movers) -> str | None:
+        flying = swarm.status == FLYING
+        assert self._plan is not None
+        missing = [
+            u for u in np.flatnonzero(flying & self._may_fly).tolist() if u not in self._planned
+        ]
+        waited = self._brief.dt_s * (swarm.step - self._planned_at) >= _AGAIN_S
+        if missing and (waited or any(u in self._had for u in missing)):
+            return "no plan"
+        if not np.array_equal(flying & self._may_fly, self._may_fly & self._flew(swarm)):
+            return "a UAS is lost"
+        if waited and (swarm.uncovered & ~self._thought_of(swarm)).any() and self._planned:
+            return "missed a waypoint"
+        if not len(movers):
+            return None
+        if not np.array_equal(movers.velocity_mps, self._seen_velocity_mps):
+            return "something moves otherwise"
+        opens = self._opens(movers)
+        if not np.array_equal((opens > 0) & swarm.uncovered, self._blocked & swarm.uncovered):
+            return "a waypoint opened or closed"
+        if (opens >= NEVER).any():
+            soon = round(_SOON_S / self._brief.dt_s)
+            for planned in self._planned.values():
+                ahead = planned.flight.visits + planned.course.begin - swarm.step
+                waits = (opens[planned.route] >= NEVER) & swarm.uncovered[planned.route]
+                if (waits & (ahead < soon) & (ahead > 0)).any():
+                    return "a waypoint is still blocked"
+        return None
+
+    def _flew(self, swarm: SwarmState) -> BoolArray:
+        """(U,) UAS that are flying by plan, or have ended as planned."""
+        ends = np.ones(len(swarm.status), np.bool_)
+        for u, end in self._ends.items():
+            ends[u] = swarm.step < end
+        return ends
+
+    def _thought_of(self, swarm: SwarmState) -> BoolArray:
+        """(W,) waypoints that a plan visits, or that no battery reaches."""
+        assert self._plan is not None
+        known = np.zeros(len(swarm.uncovered), np.bool_)
+        known[self._plan.order.left_out] = True
+        for planned in self._planned.values():
+            known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
+        return known
+
+    def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
+        first, self._step = self._plan is None, swarm.step
+        flying = swarm.status == FLYING
+        opens = self._opens(movers)
+        earliest = np.where(opens > 0, opens, 0)
+        # a flight that had to wait for something may be shorter now
+        waits = (opens > 0) if first else (opens > 0) | self._blocked
+        left = {u: p.rest(swarm.step, swarm.uncovered) for u, p in self._planned.items()}
+        flown = {u: rest for u, rest in left.items() if not waits[rest[0]].any()}
+        moment = Moment(swarm.x, flying, swarm.uncovered, earliest, swarm.time_s)
+        bodies = {u: self._bodies(movers, u) for u in range(len(swarm.x))}
+        unknown = (opens >= NEVER) & swarm.uncovered
+        options = self.options
+        effort = Effort(
+            options.orders if first else 2,
+            options.moves,
+            options.programs,
+            options.weight_energy,
+        )
+        if unknown.any():
+            moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
+        kept = None
+        if self._plan is not None:
+            kept = self._plan.order
+        seed = self._seed + swarm.step
+        plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)
+        self._plan, self._planned = plan, dict(plan.planned)
+        self._planned_at, self._seen_velocity_mps = swarm.step, movers.velocity_mps.copy()
+        self._blocked = opens > 0
+        self._may_fly = flying.copy()
+        if first:
+            for u in range(len(flying)):
+                self._may_fly[u] = u in plan.planned or u in plan.troubles
+        self._ends = {u: p.course.end for u, p in plan.planned.items()}
+        self._had = set(plan.planned)
+
+    def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort) -> int:
+        """Steps after which a visit to what is blocked is planned, until more is known."""
+        dt_s = self._brief.dt_s
+        if self._plan is not None:
+            rest_s = [dt_s * len(p.course.rest(self._step).u) for p in self._planned.values()]
+            later_s = _OPENS_AGAIN_SHARE * float(np.mean(rest_s or [0.0]))
+            return round(max(_OPENS_AGAIN_S, later_s) / dt_s)
+        others = moment.uncovered & ~unknown
+        task = self._fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
+        search = SearchEffort(effort.moves)
+        order = improve_routes(task, empty_routes(task.n_uas), search, self._seed)
+        return round(max(_OPENS_AGAIN_S, _OPENS_SHARE * float(order.seconds.mean())) / dt_s)

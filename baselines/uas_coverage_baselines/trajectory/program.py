@@ -1,0 +1,276 @@
+"""The whole flight of one UAS along its route: a convex program for given steps of the visits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY, FlightModel
+from uas_coverage_baselines.trajectory.interior_point import solve
+from uas_coverage_baselines.trajectory.rows import SoftRows
+from uas_coverage_baselines.trajectory.space import (
+    Body,
+    Space,
+    separating_rows,
+    spare_fixed_m,
+    spare_from_body_m,
+)
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+TOLERANCE_M = 0.02
+"""Soft rows that are violated by less in sum count as kept: margins are larger than this."""
+
+_NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
+_FENCE_NEAR_M = 25.0
+_INSIDE_M = 0.05  # of a waypoint's radius, or a fiftieth of it
+_LANDING_SHARE = 0.9, 0.85  # of landing distance and speed
+_LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
+_CLEAR_WEIGHT = 2.0  # of 1 m too near
+_HOPELESS = 3.0  # more violation than this is no matter of faces
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Where and how a flight ends."""
+
+    home_m: FloatArray
+    distance_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight of one UAS along a route.
+
+    Attributes:
+        visits: (K,) step of each waypoint of the route.
+        x: (N+1, 10) states of the program.
+        u: (N, 3) inputs.
+        costate: (N, 10) what a change of the states 1..N costs.
+        violation: Of the soft rows, summed; inf where the program was not solved.
+        missed_m: (K,) how far each visit is outside of its sphere.
+    """
+
+    visits: IntArray
+    x: FloatArray
+    u: FloatArray
+    costate: FloatArray
+    violation: float
+    missed_m: FloatArray
+
+    @property
+    def steps(self) -> int:
+        """N."""
+        return len(self.u)
+
+    @property
+    def path_m(self) -> FloatArray:
+        """(N+1, 3)."""
+        return self.x[:, POSITION]
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether nothing is violated."""
+        return self.violation < TOLERANCE_M
+
+
+@dataclass
+class FlightProgram:
+    """Flights of one UAS along routes of waypoints.
+
+    Attributes:
+        model: Of the vehicle.
+        space: What stands.
+        landing: Where it ends.
+        waypoints_m: (W, 3).
+        radius_m: (W,).
+        bodies: On known paths from step 0.
+        earliest: (W,) steps before which a waypoint is not to be visited.
+        loose: Factors on the limits of the first stages, for a start beyond them.
+        solved: How many programs were solved: the effort.
+    """
+
+    model: FlightModel
+    space: Space
+    landing: Landing
+    waypoints_m: FloatArray
+    radius_m: FloatArray
+    bodies: Sequence[Body] = ()
+    earliest: IntArray | None = None
+    loose: FloatArray | None = None
+    solved: int = field(default=0)
+
+    def solve(
+        self,
+        start: FloatArray,
+        route: IntArray,
+        visits: IntArray,
+        guess: FloatArray,
+        inputs: FloatArray | None = None,
+        rounds: int = 3,
+    ) -> Flight:
+        """The flight that visits at given steps and lands at the last.
+
+        Args:
+            start: (10,) state.
+            route: (K,) waypoints.
+            visits: (K,) a step in 1..N for each.
+            guess: (N+1, 10) states, or (N+1, 3) positions.
+            inputs: (N, 3) guess.
+            rounds: How often faces are chosen anew, at most.
+        """
+        n_steps = len(guess) - 1
+        visits = np.asarray(visits, np.int64)
+        if guess.shape[1] == 3:
+            guess = self._at_path_speed(guess)
+        if self.earliest is not None and (visits < self.earliest[route]).any():
+            return _unsolved(visits, guess)
+        u = np.zeros((n_steps, 3)) if inputs is None else inputs
+        loose = np.ones(n_steps + 1)
+        if self.loose is not None:
+            m = min(len(self.loose), n_steps)
+            loose[1 : m + 1] = self.loose[:m]
+        flight = _unsolved(visits, guess)
+        x = guess
+        for _ in range(rounds):
+            x = x.copy()
+            x[0] = start
+            rows = self._rows(route, visits, np.ascontiguousarray(x[:, POSITION]))
+            self.solved += 1
+            found = solve(self.model, rows, x, u, loose=loose)
+            if not found.converged or not np.isfinite(found.x).all():
+                return flight if np.isfinite(flight.violation) else _unsolved(visits, guess)
+            x, u = found.x, found.u
+            violation = float(found.violation.sum())
+            missed_m = found.violation[: len(route)]
+            flight = Flight(visits, x, u, found.costate, violation, missed_m)
+            if violation > _HOPELESS:
+                break
+            if self.spare_m(flight.path_m) > -TOLERANCE_M:
+                break
+            flight = Flight(visits, x, u, found.costate, max(violation, 0.5), missed_m)
+        return flight
+
+    def allows(self, route: IntArray, flight: Flight) -> bool:
+        """Whether a flight that was clear is so of these bodies, too, and visits in time."""
+        in_time = self.earliest is None or bool((flight.visits >= self.earliest[route]).all())
+        return in_time and flight.is_clear and self.spare_from_bodies_m(flight.path_m) >= 0.0
+
+    def spare_m(self, path_m: FloatArray) -> float:
+        """Distance beyond what is kept from all that stands or moves, along a path (N+1, 3)."""
+        path_m = np.ascontiguousarray(path_m)
+        outside_m = path_m[1:-1] @ self.space.fence_normals.T + self.space.fence_offsets_m
+        spare = min(
+            float(spare_fixed_m(self.space, path_m)), -float(outside_m.max(initial=-np.inf))
+        )
+        return min(spare, self.spare_from_bodies_m(path_m))
+
+    def spare_from_bodies_m(self, path_m: FloatArray) -> float:
+        """The same from bodies alone."""
+        path_m = np.ascontiguousarray(path_m)
+        spare = np.inf
+        for body in self.bodies:
+            gap = spare_from_body_m(path_m, body.path_m, body.level_m, body.height_m)
+            spare = min(spare, float(gap))
+        return spare
+
+    def _at_path_speed(self, path_m: FloatArray) -> FloatArray:
+        """(N+1, 10) states along positions, with the velocities of their differences."""
+        x = np.zeros((len(path_m), 10))
+        x[:, POSITION] = path_m
+        if len(path_m) > 1:
+            x[:, VELOCITY] = np.gradient(path_m, axis=0) / self.model.dt_s
+        return x
+
+    def _rows(self, route: IntArray, visits: IntArray, path_m: FloatArray) -> SoftRows:
+        n_steps = len(path_m) - 1
+        inside_m = self.radius_m[route] - np.minimum(_INSIDE_M, 0.02 * self.radius_m[route])
+        made = [_balls(visits, POSITION, self.waypoints_m[route], inside_m, 1.0)]
+        distance, speed = _LANDING_SHARE
+        end = np.array([n_steps])
+        home = self.landing
+        made += [
+            _balls(end, POSITION, home.home_m[None], np.array([distance * home.distance_m]), 1.0),
+            _balls(
+                *(end, VELOCITY, np.zeros((1, 3)), np.array([speed * home.speed_mps])),
+                _LANDING_WEIGHT,
+            ),
+        ]
+        if len(self.space.keep_m):
+            stage, normal, bound = separating_rows(self.space, path_m, _NEAR_M)
+            made.append(_planes(stage, normal, bound))
+        made += self._fence_rows(path_m)
+        made += [rows for body in self.bodies if (rows := _apart(body, path_m)) is not None]
+        return SoftRows(*(np.concatenate(parts) for parts in zip(*made, strict=True)))
+
+    def _fence_rows(self, path_m: FloatArray) -> list[SoftRows]:
+        space = self.space
+        outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
+        result = []
+        for h in range(len(space.fence_offsets_m)):
+            stage = np.flatnonzero(outside_m[1:-1, h] > -_FENCE_NEAR_M) + 1
+            if not len(stage):
+                continue
+            # homes may lie in the margin
+            home_m = space.fence_normals[h] @ self.landing.home_m + space.fence_offsets_m[h]
+            margin_m = min(space.fence_margin_m, max(-float(home_m), 0.0))
+            bound = np.full(len(stage), -space.fence_offsets_m[h] - margin_m)
+            normal = np.broadcast_to(space.fence_normals[h], (len(stage), 3))
+            result.append(_planes(stage, normal, bound))
+        return result
+
+
+def _unsolved(visits: IntArray, guess: FloatArray) -> Flight:
+    n_steps = len(guess) - 1
+    nothing = np.zeros((n_steps, 10))
+    return Flight(
+        visits, guess, np.zeros((n_steps, 3)), nothing, np.inf, np.full(len(visits), np.inf)
+    )
+
+
+def _balls(
+    stage: IntArray, states: IntArray, centre: FloatArray, radius: FloatArray, weight: float
+) -> SoftRows:
+    m = len(stage)
+    rows = np.broadcast_to(states, (m, 3))
+    return SoftRows(stage, np.ones(m, bool), rows, centre, radius, np.full(m, weight))
+
+
+def _planes(stage: IntArray, normal: FloatArray, bound: FloatArray) -> SoftRows:
+    m = len(stage)
+    rows = np.broadcast_to(POSITION, (m, 3))
+    return SoftRows(stage, np.zeros(m, bool), rows, normal, bound, np.full(m, _CLEAR_WEIGHT))
+
+
+def _apart(body: Body, path_m: FloatArray) -> SoftRows | None:
+    """Rows that keep clear of a body: a plane for each step, at both of its ends."""
+    n = min(len(path_m), len(body.path_m))
+    if n < 2:
+        return None
+    away = path_m[:n] - body.path_m[:n]
+    level_m = np.hypot(away[:, 0], away[:, 1])
+    beside, above = level_m - body.level_m, np.abs(away[:, 2]) - body.height_m
+    near = np.flatnonzero(np.maximum(beside, above)[1:] < _NEAR_M) + 1
+    if not len(near):
+        return None
+    face = np.zeros((n, 3))
+    face[:, :2] = away[:, :2] / np.maximum(level_m, 1e-6)[:, None]
+    sideways = beside >= above
+    face[~sideways] = 0.0
+    face[~sideways, 2] = np.where(away[~sideways, 2] > 0.0, 1.0, -1.0)
+    keep_m = np.where(sideways, body.level_m, body.height_m)
+    stage, normal, bound = [], [], []
+    for shift in (0, -1):
+        at = near + shift
+        chosen = near[at >= 1]
+        at = at[at >= 1]
+        stage.append(at)
+        normal.append(-face[chosen])
+        centre = np.einsum("ij,ij->i", face[chosen], body.path_m[at])
+        bound.append(-(centre + keep_m[chosen]))
+    return _planes(np.concatenate(stage), np.vstack(normal), np.concatenate(bound))

@@ -1,0 +1,235 @@
+"""What a UAS keeps clear of: fixed obstacles, the geofence, and bodies on known paths.
+
+Convex programs know no hulls to stay outside of. For each step one face is taken that separates
+both of its ends from an obstacle, chosen along the flight so far; by convexity the straight segment
+between them is then clear, too. The faces are chosen anew as the flight changes (`program`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.geometry import cylinder_clearance, segment_clearance
+from uas_coverage_env.world import Arena
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
+_FENCE_MARGIN_M = 0.1
+
+
+class Space(NamedTuple):
+    """Fixed planes as one UAS sees them; `normal . p + offset` grows outwards."""
+
+    normals: FloatArray
+    """(F, 3) faces of all obstacles."""
+    offsets_m: FloatArray
+    """(F,)"""
+    first: IntArray
+    """(O+1,) first face of each obstacle, and the end."""
+    low_m: FloatArray
+    """(O, 3) box around each hull."""
+    high_m: FloatArray
+    """(O, 3)"""
+    keep_m: FloatArray
+    """(O,) planned distance."""
+    least_m: FloatArray
+    """(O,) distance at which the rules count a breach."""
+    fence_normals: FloatArray
+    """(H, 3)"""
+    fence_offsets_m: FloatArray
+    """(H,) a place is inside, with margin, where `normal . p + offset <= 0`."""
+    fence_margin_m: float
+    """Of the plan, in addition to that of the rules."""
+
+
+class Body(NamedTuple):
+    """Something on a known path to stay clear of: a closed upright cylinder.
+
+    Attributes:
+        path_m: (T, 3) centres, at step 0 of the plan and after it; beyond its end it is gone.
+        level_m: Horizontal distance to keep from the centre.
+        height_m: Vertical distance to keep from the centre; one of both suffices.
+    """
+
+    path_m: FloatArray
+    level_m: float
+    height_m: float
+
+
+def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
+    """The space of one UAS.
+
+    Args:
+        arena: The mission.
+        uas: Index of the UAS.
+        margin_m: Planned beyond the distances that count as a breach.
+    """
+    rules, obstacles = arena.rules[0], arena.obstacles
+    rows = [np.arange(o["first_face"], o["last_face"]) for o in obstacles]
+    faces = np.concatenate([np.zeros(0, np.int64), *rows])
+    least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
+    fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
+    return Space(
+        normals=np.ascontiguousarray(arena.normals[faces]),
+        offsets_m=arena.offsets_m[faces].copy(),
+        first=np.cumsum([0, *(len(row) for row in rows)]),
+        low_m=obstacles["hull_middle_m"] - obstacles["hull_half_m"],
+        high_m=obstacles["hull_middle_m"] + obstacles["hull_half_m"],
+        keep_m=least_m + margin_m,
+        least_m=least_m,
+        fence_normals=np.ascontiguousarray(arena.normals[fence]),
+        fence_offsets_m=arena.offsets_m[fence] + float(rules["fence_margin_m"]),
+        fence_margin_m=_FENCE_MARGIN_M,
+    )
+
+
+@allocating_kernel
+def _distance(space, f, p):
+    """Signed distance of a point from face f."""
+    faces = space.normals
+    return faces[f, 0] * p[0] + faces[f, 1] * p[1] + faces[f, 2] * p[2] + space.offsets_m[f]
+
+
+@allocating_kernel
+def _is_far(space, o, p, q, beyond_m):
+    """Whether a segment stays out of an obstacle's box widened by a distance."""
+    for axis in range(3):
+        if max(p[axis], q[axis]) < space.low_m[o, axis] - beyond_m:
+            return True
+        if min(p[axis], q[axis]) > space.high_m[o, axis] + beyond_m:
+            return True
+    return False
+
+
+@allocating_kernel
+def _separating(space, o, p, q):
+    """The face with most distance to both ends of a segment, and that distance."""
+    best_m, face = -np.inf, -1
+    for f in range(space.first[o], space.first[o + 1]):
+        if space.normals[f, 2] > _BELOW:
+            continue
+        distance_m = min(_distance(space, f, p), _distance(space, f, q))
+        if distance_m > best_m:
+            best_m, face = distance_m, f
+    return best_m, face
+
+
+@allocating_kernel
+def separating_rows(space, path_m, near_m):
+    """Planes that separate both ends of each step from each obstacle near it.
+
+    Args:
+        space: `Space` of the UAS.
+        path_m: (N+1, 3) flight so far.
+        near_m: Obstacles farther than this beyond what is kept get no row.
+
+    Returns:
+        Stages (m,), normals (m, 3) and bounds (m,) of rows `normal . p <= bound`.
+    """
+    n_obstacles, n_steps = len(space.keep_m), len(path_m) - 1
+    stage, normal, bound = [0], [(0.0, 0.0, 0.0)], [0.0]
+    for o in range(n_obstacles):
+        reach_m = space.keep_m[o] + near_m
+        for n in range(n_steps):
+            if _is_far(space, o, path_m[n], path_m[n + 1], reach_m):
+                continue
+            distance_m, face = _separating(space, o, path_m[n], path_m[n + 1])
+            if distance_m >= reach_m or face < 0:
+                continue
+            for end in range(n, n + 2):
+                if end > 0:
+                    a, b, c = space.normals[face]
+                    stage.append(end)
+                    normal.append((-a, -b, -c))
+                    bound.append(space.offsets_m[face] - space.keep_m[o])
+    m = len(stage) - 1
+    stages, normals, bounds = np.empty(m, np.int64), np.empty((m, 3)), np.empty(m)
+    for k in range(m):
+        stages[k], bounds[k] = stage[k + 1], bound[k + 1]
+        normals[k, 0], normals[k, 1], normals[k, 2] = normal[k + 1]
+    return stages, normals, bounds
+
+
+@allocating_kernel
+def spare_fixed_m(space, path_m):
+    """Least distance beyond what the plan keeps from obstacles, by one face for each step."""
+    spare_m = np.inf
+    for o in range(len(space.keep_m)):
+        for n in range(len(path_m) - 1):
+            if _is_far(space, o, path_m[n], path_m[n + 1], space.keep_m[o]):
+                continue
+            distance_m, _ = _separating(space, o, path_m[n], path_m[n + 1])
+            spare_m = min(spare_m, distance_m - space.keep_m[o])
+    return spare_m
+
+
+@allocating_kernel
+def spare_of_rules_m(space, path_m, lands):
+    """Least distance beyond those of the rules, from fixed obstacles and the fence: exact.
+
+    Distances that are smaller at the start already are not to become smaller; where the flight
+    ends in landing, the last sample is no sample of a flying UAS.
+
+    Args:
+        space: `Space` of the UAS.
+        path_m: (N+1, 3).
+        lands: Whether the flight ends with a landing.
+    """
+    spare_m = np.inf
+    n_steps = len(path_m) - 1
+    for h in range(len(space.fence_offsets_m)):
+        normal, offset = space.fence_normals[h], space.fence_offsets_m[h]
+        start_m = -(normal[0] * path_m[0, 0] + normal[1] * path_m[0, 1] + normal[2] * path_m[0, 2])
+        least_m = min(0.0, start_m - offset)
+        for n in range(1, n_steps + 1 - (1 if lands else 0)):
+            p = path_m[n]
+            inside_m = -(normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2]) - offset
+            spare_m = min(spare_m, inside_m - least_m)
+    for o in range(len(space.least_m)):
+        first, last = space.first[o], space.first[o + 1]
+        start_m = -np.inf
+        for f in range(first, last):
+            start_m = max(start_m, _distance(space, f, path_m[0]))
+        least_m = min(space.least_m[o], start_m)
+        for n in range(n_steps):
+            p, q = path_m[n], path_m[n + 1]
+            if _is_far(space, o, p, q, space.least_m[o]):
+                continue
+            clearance_m = segment_clearance(
+                space.normals, space.offsets_m, first, last, p[0], p[1], p[2], q[0], q[1], q[2]
+            )
+            spare_m = min(spare_m, clearance_m - least_m)
+    return spare_m
+
+
+@allocating_kernel
+def apart_m(path_m, other_m, radius_m, half_height_m):
+    """Smallest distance of a path from a closed cylinder on another, between samples too: exact.
+
+    Beyond the end of the shorter path nothing is measured. Two UAS: radius and height 0.
+    """
+    smallest = np.inf
+    for n in range(min(len(path_m), len(other_m)) - 1):
+        a, b = path_m[n] - other_m[n], path_m[n + 1] - other_m[n + 1]
+        smallest = min(
+            smallest,
+            cylinder_clearance(radius_m, half_height_m, a[0], a[1], a[2], b[0], b[1], b[2]),
+        )
+    return smallest
+
+
+@allocating_kernel
+def spare_from_body_m(path_m, other_m, level_m, height_m):
+    """Least distance beyond what a plan keeps from a body, between samples too."""
+    smallest = np.inf
+    for n in range(min(len(path_m), len(other_m)) - 1):
+        a, b = path_m[n] - other_m[n], path_m[n + 1] - other_m[n + 1]
+        clearance_m = cylinder_clearance(level_m, height_m, a[0], a[1], a[2], b[0], b[1], b[2])
+        smallest = min(smallest, clearance_m)
+    return smallest

@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from small_fleets import TOWER, every_waypoint, field, fleet_of, start_of
+from small_worlds import box, meadow, waypoint
+from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
+from uas_coverage_baselines.trajectory.first_guess import first_flight
+from uas_coverage_baselines.trajectory.fleet import make_way
+from uas_coverage_baselines.trajectory.retiming import quickest, retimed, stretches, worth
+from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
+
+from uas_coverage_env.geometry import segment_clearance
+from uas_coverage_env.vehicle import VX, VZ
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """A fleet of one over the field: it, its first sight, its route and its quickest flight."""
+    scenario = field()
+    fleet, swarm = fleet_of(scenario)
+    route = every_waypoint(scenario)
+    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 100)
+    return fleet, swarm, route, flight
+
+
+def test_every_sphere_is_touched_at_its_visit(flown):
+    fleet, _, route, flight = flown
+    away_m = np.linalg.norm(flight.path_m[flight.visits] - fleet.waypoints_m[route], axis=1)
+    assert (away_m <= fleet.radius_m[route]).all()
+
+
+def test_a_flight_ends_landed_at_home(flown):
+    fleet, swarm, _, flight = flown
+    course = course_of(fleet, 0, 0, swarm.x[0], flight)
+    landing = fleet.programs[0].landing
+    assert np.linalg.norm(course.x[-1, :3] - landing.home_m) < landing.distance_m
+    assert np.linalg.norm(course.x[-1, VX : VZ + 1]) < landing.speed_mps
+
+
+def test_what_is_flown_in_the_lpv_world_is_what_was_planned(flown):
+    fleet, swarm, _, flight = flown
+    course = course_of(fleet, 0, 0, swarm.x[0], flight)
+    np.testing.assert_allclose(course.x[:, :3], flight.path_m, atol=1e-3)
+
+
+def test_the_straight_segments_of_a_flight_clear_the_hulls(flown):
+    fleet, _, _, flight = flown
+    for hull, obstacle in zip(fleet.brief.hulls, fleet.brief.obstacles, strict=True):
+        least_m = fleet.brief.uas[0].radius_m + obstacle.safe_distance_m
+        for p, q in zip(flight.path_m[:-1], flight.path_m[1:], strict=True):
+            clearance_m = segment_clearance(hull.normals, hull.offsets_m, 0, hull.n_faces, *p, *q)
+            assert clearance_m >= least_m
+
+
+def test_retiming_makes_a_flight_much_shorter_than_its_first_guess(flown):
+    fleet, swarm, route, flight = flown
+    first = first_flight(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route)
+    assert first.is_clear
+    assert flight.steps < 0.85 * first.steps
+
+
+def test_shadow_prices_name_the_stretch_in_which_time_is_missing(flown):
+    """A step taken from a tight stretch is worth most there."""
+    fleet, swarm, route, flight = flown
+    order, lengths = stretches(flight)
+    longest = int(np.argmax(lengths[:-1]))
+    visits = flight.visits.copy()
+    visits[order[longest:]] -= 3
+    squeezed = retimed(fleet.programs[0], start_of(swarm), route, flight, visits, flight.steps - 3)
+    assert squeezed.violation > 0.5
+    assert int(np.argmax(worth(squeezed).gain)) == longest
+
+
+def test_a_flight_that_hits_something_is_found_out(flown):
+    fleet, swarm, _, flight = flown
+    assert trouble_alone(fleet, 0, swarm.x[0], flight) is None
+    path_m = flight.path_m.copy()
+    middle = len(path_m) // 2
+    path_m[middle] = np.mean(TOWER["vertices_m"], axis=0)
+    assert spare_of_rules_m(fleet.programs[0].space, path_m, True) < 0.0
+    path_m[middle] = (-3.0, 100.0, -20.0)
+    assert spare_of_rules_m(fleet.programs[0].space, path_m, True) < 0.0
+
+
+def test_a_flight_beyond_the_battery_is_not_flown():
+    scenario = field(soc_0=0.2505)
+    fleet, swarm = fleet_of(scenario)
+    route = every_waypoint(scenario)
+    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 20)
+    assert trouble_alone(fleet, 0, swarm.x[0], flight) == "the battery does not last"
+
+
+def test_a_flight_makes_way_for_another_on_its_path(flown):
+    fleet, swarm, route, flight = flown
+    body = Body(flight.path_m.copy(), 6.3, 6.3)
+    body.path_m[:] += (0.5, 0.5, 0.0)
+    body.path_m[: flight.steps // 3] += (60.0, 0.0, 0.0)  # joins later
+    program = fleet.program(0, {}, [body], None)
+    assert program.spare_from_bodies_m(flight.path_m) < 0.0
+    other = make_way(program, start_of(swarm), route, flight)
+    assert program.spare_from_bodies_m(other.path_m) >= -0.02
+    assert other.is_clear
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "place_m", "over"),
+    [
+        (TOWER, (160.0, 160.0, -12.0), False),
+        (box("wall", (0.5, 60.0, -9.0), (199.5, 80.0, 0.0)), (100.0, 40.0, -6.0), True),
+    ],
+)
+def test_tall_obstacles_are_flown_round_and_long_low_ones_over(obstacle, place_m, over):
+    scenario = field(waypoints=(waypoint(place_m, 5.0),), obstacles=(obstacle,))
+    fleet, swarm = fleet_of(scenario)
+    route = every_waypoint(scenario)
+    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 60)
+    assert flight.is_clear
+    roof_m = -min(z for _, _, z in obstacle["vertices_m"])
+    assert (-flight.path_m[:, 2].min() > roof_m) == over
+
+
+def test_with_nothing_to_visit_a_flight_goes_home():
+    scenario = meadow()
+    fleet, swarm = fleet_of(scenario)
+    start = start_of(swarm)
+    start[[0, 4, 8]] += (30.0, -20.0, -10.0)
+    nothing = np.zeros(0, np.int64)
+    flight = quickest(fleet.programs[0], fleet.terrain, 0, start, nothing, 60)
+    assert flight.is_clear
+    assert np.linalg.norm(flight.path_m[-1] - fleet.programs[0].landing.home_m) < 2.0

@@ -1,0 +1,192 @@
+import numpy as np
+import pytest
+import uas_coverage_baselines.trajectory.program as program_module
+from small_fleets import FIELD, HOUSE, TOWER, field
+from small_worlds import meadow, mover
+from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
+
+from uas_coverage_env import rollout
+from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.flight.metrics import home
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle import DOD
+
+QUICK = {"orders": 1, "moves": 20_000, "programs": 40}
+TWO = ((100.0, 100.0, -1.0), (112.0, 100.0, -1.0))
+
+
+def planner(**options):
+    return Trajectory(TrajectoryOptions(**(QUICK | options)))
+
+
+@pytest.fixture(scope="module")
+def small_town():
+    return generate_scenario(3, n_uas=2, n_waypoints=12, n_obstacles=4)
+
+
+@pytest.fixture(scope="module")
+def flight(small_town):
+    return rollout(small_town, planner())
+
+
+def is_harmless(flight):
+    return flight.violations == () and flight.breaches == 0
+
+
+class Watched(Trajectory):
+    """Keeps every decision."""
+
+    def reset(self, brief, seed):
+        self.decisions = []
+        super().reset(brief, seed)
+
+    def act(self, swarm):
+        commands = super().act(swarm)
+        self.decisions.append(self.last_decision)
+        return commands
+
+
+class Breakable:
+    """The interior point, which fails where it is told to."""
+
+    def __init__(self, monkeypatch, fails):
+        self.calls, self._solve, self._fails = 0, program_module.solve, fails
+        monkeypatch.setattr(program_module, "solve", self)
+
+    def __call__(self, *args, **options):
+        self.calls += 1
+        return self._fails(self.calls, self._solve(*args, **options))
+
+
+def test_it_accomplishes_a_town_without_violation_or_breach(flight):
+    assert accomplished(flight)
+    assert is_harmless(flight)
+
+
+def test_it_is_faster_and_takes_less_energy_than_flying_to_the_nearest(small_town, flight):
+    nearest = rollout(small_town, "nearest-waypoint")
+    assert flight.steps < 0.8 * nearest.steps
+    assert energy_Wh(flight).sum() < 0.8 * energy_Wh(nearest).sum()
+
+
+def test_the_same_seed_flies_the_same_mission(small_town, flight):
+    np.testing.assert_array_equal(rollout(small_town, planner()).x, flight.x)
+
+
+def test_the_whole_mission_is_flown_as_planned_before_take_off(small_town):
+    watched = Watched(TrajectoryOptions(**QUICK))
+    flight = rollout(small_town, watched)
+    for u, uas in enumerate(small_town.uas):
+        planned_m = watched.decisions[0].predicted_m[uas.name]
+        np.testing.assert_allclose(flight.x[: len(planned_m) - 1, u, :3], planned_m[:-1], atol=1e-6)
+    assert not any(decision.fallback for decision in watched.decisions)
+
+
+def test_without_any_solution_it_stays_where_it_is_and_lands_at_last(small_town, monkeypatch):
+    Breakable(monkeypatch, lambda _, found: found._replace(converged=False))
+    watched = Watched(TrajectoryOptions(**QUICK))
+    flight = rollout(small_town, watched)
+    assert is_harmless(flight)
+    assert home(flight).all()
+    assert all(decision.fallback for decision in watched.decisions)
+
+
+def test_a_solver_that_dies_in_flight_changes_nothing_of_what_was_verified(small_town, monkeypatch):
+    solver = Breakable(monkeypatch, lambda _, found: found)
+    watched = Watched(TrajectoryOptions(**QUICK))
+    whole = rollout(small_town, watched)
+    before_take_off = solver.calls
+
+    def dies(calls, found):
+        return found._replace(converged=False) if calls > before_take_off else found
+
+    Breakable(monkeypatch, dies)
+    np.testing.assert_array_equal(rollout(small_town, planner()).x, whole.x)
+
+
+def test_wrong_solutions_are_not_flown(small_town, monkeypatch):
+    rng = np.random.default_rng(0)
+
+    def wrong(_, found):
+        if rng.random() < 0.5:
+            return found
+        return found._replace(
+            x=found.x + rng.normal(size=found.x.shape), u=found.u + rng.normal(size=found.u.shape)
+        )
+
+    Breakable(monkeypatch, wrong)
+    flight = rollout(small_town, planner())
+    assert is_harmless(flight)
+    assert home(flight).all()
+
+
+def test_on_the_nonlinear_plant_it_tracks_its_plan_without_harm(small_town):
+    flight = rollout(small_town, planner(), dynamics="nonlinear")
+    assert accomplished(flight)
+    assert is_harmless(flight)
+
+
+def test_a_weak_battery_gets_a_short_route():
+    weak = field(starts_m=TWO, soc_0=1.0)
+    data = weak.model_dump(by_alias=True)
+    data["uas"][1]["soc_0"] = 0.27
+    weak = type(weak).model_validate(data)
+    flight = rollout(weak, planner())
+    assert accomplished(flight)
+    assert flight.x[-1, 1, DOD] <= 0.75
+    way_m = np.abs(np.diff(flight.x[:, :, :3], axis=0)).sum(axis=(0, 2))
+    assert way_m[1] < way_m[0]
+
+
+def test_the_waypoints_of_a_lost_uas_are_covered_by_the_others():
+    scenario = field(starts_m=TWO)
+    world, flown = World(scenario), planner()
+    flown.reset(MissionBrief.of(scenario), 0)
+    world.reset()
+    for step in range(120):
+        swarm = world.swarm_state()
+        if not swarm.active:
+            break
+        commands = dict(flown.act(swarm))
+        world.step(commands)
+        if step == 6:
+            lost = int(swarm.status.argmin())
+            world.state.status[lost] = 2
+    assert not world.swarm_state().uncovered.any()
+
+
+PARKED = mover(
+    (160.0, 150.0, -25.0),
+    (0.0, (0.0, 0.0, 0.0)),
+    (45.0, (0.0, 0.0, -3.0)),
+    (50.0, (0.0, 12.0, 0.0)),
+    radius_m=6.0,
+    safe_distance_m=12.0,
+)
+
+
+def test_what_is_blocked_is_waited_for_at_a_distance_and_covered_later():
+    scenario = field(starts_m=TWO, moving_obstacles=(PARKED,))
+    flight = rollout(scenario, planner())
+    assert accomplished(flight)
+    assert is_harmless(flight)
+    assert flight.steps > 45
+
+
+@pytest.mark.parametrize("heading", [(0.0, 4.0, 0.0), (3.0, 3.0, 0.0), (-2.0, 5.0, 0.5)])
+def test_nothing_comes_near_to_what_flies_through_the_mission(heading):
+    crossing = mover((30.0, 5.0, -20.0), (0.0, heading), (20.0, (1.0, 3.0, 0.0)))
+    flight = rollout(field(starts_m=TWO, moving_obstacles=(crossing,)), planner())
+    assert is_harmless(flight)
+    assert accomplished(flight)
+
+
+def test_energy_can_be_weighed_more_than_time():
+    """With a large weight one UAS may stay at home."""
+    scenario = meadow(TWO, waypoints=FIELD, obstacles=(TOWER, HOUSE))
+    quick = rollout(scenario, planner(weight_energy=0.0))
+    thrifty = rollout(scenario, planner(weight_energy=2.0))
+    assert quick.steps <= thrifty.steps
+    assert energy_Wh(thrifty).sum() <= energy_Wh(quick).sum()
