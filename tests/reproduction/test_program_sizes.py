@@ -91,7 +91,7 @@ def test_what_is_left_out_is_not_in_the_program(flown):
 
 def test_a_timing_says_whether_the_gap_was_closed(flown):
     problem = LEFT_OUT["all waypoints"](LEFT_OUT["all obstacles"](decision(flown, 160)))
-    timing = timed("little", problem, cap_s=30.0)
+    timing = timed("little", problem, cap_s=30.0, scale=sizes.open_cost(decision(flown, 60)))
     assert timing.solved
     assert timing.gap <= sizes.GAP
     assert timing.rows > 0

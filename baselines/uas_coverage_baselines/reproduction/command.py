@@ -151,7 +151,7 @@ def _written(
     from uas_coverage_baselines.reproduction import page
     from uas_coverage_baselines.reproduction.comparison import ReproducedPaper
     from uas_coverage_baselines.reproduction.decisions import decision, whole_decision
-    from uas_coverage_baselines.reproduction.sizes import LEFT_OUT, class_sizes, timed
+    from uas_coverage_baselines.reproduction.sizes import LEFT_OUT, class_sizes, open_cost, timed
     from uas_coverage_baselines.reproduction.sweeps import FULL, QUICK, trades
     from uas_coverage_env.leaderboard.table import rich_table
 
@@ -160,7 +160,8 @@ def _written(
     step = min(_PROGRAM_STEP, int(flight.last_sample.min()) - 1)
     with screen.status("solving the paper's program with parts of it left out"):
         problem = decision(flight, step)
-        timings = [timed(name, change(problem), cap_s) for name, change in LEFT_OUT.items()]
+        scale = open_cost(problem)
+        timings = [timed(name, change(problem), cap_s, scale) for name, change in LEFT_OUT.items()]
     with screen.status("solving it under other parameters"):
         tried = list(trades(flight, step, cap_s, QUICK if quick else FULL))
     sizes = class_sizes(whole_decision(flight))

@@ -241,8 +241,8 @@ def _page(
             "## Size of the program\n",
             "The first decision with all waypoints, the rows as the paper has them:\n",
             markdown(size_cells(sizes)),
-            f"A decision in flight, solved to {GAP:.0%} in the form `{SOLVED_FORM}` on one "
-            "thread, with a part of it left out:\n",
+            f"A decision in flight in the form `{SOLVED_FORM}`, on one thread, with a part of it "
+            f"left out, to a gap of {GAP:.0%} of what all open waypoints cost over the horizon:\n",
             markdown(timing_cells(timings)),
             "## What accuracy costs\n",
             markdown(trade_cells(trades)),

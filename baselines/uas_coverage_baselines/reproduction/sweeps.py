@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uas_coverage_baselines.reproduction.decisions import decision
-from uas_coverage_baselines.reproduction.sizes import Timing, timed
+from uas_coverage_baselines.reproduction.sizes import Timing, open_cost, timed
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.vehicle import DOD, linear_model
@@ -57,11 +57,12 @@ def trades(
         cap_s: Longest time of a solve [s].
         values: Which to try.
     """
+    scale = open_cost(decision(flight, step))
     for parameter, tried in values.items():
         for value in tried:
             problem = decision(flight, step, {_OPTIONS[parameter]: value})
-            label = f"{parameter} = {value}"
-            yield Trade(parameter, value, timed(label, problem, cap_s), _given(parameter, value))
+            label, given = f"{parameter} = {value}", _given(parameter, value)
+            yield Trade(parameter, value, timed(label, problem, cap_s, scale), given)
     for order in ORDERS:
         error_m = discretisation_error_m(flight, step, order)
         yield Trade("N_dis", order, None, f"off by {error_m:.2g} m after {_HORIZON_STEPS} steps")
