@@ -14,7 +14,7 @@ def asked(name, some):
     return EVENTS[name](Story(some))
 
 
-def test_the_paper_tells_of_nothing_that_nobody_looks_for():
+def test_whatever_the_paper_tells_is_looked_for():
     assert {told.name for told in paper_named("gasche2025").events} == set(EVENTS)
 
 
@@ -66,7 +66,7 @@ def test_the_threshold_is_passed_when_the_charge_says_so():
     assert slowly.time_s == 121
 
 
-def test_who_is_in_the_west_or_home_by_then_is_not_in_the_east():
+def test_a_uas_in_the_west_or_home_by_then_is_not_in_the_east():
     assert not asked("tired_in_the_east", flight({(1, 70): 21})).happened
     assert asked("tired_in_the_east", flight({(1, 70): 33})).happened
     assert not asked("tired_in_the_east", flight({(1, 60): 33}, steps=(220, 66))).happened
