@@ -10,6 +10,8 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import ContactKind, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE
+from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import load_scenario
 
@@ -330,3 +332,9 @@ def test_an_action_out_of_bounds_is_clipped_in_turns_without_a_word(capsys):
         warnings.simplefilter("error")
         env.step(np.array([5.0, 0.0, 0.0]))
     assert capsys.readouterr().out == ""
+
+
+def test_an_episode_has_so_few_attributes_that_python_finds_them_fast():
+    # from 30 on, CPython 3.11 looks each of them up in a dictionary
+    episode = Episode(practice_ground(), MissionSettings())
+    assert len(vars(episode)) < 30

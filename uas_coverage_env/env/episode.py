@@ -151,7 +151,8 @@ class Episode:
                 an own kind of action wrote a command that cannot be flown.
         """
         observation = _empty(self._observation_shape, _FLOAT32)
-        invalid = self._step(*self._given, self.observation, observation)
+        at, nonlinear = self._given
+        invalid = self._step(at, nonlinear, self.observation, observation)
         if invalid != ACCEPTED:
             numbers_asked = self.asked[invalid].tolist()
             self.asked[invalid] = 0.0
