@@ -136,7 +136,7 @@ def main(
 ) -> None:
     """Fly a mission with `milp-mpc-paper` and tell every decision."""
     scenario = mission_of(mission)
-    given = dict(part.partition("=")[::2] for part in option or [])
+    given = {name: value for name, _, value in (part.partition("=") for part in option or [])}
     options = load_planner("milp-mpc-paper", given).options  # type: ignore[attr-defined]
     folder = out / "solutions"
     folder.mkdir(parents=True, exist_ok=True)

@@ -58,6 +58,7 @@ QUICK = {
     "milp_mpc/test_golden_reductions.py": "",
     "milp_mpc/test_milp_builder.py": "",
     "milp_mpc/test_operation_modes.py": "",
+    "milp_mpc/test_paper_numbers.py": "",
     "milp_mpc/test_plan_meets_world.py": "",
     "milp_mpc/test_plan_verification.py": "",
     "milp_mpc/test_solvers.py": (
