@@ -1,4 +1,6 @@
 import itertools
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,9 @@ from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario, warnings
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import GoTo, Velocity
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+import independent_check
 
 HOUSE = box("house", (60.0, 60.0, -9.0), (90.0, 90.0, 0.0), 1.0)
 
@@ -80,14 +85,17 @@ def test_what_is_kept_anyway_is_not_kept_twice():
 
 
 class LowFlight:
-    """Commands a flight at 1 m across the field, and goes home in the end."""
+    """Commands a flight across the field at a height, and goes home in the end."""
+
+    def __init__(self, altitude_m=1.0):
+        self.altitude_m = altitude_m
 
     def reset(self, brief, seed):
         self.brief = brief
 
     def act(self, swarm):
         if swarm.time_s < 25.0:
-            return {name: Velocity(8.0, 0.0, 1.0) for name in swarm.active}
+            return {name: Velocity(8.0, 0.0, self.altitude_m) for name in swarm.active}
         return {name: GoTo(None) for name in swarm.active}
 
 
@@ -98,6 +106,20 @@ def test_too_low_is_counted_named_and_read_back(tmp_path):
     assert summary(flight)["height_breaches"] == flight.height_breaches
     flight.save(tmp_path / "low")
     assert type(flight).load(tmp_path / "low") == flight
+    # judged anew from the files alone
+    report = independent_check.check(tmp_path / "low")
+    assert report.height_breaches == flight.height_breaches
+    assert report.problems == []
+
+
+def test_the_independent_check_knows_roofs(tmp_path):
+    scenario = meadow([(20.0, 75.0, -10.7)], obstacles=[HOUSE], min_height_m=3.0, max_steps=14)
+    flight = rollout(scenario, LowFlight(altitude_m=10.7))
+    assert 2 <= flight.height_breaches == flight.breaches < 14
+    flight.save(tmp_path / "over")
+    report = independent_check.check(tmp_path / "over")
+    assert report.height_breaches == flight.height_breaches
+    assert report.problems == []
 
 
 def test_the_safety_filter_keeps_the_least_height_and_lets_land():
