@@ -101,9 +101,9 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`.
 
     Arguments:
-        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`; or what
-            draws a scenario at each reset: the name of a family (`generated`), a `MissionSource`,
-            or any function `generator(rng) -> Scenario`.
+        scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
+            data; or what draws a scenario at each reset: the name of a family (`generated`), a
+            `MissionSource`, or any function `generator(rng) -> Scenario`.
         {settings}
         render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra `human`:
             space pauses, right steps, escape closes it and the missions go on unseen).

@@ -60,9 +60,9 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         Terminated: no UAS flies any more. Truncated: one still flies after `max_cycles` steps.
 
     Arguments:
-        scenario: Name of a shipped scenario, path of a scenario file, or a `Scenario`; or what
-            draws a scenario at each reset: the name of a family (`generated`), a `MissionSource`,
-            or any function `generator(rng) -> Scenario`.
+        scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
+            data; or what draws a scenario at each reset: the name of a family (`generated`), a
+            `MissionSource`, or any function `generator(rng) -> Scenario`.
         {settings}
         render_mode: None, "rgb_array" or "human", see `CoverageParallelEnv`.
 
