@@ -95,6 +95,12 @@ def test_the_buildings_of_the_town_become_obstacles_with_credit_and_can_be_flown
     assert warnings(scenario) == []
 
 
+def test_the_check_of_a_scenario_says_where_it_is(capsys):
+    imported("karhula")
+    assert main(["scenarios", "check", "out.toml"]) == 0
+    assert "place      60.5246000, 26.9467500, 0 m above sea level\n" in capsys.readouterr().out
+
+
 def test_take_off_places_lie_where_they_were_drawn():
     scenario = imported("karhula")
     frame = LocalFrame(scenario.place)

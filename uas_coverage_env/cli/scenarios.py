@@ -70,12 +70,22 @@ def _lines(scenario: Scenario) -> list[str]:
         f"waypoints  {len(scenario.waypoints)}, sum of weights {weight:g}",
         f"obstacles  {len(scenario.obstacles)} fixed, {len(scenario.moving_obstacles)} moving",
         f"time       at most {scenario.max_steps} steps of {scenario.dt_s:g} s",
+        *(f"place      {line}" for line in _place(scenario)),
         *(f"disturbed  {line}" for line in _disturbances(scenario)),
         *(
             f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, "
             f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}"
             for uas in scenario.uas
         ),
+    ]
+
+
+def _place(scenario: Scenario) -> list[str]:
+    place = scenario.place
+    if place is None:
+        return []
+    return [
+        f"{place.latitude_deg:.7f}, {place.longitude_deg:.7f}, {place.height_m:g} m above sea level"
     ]
 
 

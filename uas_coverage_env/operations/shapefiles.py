@@ -28,7 +28,7 @@ def read_shapefile(path: Path) -> Iterator[Drawn]:
         to_degrees = pyproj.Transformer.from_crs(crs, 4326, always_xy=True)
     except ProjError:
         raise InputError(f"{projection}: names no coordinate system; export it again") from None
-    parts = {
+    parts: dict[str, Any] = {
         ending: io.BytesIO(content(path.with_suffix(f".{ending}")))
         for ending in ("shp", "shx", "dbf")
         if ending == "shp" or path.with_suffix(f".{ending}").is_file()
