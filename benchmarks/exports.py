@@ -17,6 +17,7 @@ import json
 import math
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -58,6 +59,15 @@ def metres(latitude: float, longitude: float, height: float, place: Place) -> ND
     return np.array([line["s12"] * math.cos(azimuth), line["s12"] * math.sin(azimuth), -height])
 
 
+def waypoints_of(path: Path) -> list[Any]:
+    """The items of a .waypoints file as pymavlink reads them; the first is home."""
+    loader: Any = mavwp.MAVWPLoader()
+    with warnings.catch_warnings():  # it leaves the file open
+        warnings.simplefilter("ignore", ResourceWarning)
+        loader.load(str(path))
+    return [loader.wp(n) for n in range(loader.count())]
+
+
 def off_m(found: list[tuple[float, float, float]], wanted: Any, place: Place) -> float:
     """Largest distance of places from where they should be [m]; infinite where some are missing."""
     if len(found) != len(wanted):
@@ -96,9 +106,7 @@ def check(
         ]
         path = folder / "file.waypoints"
         path.write_text(files[f"{uas.name}.waypoints"])
-        loader: Any = mavwp.MAVWPLoader()
-        loader.load(str(path))
-        entries = [loader.wp(n) for n in range(1, loader.count())]
+        entries = waypoints_of(path)[1:]
         of_text = [(e.x, e.y, e.z) for e in entries if e.command in WITH_PLACE]
         corners += len(wanted)
         worst_plan = max(worst_plan, off_m(of_plan, wanted, place))
