@@ -69,6 +69,7 @@ QUICK = {
     "mission/test_legs.py": "",
     "missions/test_independent_check.py": "",
     "operations/test_frame.py": "",
+    "operations/test_lateness.py": "",
     "operations/test_layout.py": "",
     "operations/test_leg_model.py": "",
     "routing/test_order_search.py": "",
