@@ -53,6 +53,9 @@ def test_parallel_api_of_drawn_missions(settings, capsys):
     parallel_api_test(uas_coverage_v0.parallel_env(**settings), num_cycles=150)
 
 
+# it warns of every observation that is no array, as those with a mask beside it
+@pytest.mark.filterwarnings("ignore:Observation space for each agent probably:UserWarning")
+@pytest.mark.filterwarnings("ignore:Observation is not a NumPy array:UserWarning")
 @all_settings
 def test_aec_api(settings, capsys):
     api_test(uas_coverage_v0.env(**settings), num_cycles=60)

@@ -173,8 +173,7 @@ def test_all_interfaces_fly_the_same_missions():
         inner: tuple[Any, ...] = (turns.unwrapped, swarm.unwrapped)
         scenarios = (*(each.scenario for each in inner), many.call("scenario")[i])
         assert all(scenario == env.scenario for scenario in scenarios)
-        flies = [name for name in info["uas"] if info["uas"][name]["status"] == 0]
-        assert turns.agents == env.agents == flies
+        assert turns.agents == env.agents == [n for n, u in info["uas"].items() if not u["status"]]
         size = observation.size // 3
         for k, agent in enumerate(env.possible_agents):
             row = observation[k * size : (k + 1) * size]

@@ -361,7 +361,7 @@ def test_players_do_not_see_where_a_moving_obstacle_will_go():
 def test_the_global_state_lists_uas_moving_obstacles_and_waypoints():
     env, observations = flown(practice_ground(n_moving=2), steps=4)
     state = env.state()
-    assert state.shape == env.state_space.shape == (2 * 26 + 2 * 6 + 3,)
+    assert state.shape == env.state_space.shape == (2 * 26 + 4 * 6 + 3,)
     assert state.dtype == np.float32
     assert env.state_space.contains(state)
     np.testing.assert_array_equal(state[:24], observations["uas_1"][:24])
@@ -371,6 +371,7 @@ def test_the_global_state_lists_uas_moving_obstacles_and_waypoints():
         state[52:55], [centre[0] / 100 - 1, centre[1] / 100 - 1, 0.0], atol=1e-6
     )
     np.testing.assert_allclose(state[55:58], [0.025, 0, 0], atol=1e-6)
+    assert not state[64:76].any()  # there is room for two more
     assert state[-3:].tolist() == [1.0, 1.0, 1.0]
 
 

@@ -33,7 +33,7 @@ def mistake_in(tmp_path, text):
 
 
 def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
-    assert scenario_names() == ("corridor", "open_field", "village")
+    assert scenario_names() == ("corridor", "gasche2025", "open_field", "village")
     for name in scenario_names():
         scenario = load_scenario(name)
         assert scenario.name == name
@@ -41,7 +41,7 @@ def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
 
 
 def test_an_unknown_name_lists_what_there_is():
-    with pytest.raises(InputError, match="unknown scenario 'vilage'; take corridor, open_field"):
+    with pytest.raises(InputError, match="unknown scenario 'vilage'; take corridor, gasche2025"):
         load_scenario("vilage")
     with pytest.raises(InputError, match="unknown scenario ''"):
         load_scenario("")

@@ -16,8 +16,6 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_text
 
-__all__ = ["InputError", "StrictModel", "parse", "read_toml"]
-
 M = TypeVar("M", bound=BaseModel)
 
 _LONGEST_VALUE = 60

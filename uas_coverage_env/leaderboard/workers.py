@@ -64,6 +64,8 @@ def fly_all(
         chosen = {"backend": "uas-ray"}
     else:
         chosen = {"backend": "loky", "initializer": _end_with, "initargs": (os.getpid(),)}
+    # a process that has flown before may be in another folder
+    kept_in = keep and keep.resolve()
     try:
         with parallel_config(n_jobs=jobs, **chosen):
             # one flight per task: what is finished is kept at once
@@ -72,7 +74,7 @@ def fly_all(
                 batch_size=1,  # pyright: ignore[reportArgumentType]  # its default is a word
                 max_nbytes=None,  # nothing large travels
             )
-            for row in parallel(delayed(fly)(entry, source_sha256, keep) for entry in entries):
+            for row in parallel(delayed(fly)(entry, source_sha256, kept_in) for entry in entries):
                 if row is None:
                     raise StoppedError
                 yield row
