@@ -55,11 +55,11 @@ class OcpOptions(PlannerOptions):
         default=0.0,
         ge=0.0,
         le=50.0,
-        description="with which a moving obstacle may set off at a UAS, which is to get out of "
-        "its way: widens the margin; 0: not reckoned with",
+        description="acceleration towards a UAS that is assumed of a moving obstacle; widens "
+        "the margin; 0: none is assumed",
     )
     moving_speed_mps: float = Field(
-        default=15.0, gt=0.0, le=100.0, description="up to which it may set off so"
+        default=15.0, gt=0.0, le=100.0, description="speed up to which it is assumed to accelerate"
     )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),

@@ -204,7 +204,7 @@ class ProblemBuilder:
         return result
 
     def _getaway_margins(self) -> FloatArray:
-        """(M,) to get out of the way of each moving obstacle; 0 where that is not reckoned with."""
+        """(M,) [m] to get out of the way of each; 0 where no acceleration is assumed."""
         options, brief = self._options, self.brief
         result = np.zeros(len(brief.moving_obstacles))
         if options.moving_acceleration_mps2 > 0.0:
