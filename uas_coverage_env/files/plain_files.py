@@ -1,4 +1,4 @@
-"""Plain files, read and written whole; what somebody hands over is opened with care.
+"""Plain files, read and written whole; files from others are opened with care.
 
 A pipe would be waited for, a device never ends, and a link would be written through: only plain
 files are read, up to a size, and a file is written beside its place and then put there.
