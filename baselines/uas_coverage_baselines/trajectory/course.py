@@ -11,18 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import rollout
 from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.space import apart_m, spare_of_rules_m
-from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     DOD,
     VX,
     VZ,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
 )
 
 FloatArray = NDArray[np.float64]
@@ -122,7 +119,7 @@ def are_apart(fleet: Fleet, i: int, j: int, one: Course, other: Course) -> bool:
 def braked(fleet: Fleet, uas: int, course: Course, followed: int) -> Course:
     """A course followed for some steps, then braked to a hover."""
     steps = int(np.ceil(BRAKING_S / fleet.brief.dt_s))
-    states, inputs = _brake(fleet.arena.vehicles[uas], course.x[followed], steps)
+    states, inputs = brake(fleet.arena.vehicles[uas], course.x[followed], steps)
     return Course(
         course.begin,
         np.vstack([course.x[: followed + 1], states]),
@@ -133,17 +130,4 @@ def braked(fleet: Fleet, uas: int, course: Course, followed: int) -> Course:
 
 def hover_inputs(fleet: Fleet, uas: int, x: FloatArray) -> FloatArray:
     """(5,) inputs that brake, and hold a hover."""
-    return _brake(fleet.arena.vehicles[uas], np.ascontiguousarray(x), 1)[1][0]
-
-
-@allocating_kernel
-def _brake(vehicle, start, steps):
-    """States after each step (steps, 14) and inputs (steps, 5) of braking from a state."""
-    states, inputs = np.empty((steps, start.shape[0])), np.zeros((steps, 5))
-    x, reference = start.copy(), np.empty(2)
-    reseed_reference(vehicle, x, reference)
-    for n in range(steps):
-        velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[n])
-        lpv_step(vehicle, x, inputs[n], x)
-        states[n] = x
-    return states, inputs
+    return brake(fleet.arena.vehicles[uas], np.ascontiguousarray(x), 1)[1][0]

@@ -28,18 +28,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import short_s
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
-from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     compile_vehicle,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
 )
 
 FloatArray = NDArray[np.float64]
@@ -169,16 +166,3 @@ def prolonged(problem: PlanningProblem, steps: int) -> tuple[MovingHull, ...]:
         path = np.vstack([moving.position_m, moving.position_m[-1] + beyond * stride])
         result.append(replace(moving, position_m=path))
     return tuple(result)
-
-
-@allocating_kernel
-def brake(vehicle, start, steps):
-    """States after each step (steps, 14) and inputs (steps, 5) of braking from a state."""
-    states, inputs = np.empty((steps, start.shape[0])), np.zeros((steps, 5))
-    x, reference = start.copy(), np.empty(2)
-    reseed_reference(vehicle, x, reference)
-    for step in range(steps):
-        velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[step])
-        lpv_step(vehicle, x, inputs[step], x)
-        states[step] = x
-    return states, inputs

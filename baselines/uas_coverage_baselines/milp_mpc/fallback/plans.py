@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.fallback.backup import brake
+from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, brake, prolonged
+from uas_coverage_baselines.braking import brake
+from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
