@@ -15,8 +15,8 @@ Range = tuple[int, int]
 N_UAS, N_WAYPOINTS, N_OBSTACLES = (1, 4), (20, 60), (5, 20)
 """The ranges of the benchmarks and of the leaderboard's sets."""
 
-MIN_HEIGHT_M = 0.0
-"""The least height of the benchmarks, of the family and of the leaderboard's sets [m]: none yet."""
+MIN_HEIGHT_M = 3.0
+"""The least height of the benchmarks, of the family and of the leaderboard's sets [m]."""
 
 # above the seeds of every set that players are compared on: nothing is trained on those
 _SEEDS = (2**31, 2**32)
