@@ -8,7 +8,7 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
 from uas_coverage_env.env.batch_kernel import ABSENT, drawn
-from uas_coverage_env.env.memory import ENERGY, LIMITS, STATUS
+from uas_coverage_env.env.memory import ENERGY, FIRST_TERM, LIMITS, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import generate_scenario
@@ -49,9 +49,9 @@ def assert_is(batch, lane, env, observations, rewards=None, infos=None):
         if infos is not None:
             info = infos[agent]
             assert tuple(info["reward_terms"]) == REWARD_TERMS
-            terms = batch.learners.terms[lane, i].tolist()
+            terms = batch.learners.amounts[lane, i, FIRST_TERM:].tolist()
             assert list(info["reward_terms"].values()) == terms
-            assert info["energy_Wh"] == report[ENERGY]
+            assert info["energy_Wh"] == batch.learners.amounts[lane, i, ENERGY]
             assert info["status"] == report[STATUS]
             assert info["limits_exceeded"] == report[LIMITS]
             if batch.chooses:

@@ -22,6 +22,7 @@ from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
     ENERGY,
+    FIRST_TERM,
     LEARNERS,
     REPORT_SIZE,
     REWARD,
@@ -88,7 +89,7 @@ class Final(NamedTuple):
     """The end of the last mission that ended in a lane; SAME_STEP only."""
 
     observation: Annotated[NDArray[np.float32], "L", "U", "V"]
-    report: Annotated[NDArray[np.float64], "L", "U", REPORT_SIZE]
+    report: Annotated[NDArray[np.int64], "L", "U", REPORT_SIZE]
     swarm: Annotated[NDArray[np.float64], "L", "Q"]
     candidates: Annotated[NDArray[np.int64], "L", "U", K_WAYPOINTS]
 
@@ -197,8 +198,8 @@ def _begin_lane(pool, missions, lane, order, observation, width):
         for k in range(width):
             observation[lane, i, k] = 0.0
         for column in range(REPORT_SIZE):
-            report[lane, i, column] = 0.0
-        report[lane, i, CONTACT_WITH] = -1.0
+            report[lane, i, column] = 0
+        report[lane, i, CONTACT_WITH] = -1
         report[lane, i, STATUS] = ABSENT
         report[lane, i, COVERED] = n_covered
     for i in range(report.shape[1]):
@@ -214,25 +215,25 @@ def _add_up(worlds, lanes, learners, lane, max_steps):
 
     The order matters: sums of floats depend on it, and a lane must equal a single mission.
     """
-    report = learners.report
+    report, amounts = learners.report, learners.amounts
     n_uas = report.shape[0]
     flies = False
     for i in range(lanes.rewards.shape[1]):
         lanes.rewards[lane, i] = 0.0
         if i < n_uas:
             flies |= worlds.status[lane, i] == FLYING
-            lanes.rewards[lane, i] = report[i, REWARD]
+            lanes.rewards[lane, i] = amounts[i, REWARD]
     swarm = rows_view(lanes.swarm, lane, (lanes.swarm.shape[1],))
     # sums in variables: memory that has just been written is read late
     energy_Wh = 0.0
     for i in range(n_uas):
-        energy_Wh += report[i, ENERGY]
+        energy_Wh += amounts[i, ENERGY]
     swarm[SWARM_ENERGY] = energy_Wh
     reward = 0.0
-    for term in range(learners.terms.shape[1]):
+    for term in range(amounts.shape[1] - FIRST_TERM):
         paid = 0.0
         for i in range(n_uas):
-            paid += learners.terms[i, term]
+            paid += amounts[i, FIRST_TERM + term]
         swarm[SWARM_FIRST_TERM + term] = paid
         reward += paid
     swarm[SWARM_REWARD] = reward

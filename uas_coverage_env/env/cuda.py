@@ -141,7 +141,7 @@ def _finish(pool, paying, observing, missions, lane):
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
-        missions.rewards[lane, i] = learners.report[i, REWARD]
+        missions.rewards[lane, i] = learners.amounts[i, REWARD]
         missions.acted[lane] += scratch.outcome[i].flew
         flies = flies or learners.report[i, STATUS] == FLYING
     missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps

@@ -48,7 +48,7 @@ class Episode:
         asked: (U, size) the actions of the coming step, to be written before it.
         asked_rows: Its rows: to index the array takes longer.
         observation: (U, V) the latest; a new array in every step.
-        terms: The weighted terms of the reward of the latest step, one row for each UAS.
+        amounts: Of the latest step, one row for each UAS: the columns of `memory`.
         infos: What is told about the UAS.
     """
 
@@ -79,7 +79,7 @@ class Episode:
         self._observation_shape = (len(self.names), settings.observation_size)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
-        self.terms: list[list[float]] = []
+        self.amounts: list[list[float]] = []
         self._first: tuple[Learners, NDArray[np.float32]] | None = None
         self._prepare()
 
@@ -88,7 +88,7 @@ class Episode:
         kind = self.actions.kind
         self.asked = self._learners.asked
         self.asked_rows = list(self.asked)
-        self._report, self._paid = self._learners.report, self._learners.terms
+        self._report, self._paid = self._learners.report, self._learners.amounts
         self.infos = Infos(self.settings, self._learners, self._scratch)
         self._acting = acting_of(kind)
         self._checks = is_own(self._acting)
@@ -138,9 +138,9 @@ class Episode:
         for array in self._scratch_bytes:
             array[:] = 0
         self.observation = observation.copy()
-        self.terms = self._learners.terms.tolist()
+        self.amounts = self._learners.amounts.tolist()
 
-    def step(self) -> list[list[float]]:
+    def step(self) -> list[list[int]]:
         """Fly what was asked for one step.
 
         Returns:
@@ -161,13 +161,13 @@ class Episode:
             )
         self.observation = observation
         self.steps += 1
-        self.terms = self._paid.tolist()
+        self.amounts = self._paid.tolist()
         if self._checks:
             refuse_what_it_wrote(self.actions.kind, self.asked, self.names)
         return self._report.tolist()
 
     @property
-    def report(self) -> list[list[float]]:
+    def report(self) -> list[list[int]]:
         """The report of the latest step; before the first, one in which nothing happened."""
         return self._learners.report.tolist()
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.interface import flat
-from uas_coverage_env.env.memory import Learners, Scratch
+from uas_coverage_env.env.memory import ENERGY, FIRST_TERM, Learners, Scratch
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.settings import MissionSettings
 
@@ -32,18 +32,21 @@ class Infos:
         self._learners = learners
         self._scratch = scratch
 
-    def of(self, i: int, row: Sequence[float], terms: Sequence[float]) -> dict[str, Any]:
+    def of(self, i: int, row: Sequence[int], amounts: Sequence[float]) -> dict[str, Any]:
         """The info of a UAS.
 
         Args:
             i: Its index.
             row: Its row of the report, the columns of `memory`.
-            terms: The weighted terms of its reward.
+            amounts: Its row of the amounts, likewise.
         """
-        energy_Wh, contact, contact_with, limits, status, filtered, returning, covered, _ = row
+        contact, contact_with, limits, status, filtered, returning, covered = row
         if self._usual:
             # written out: in half the time of `dict(zip(...))`, and this is a tenth of a step
-            coverage, team_coverage, energy, violation, home, stranded, filter_, time = terms
+            (
+                energy_Wh, _,
+                coverage, team_coverage, energy, violation, home, stranded, filter_, time,
+            ) = amounts  # fmt: skip
             named = {
                 "coverage": coverage,
                 "team_coverage": team_coverage,
@@ -55,14 +58,15 @@ class Infos:
                 "time": time,
             }
         else:
-            named = dict(zip(self._term_names, terms, strict=True))
+            energy_Wh = amounts[ENERGY]
+            named = dict(zip(self._term_names, amounts[FIRST_TERM:], strict=True))
         info: dict[str, Any] = {
-            "status": int(status),
-            "contact": int(contact),
-            "contact_with": int(contact_with),
-            "limits_exceeded": int(limits),
-            "returning": returning > 0.0,
-            "covered": int(covered),
+            "status": status,
+            "contact": contact,
+            "contact_with": contact_with,
+            "limits_exceeded": limits,
+            "returning": returning > 0,
+            "covered": covered,
             "energy_Wh": energy_Wh,
             "reward_terms": named,
         }
@@ -72,7 +76,7 @@ class Infos:
             info["action_mask"] = self.action_mask(i)
         if self._filters:
             info["filter"] = {
-                "changed": filtered > 0.0,
+                "changed": filtered > 0,
                 "asked": _described(self._scratch.commands[i]),
                 "applied": _described(self._scratch.outcome[i]["applied_command"]),
             }

@@ -12,6 +12,7 @@ from uas_coverage_env.env.memory import (
     ENERGY,
     EPISODE,
     FILTERED,
+    FIRST_TERM,
     LIMITS,
     RETURNING,
     REWARD,
@@ -46,7 +47,7 @@ class Rules(NamedTuple):
 @inlined_kernel
 def finish_step(arena, state, tables, learners, scratch, paying, observing, observation, on_gpu):
     """Reward and observe a step; arguments as for `step_learners` and `compute_rewards`."""
-    report = learners.report
+    report, amounts = learners.report, learners.amounts
     outcome = scratch.outcome
     compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu)
     newly_covered = 0
@@ -54,7 +55,6 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         newly_covered += outcome[i].newly_covered
     for i in range(report.shape[0]):
         event = outcome[i]
-        report[i, ENERGY] += event.energy_Wh
         report[i, CONTACT] = event.contact
         report[i, CONTACT_WITH] = event.contact_with
         report[i, LIMITS] = event.limits_exceeded
@@ -64,8 +64,9 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         report[i, COVERED] += newly_covered
         reward = 0.0
         for term in range(paying.weights.shape[0]):
-            reward += learners.terms[i, term]
-        report[i, REWARD] = reward
+            reward += amounts[i, FIRST_TERM + term]
+        amounts[i, ENERGY] += event.energy_Wh
+        amounts[i, REWARD] = reward
     if newly_covered > 0:
         count_company(state.uncovered, tables.neighbours, learners.company)
     for i in range(report.shape[0]):

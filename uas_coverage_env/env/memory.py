@@ -13,12 +13,17 @@ from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 
-ENERGY, CONTACT, CONTACT_WITH, LIMITS, STATUS, FILTERED, RETURNING, COVERED, REWARD = range(9)
-"""Columns of a report: energy drawn since t = 0 [Wh], outcome of the step (LIMITS is a mask, see
-`vehicle.LIMIT_NAMES`), number of waypoints that the swarm has covered so far, and the reward: the
-sum of its terms, added up in their order (Python's own `sum` rounds in another way since 3.12)."""
+CONTACT, CONTACT_WITH, LIMITS, STATUS, FILTERED, RETURNING, COVERED = range(7)
+"""Columns of a report: outcome of the step (LIMITS is a mask, see `vehicle.LIMIT_NAMES`), and how
+many waypoints the swarm has covered so far. Whole numbers, as Python is given them: to convert them
+one by one takes a tenth of a step."""
 
-REPORT_SIZE = REWARD + 1
+REPORT_SIZE = COVERED + 1
+
+ENERGY, REWARD, FIRST_TERM = range(3)
+"""Columns of the amounts: energy drawn since t = 0 [Wh], the reward, and from FIRST_TERM on its
+weighted terms. The reward is their sum in their order (Python's own `sum` rounds in another way
+since 3.12)."""
 
 
 class Tables(NamedTuple):
@@ -42,10 +47,10 @@ class Learners(NamedTuple):
     """The open waypoints in the order of the latest observation; -1 where there are no more."""
     company: Annotated[NDArray[np.float32], "W", 2]
     """See `count_company`."""
-    report: Annotated[NDArray[np.float64], "U", REPORT_SIZE]
+    report: Annotated[NDArray[np.int64], "U", REPORT_SIZE]
     """Of the latest step: the columns named above."""
-    terms: Annotated[NDArray[np.float64], "U", "R"]
-    """Of the latest step: the R terms of the reward, weighted."""
+    amounts: Annotated[NDArray[np.float64], "U", "P"]
+    """Of the latest step: likewise, P = FIRST_TERM + R."""
 
 
 class FirstObservation(NamedTuple):

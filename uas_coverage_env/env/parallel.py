@@ -197,8 +197,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             self._screen.see(episode.positions_m)
             self._show()
         observations = dict(zip(self.agents, episode.observation, strict=True))
-        rows = zip(self.agents, episode.report, episode.terms, strict=True)
-        infos = {agent: episode.infos.of(i, *each) for i, (agent, *each) in enumerate(rows)}
+        rows = zip(self.agents, episode.report, episode.amounts, strict=True)
+        infos = {
+            agent: episode.infos.of(i, report, amounts)
+            for i, (agent, report, amounts) in enumerate(rows)
+        }
         self._told = ({}, {})
         return self._with_masks(observations, infos) if self._masks else (observations, infos)
 
@@ -233,7 +236,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             accept(agent, actions[agent], asked[index[agent]])
         report = episode.step()
 
-        observation, terms, told = episode.observation, episode.terms, episode.infos
+        observation, amounts, told = episode.observation, episode.amounts, episode.infos
         over = episode.steps >= episode.max_cycles
         observations: Observations = {}
         rewards: dict[str, float] = {}
@@ -244,13 +247,13 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         # by index: to iterate over the array, or to zip, takes twice as long
         for agent in agents:
             i = index[agent]
-            row = report[i]
+            row, paid = report[i], amounts[i]
             flies = row[STATUS] == FLYING
             observations[agent] = observation[i]
-            rewards[agent] = row[REWARD]
+            rewards[agent] = paid[REWARD]
             terminations[agent] = not flies
             truncations[agent] = over and flies
-            infos[agent] = told.of(i, row, terms[i])
+            infos[agent] = told.of(i, row, paid)
             if not flies:
                 ended = True
         if ended:

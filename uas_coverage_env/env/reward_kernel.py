@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel
-from uas_coverage_env.env.memory import LEARNERS, SCRATCH, TABLES, Paying
+from uas_coverage_env.env.memory import FIRST_TERM, LEARNERS, SCRATCH, TABLES, Paying
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
 from uas_coverage_env.env.rewards import terms as default
 from uas_coverage_env.world.arena import ARENA
@@ -65,8 +65,9 @@ def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64]) -> Payi
 @inlined_kernel
 def _pay_as_usual(arena, state, tables, learners, scratch, i):
     """Write the terms of `REWARD`, not yet weighted."""
-    row = learners.terms[i]
-    none = slice_view(learners.terms, 0, 0)
+    paid = learners.amounts[i]
+    row = slice_view(paid, FIRST_TERM, paid.shape[0] - FIRST_TERM)
+    none = slice_view(paid, 0, 0)
     row[_AT.coverage] = default.coverage(arena, state, tables, learners, scratch, i, none)
     row[_AT.team_coverage] = default.team_coverage(arena, state, tables, learners, scratch, i, none)
     row[_AT.energy] = default.energy(arena, state, tables, learners, scratch, i, none)
@@ -85,17 +86,17 @@ def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
         arena: The arena.
         state: The state of the world after the step.
         tables: `Tables`.
-        learners: `Learners`; its terms are written.
+        learners: `Learners`; the terms of its amounts are written.
         scratch: `Scratch`.
         paying: `Paying`.
         on_gpu: None on the processor. A GPU calls nothing at an address: it knows `REWARD` alone.
     """
-    terms = learners.terms
+    amounts = learners.amounts
     n_terms = paying.weights.shape[0]
-    for i in range(terms.shape[0]):
+    for i in range(amounts.shape[0]):
         if not scratch.outcome[i].flew:
             for term in range(n_terms):
-                terms[i, term] = 0.0
+                amounts[i, FIRST_TERM + term] = 0.0
             continue
         if on_gpu is not None:
             _pay_as_usual(arena, state, tables, learners, scratch, i)
@@ -104,10 +105,11 @@ def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
                 _pay_as_usual(arena, state, tables, learners, scratch, i)
             for t in range(paying.calls.shape[0]):
                 call = paying.calls[t]
-                terms[i, call[1]] = _value_of(
+                amounts[i, FIRST_TERM + call[1]] = _value_of(
                     call[0], arena, state, tables, learners, scratch, i,
                     slice_view(paying.parameters, call[2], call[3]),
                 )  # fmt: skip
         for term in range(n_terms):
             # adding zero makes -0.0 a plain zero
-            terms[i, term] = terms[i, term] * paying.weights[term] + 0.0
+            amount = amounts[i, FIRST_TERM + term]
+            amounts[i, FIRST_TERM + term] = amount * paying.weights[term] + 0.0

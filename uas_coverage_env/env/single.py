@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import joint_action_of
 from uas_coverage_env.env.interface import absent, flat, observation_space, with_mask
-from uas_coverage_env.env.memory import COVERED, ENERGY, STATUS
+from uas_coverage_env.env.memory import COVERED, ENERGY, FIRST_TERM, STATUS
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.sequence import MissionSequence
@@ -219,20 +219,20 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         masks = [self._episode.infos.action_mask(i) for i in range(len(self._episode.names))]
         return np.concatenate(masks + [missing] * (self._n_uas - len(masks)))
 
-    def _told(self, report: list[list[float]]) -> dict[str, Any]:
+    def _told(self, report: list[list[int]]) -> dict[str, Any]:
         episode = self._episode
         # not Python's `sum`, which rounds in another way than a kernel since 3.12
-        terms = [reduce(add, column) for column in zip(*episode.terms, strict=True)]
+        sums = [reduce(add, column) for column in zip(*episode.amounts, strict=True)]
         uas = {
-            name: episode.infos.of(i, row, episode.terms[i])
+            name: episode.infos.of(i, row, episode.amounts[i])
             for i, (name, row) in enumerate(zip(episode.names, report, strict=True))
         }
         for name in self._missions.source.names[len(uas) :]:
             uas[name] = absent(uas[episode.names[0]])
         told: dict[str, Any] = {
-            "reward_terms": dict(zip(episode.settings.term_names, terms, strict=True)),
-            "covered": int(report[0][COVERED]),
-            "energy_Wh": reduce(add, [row[ENERGY] for row in report]),
+            "reward_terms": dict(zip(episode.settings.term_names, sums[FIRST_TERM:], strict=True)),
+            "covered": report[0][COVERED],
+            "energy_Wh": sums[ENERGY],
             "uas": uas,
         }
         if episode.settings.chooses and not episode.settings.mask_in_observation:

@@ -8,6 +8,7 @@ from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
     FIRST_OBSERVATION,
+    FIRST_TERM,
     LEARNERS,
     STATUS,
     Learners,
@@ -33,6 +34,7 @@ def learners_sizes(settings: MissionSettings, action_size: int) -> dict[str, int
     return {
         "A": action_size,
         "R": len(settings.reward),
+        "P": FIRST_TERM + len(settings.reward),
         "V": settings.observation_size,
     }
 

@@ -327,7 +327,7 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     def _infos(
         self,
-        report: NDArray[np.float64],
+        report: NDArray[np.int64],
         swarm: NDArray[np.float64],
         candidates: NDArray[np.int64],
         mask: NDArray[np.bool_],
@@ -340,22 +340,20 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         terms: dict[str, Any] = {}
         for column, name in enumerate(self._batch.settings.term_names, SWARM_FIRST_TERM):
             terms[name] = swarm[:, column]
-        status = report[:, :, STATUS].astype(np.int64)
+        status = report[:, :, STATUS].copy()
         infos = {
             "reward_terms": terms,
             "covered": swarm[:, SWARM_COVERED].astype(np.int64),
             "energy_Wh": swarm[:, SWARM_ENERGY],
             "scenario": self._batch.lanes.scenario * mask,
             "status": status,
-            "contact": report[:, :, CONTACT].astype(np.int64),
-            "contact_with": np.where(status == ABSENT, -1, report[:, :, CONTACT_WITH]).astype(
-                np.int64
-            ),
-            "limits_exceeded": report[:, :, LIMITS].astype(np.int64),
-            "returning": report[:, :, RETURNING] > 0.0,
+            "contact": report[:, :, CONTACT].copy(),
+            "contact_with": np.where(status == ABSENT, -1, report[:, :, CONTACT_WITH]),
+            "limits_exceeded": report[:, :, LIMITS].copy(),
+            "returning": report[:, :, RETURNING] > 0,
         }
         if self._batch.filters:
-            infos["filtered"] = report[:, :, FILTERED] > 0.0
+            infos["filtered"] = report[:, :, FILTERED] > 0
         if self._batch.chooses and not self._masks_seen:
             infos["action_mask"] = self._masks_of(candidates) * mask[:, None].astype(np.int8)
         if self._batch.settings.flat_infos:
