@@ -1,7 +1,8 @@
 from pathlib import Path
 
 import pytest
-from uas_coverage_agents.training.config import PUBLISHED, load_config, published_names
+from uas_coverage_agents.training.config import load_config
+from uas_coverage_agents.training.published import PUBLISHED, published_names
 from uas_coverage_agents.training.scenarios import (
     VALIDATION,
     town,

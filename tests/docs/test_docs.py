@@ -8,7 +8,7 @@ import typer
 from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_modules
 from typer.core import TyperGroup
 
-from uas_coverage_env.cli.app import app
+from uas_coverage_env.cli.app import command_group
 from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.flight import load_planner
@@ -79,7 +79,7 @@ def test_the_command_line_understands_every_command_of_a_page(page, tmp_path, mo
 
 def understood(words):
     """Parse a command as the program does, and ask that players and their options exist."""
-    command, context, rest = typer.main.get_command(app), None, words[1:]
+    command, context, rest = command_group(), None, words[1:]
     while True:
         if rest == [] and context is not None:
             return  # a text that names a command without what it needs

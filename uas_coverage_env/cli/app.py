@@ -8,33 +8,71 @@ from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli import (
-    compare,
-    figure,
-    operations,
-    planners,
-    replay,
-    run,
-    scenarios,
-    vehicle,
-    warm_up,
-)
+from uas_coverage_env.cli.lazy import MARKUP, CommandEntry, LazyGroup, at
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
-from uas_coverage_env.cli.plugins import add_plugin_commands
+from uas_coverage_env.cli.plugins import plugin_entries
 from uas_coverage_env.cli.termination import terminated_as_by_hand
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import PlannerError
+from uas_coverage_env.files.errors import InputError, PlannerError
 
 PROGRAM = "uas-coverage"
 
 # what typer makes of Ctrl-C that no command has caught
 _CTRL_C = 130
 
+_CLI = "uas_coverage_env.cli"
+
+COMMANDS = (
+    CommandEntry("run", at(f"{_CLI}.run:run"), "Fly one mission and write a flight directory."),
+    CommandEntry(
+        "compare",
+        at(f"{_CLI}.compare:compare"),
+        "Fly every planner on every scenario with every seed, and compare them.",
+    ),
+    CommandEntry(
+        "warm-up",
+        at(f"{_CLI}.warm_up:warm_up"),
+        "Compile the simulation for this machine, so that the first flight begins at once.",
+    ),
+    CommandEntry(
+        "planners",
+        at(f"{_CLI}.planners:planners"),
+        "List the planners and their options (set them with `run --option key=value`).",
+    ),
+    CommandEntry(
+        "replay",
+        at(f"{_CLI}.replay:replay"),
+        "Write DIR/replay.html, a page that opens from disk and needs no network.",
+    ),
+    CommandEntry(
+        "figure",
+        at(f"{_CLI}.figure:figure"),
+        "Draw a figure as a vector file (needs the extra `view`).",
+    ),
+    CommandEntry(
+        "import",
+        at(f"{_CLI}.operations:import_area"),
+        "Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`).",
+    ),
+    CommandEntry(
+        "export",
+        at(f"{_CLI}.operations:export"),
+        "Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`).",
+    ),
+    CommandEntry(
+        "scenarios", at(f"{_CLI}.scenarios:app"), "List the shipped scenarios, or check one."
+    ),
+    CommandEntry(
+        "vehicle", at(f"{_CLI}.vehicle:app"), "List the shipped vehicles, check one, or make one."
+    ),
+)
+"""The commands of the package; each says in its first line what stands here."""
+
 app = typer.Typer(
+    cls=LazyGroup,
     add_completion=False,
     invoke_without_command=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
+    rich_markup_mode=MARKUP,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -57,22 +95,17 @@ def describe(
         typer.echo(context.get_help())
 
 
-app.command("run")(run.run)
-app.command("compare")(compare.compare)
-app.command("warm-up")(warm_up.warm_up)
-app.command("planners")(planners.planners)
-app.command("replay")(replay.replay)
-app.command("figure")(figure.figure)
-app.command("import")(operations.import_area)
-app.command("export")(operations.export)
-app.add_typer(scenarios.app, name="scenarios")
-app.add_typer(vehicle.app, name="vehicle")
-add_plugin_commands(app)
+def command_group() -> LazyGroup:
+    """The command line with the commands of the package and those of others."""
+    group = typer.main.get_command(app)
+    assert isinstance(group, LazyGroup)
+    group.add_entries([*COMMANDS, *plugin_entries()])
+    return group
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; invalid input is reported in one line."""
-    command = typer.main.get_command(app)
+    command = command_group()
     _never_stop_at_a_letter()
     try:
         with terminated_as_by_hand():

@@ -1,10 +1,12 @@
 """How the commands speak: plain lines and tables on stdout, warnings on stderr."""
 
 import sys
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from uas_coverage_env.scenario import Scenario, load_scenario, warnings
+if TYPE_CHECKING:
+    from uas_coverage_env.scenario import Scenario
 
 DONE, FAILED = 0, 1
 
@@ -19,8 +21,13 @@ def one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def loaded(name_or_path: str) -> Scenario:
+def loaded(name_or_path: str) -> "Scenario":
     """Load a scenario; what is doubtful about it goes to stderr, a line each."""
+    from uas_coverage_env.scenario import (  # a second that help need not take
+        load_scenario,
+        warnings,
+    )
+
     scenario = load_scenario(name_or_path)
     for warning in warnings(scenario):
         sys.stderr.write(f"warning: {one_line(warning)}\n")

@@ -1,29 +1,34 @@
 """Commands that other packages add: entry-point group `uas_coverage.commands`.
 
-An entry is a function as typer takes it; its name is that of the command. It is loaded whenever the
-command line starts, so its module should import what is heavy only when the command runs.
+An entry is a function as typer takes it; its name is that of the command. It is loaded when the
+command is called or listed, so its module should import what is heavy only when the command runs.
 """
 
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
-from typing import NoReturn
+from typing import Any, NoReturn
 
-import typer
-
+from uas_coverage_env.cli.lazy import CommandEntry
 from uas_coverage_env.cli.output import one_line
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.errors import InputError
 
 GROUP = "uas_coverage.commands"
 
 
-def add_plugin_commands(app: typer.Typer) -> None:
-    """Add them all; one that cannot be loaded says so when it is called, and harms no other."""
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+def plugin_entries() -> list[CommandEntry]:
+    """Them all; one that cannot be loaded says so when it is called, and harms no other."""
+    entries = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    return [CommandEntry(entry.name, _loader(entry)) for entry in entries]
+
+
+def _loader(entry: EntryPoint) -> Callable[[], Any]:
+    def load() -> Any:
         try:
-            command = entry.load()
+            return entry.load()
         except (ImportError, AttributeError) as error:
-            command = _refusal(entry, error)
-        app.command(entry.name)(command)
+            return _refusal(entry, error)
+
+    return load
 
 
 def _refusal(entry: EntryPoint, error: Exception) -> Callable[[], NoReturn]:

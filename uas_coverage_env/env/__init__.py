@@ -16,11 +16,11 @@ from uas_coverage_env.env.observation import (
 from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.env.pool import ScenarioPool
-from uas_coverage_env.env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm, rewards_table
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.single import CoverageSwarmEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv
+from uas_coverage_env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
 
 __all__ = [
     "ACTIONS",

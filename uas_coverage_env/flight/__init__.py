@@ -1,5 +1,6 @@
 """What is kept of a flight: planners by name, the rollout, its record, measures and directory."""
 
+from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.metrics import (
@@ -18,7 +19,6 @@ from uas_coverage_env.flight.planner import (
     AssistedOptions,
     Decision,
     Planner,
-    PlannerError,
     PlannerOptions,
 )
 from uas_coverage_env.flight.record import MODES, DecisionRecord, FlightRecord, Violation

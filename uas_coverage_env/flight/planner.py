@@ -70,10 +70,6 @@ class Planner(Protocol):
         ...
 
 
-class PlannerError(ValueError):
-    """A planner gave commands that cannot be flown; names planner, time, UAS and value."""
-
-
 class PlannerOptions(StrictModel):
     """Base of a planner's options: frozen, unknown names are errors, text is read as a number."""
 

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.disturbances import Disturbance
+from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.log import FlightLog
-from uas_coverage_env.flight.planner import Assistants, Planner, PlannerError
+from uas_coverage_env.flight.planner import Assistants, Planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario

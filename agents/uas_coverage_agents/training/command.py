@@ -14,14 +14,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
-from uas_coverage_agents.policy import Policy
-from uas_coverage_agents.training.config import load_config, published_names
-from uas_coverage_env.cli.compilation import compilation_shown
+from uas_coverage_agents.training.published import published_names
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.plain_files import read_bytes, write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 
 if TYPE_CHECKING:
+    from uas_coverage_agents.policy import Policy
     from uas_coverage_agents.training.loop import TrainingJob, TrainingProgress
 
 ORDER = "order.json"
@@ -84,6 +83,8 @@ def train(
     if minutes is not None and math.isinf(minutes):
         raise InputError("--minutes inf: would never end; give a number")
     changes = [*(change or ()), *([f"steps={steps}"] if steps is not None else ())]
+    from uas_coverage_agents.training.config import load_config  # this module is loaded for a list
+
     config = load_config(algorithm, scenario=scenario, changes=changes)
     if zip_file is not None and not trust_pickle:
         raise InputError(
@@ -209,6 +210,8 @@ def _shown(screen: Console) -> Iterator[Callable[["TrainingProgress"], object]]:
 
         yield say
         return
+    from uas_coverage_env.cli.compilation import compilation_shown
+
     columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"))
     bar = Progress(*columns, console=screen)
     task = bar.add_task("", total=1.0)
@@ -226,7 +229,7 @@ def _shown(screen: Console) -> Iterator[Callable[["TrainingProgress"], object]]:
         yield move
 
 
-def _report(screen: Console, policy: Policy, directory: Path) -> None:
+def _report(screen: Console, policy: "Policy", directory: Path) -> None:
     score, training = policy.description.score, policy.description.training
     if score is not None:
         table = Table("unseen missions", "mean", "95 % interval", box=None)

@@ -8,12 +8,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from uas_coverage_agents.policy import ScenarioFamily
+from uas_coverage_agents.training.published import PUBLISHED, published_names
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_agents.waypoint.settings import WaypointSettings
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse, read_toml
 from uas_coverage_env.scenario import load_scenario
-
-PUBLISHED = Path(__file__).parents[1] / "configs"
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -135,11 +134,6 @@ class TrainingConfig(StrictModel):
         if attention and self.learning.algorithm != "ppo":
             raise ValueError("player.network is 'gaze', which is learned by ppo alone")
         return self
-
-
-def published_names() -> tuple[str, ...]:
-    """Names of the configurations that come with the package."""
-    return tuple(sorted(path.stem for path in PUBLISHED.glob("*.toml")))
 
 
 def load_config(

@@ -1,0 +1,74 @@
+"""Commands that are imported when they run: to list them, none of the package's is imported."""
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+MARKUP = "markdown"
+
+
+class CommandEntry(NamedTuple):
+    """A command of the command line."""
+
+    name: str
+    load: Callable[[], Any]
+    """Imports it: a function as typer takes it, or a `typer.Typer` of further commands."""
+    summary: str = ""
+    """Its line in the list of commands; without one, it is imported for its own."""
+
+
+def at(location: str) -> Callable[[], Any]:
+    """What imports MODULE:NAME."""
+
+    def load() -> Any:
+        module, _, name = location.partition(":")
+        return getattr(import_module(module), name)
+
+    return load
+
+
+class _NotImported(TyperCommand):
+    """What stands for a command in a list."""
+
+    def __init__(self, entry: CommandEntry) -> None:
+        super().__init__(name=entry.name, help=entry.summary)
+        self.entry = entry
+
+
+class LazyGroup(TyperGroup):
+    """A group of commands that are imported when they are called."""
+
+    _lists = False
+
+    def add_entries(self, entries: Sequence[CommandEntry]) -> None:
+        """Add commands; of two that have one name, the later one counts."""
+        for entry in entries:
+            self.add_command(_NotImported(entry))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name; where commands are only listed, what stands for it."""
+        command = super().get_command(ctx, cmd_name)
+        if not isinstance(command, _NotImported) or (self._lists and command.entry.summary):
+            return command
+        return _command_of(command.entry)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        self._lists = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self._lists = False
+
+
+def _command_of(entry: CommandEntry) -> Any:
+    app = made = entry.load()
+    if not isinstance(made, typer.Typer):
+        app = typer.Typer(add_completion=False, rich_markup_mode=MARKUP)
+        app.command(entry.name)(made)
+    command = typer.main.get_command(app)
+    command.name = entry.name
+    return command
