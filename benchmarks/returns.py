@@ -21,6 +21,7 @@ charge, than `Range` with its margin, 1 otherwise, 2 where the input is bad.
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
 )
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
-from uas_coverage_env.autopilot import seconds_home
+from uas_coverage_env.autopilot import seconds_home, seconds_to_keep
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
 from uas_coverage_env.simulation import Dynamics
@@ -130,7 +131,7 @@ def estimates(flown: Return) -> tuple[list[float], list[float]]:
     scenario, x = flown.scenario, flown.x
     brief, world = MissionBrief.of(scenario), World(scenario)
     home = Range(brief).home(0, x)
-    called_s = float(seconds_home(world.arena, 0, x))
+    called_s = max(seconds_home(world.arena, 0, x), seconds_to_keep(world.arena, 0, x, math.inf))
     vehicle = brief.vehicles[0]
     planned_s = milp_seconds_home(vehicle, x[:3] - np.array(brief.uas[0].start_m))
     return (

@@ -1,12 +1,19 @@
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
-from small_worlds import meadow, waypoint
+from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import seconds_home
+from uas_coverage_env.autopilot import seconds_home, seconds_to_keep
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX
 from uas_coverage_env.world import FLYING, LANDED, GoTo, Velocity
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from return_mode import FAMILIES, fly
 
 AWAY = {"uas_1": Velocity(6.0, 6.0, 20.0)}
 HOVER = {"uas_1": Velocity(0.0, 0.0, 20.0)}
@@ -101,3 +108,83 @@ def test_a_whole_town_comes_home_from_a_random_walk():
         world.step({name: commands[name] for name in world.active})
     assert (world.state.status == LANDED).all()
     assert FLYING not in world.state.status
+
+
+def budgeted(world, seconds):
+    """Leave the only UAS charge for so long."""
+    uas = world.arena.uas[0]
+    world.state.x[0, DOD] = uas["dod_max"] - seconds * uas["dod_per_s"]
+
+
+def comes_home(world, command, max_steps=400):
+    for _ in range(max_steps):
+        if world.done:
+            break
+        world.step({"uas_1": command})
+    return world.state.status[0] == LANDED
+
+
+@pytest.mark.parametrize("budget_s", np.arange(18.0, 34.0, 0.25))
+def test_a_uas_that_flies_off_at_full_speed_is_called_while_it_can_still_turn(budget_s):
+    world = World(meadow([(30.0, 100.0, -1.0)], max_steps=600), return_mode=True)
+    budgeted(world, budget_s)
+    assert comes_home(world, Velocity(12.0, 0.0, 2.0))
+
+
+@pytest.mark.parametrize("budget_s", np.arange(60.0, 100.0, 2.5))
+def test_a_uas_low_behind_a_high_roof_is_called_in_time_to_climb_over_it(budget_s):
+    wall = box("wall", (60.0, 0.5, -30.0), (66.0, 199.5, 0.0))
+    target = waypoint((180.0, 180.0, -40.0), 4.0)
+    world = World(
+        meadow([(30.0, 100.0, -1.0)], obstacles=[wall], waypoints=[target], max_steps=600),
+        return_mode=True,
+        safety_filter=True,
+    )
+    assert not world.arena.obstacles["tall"].any()
+    world.state.x[0, :3] = (90.0, 100.0, -3.0)
+    world.state.departed[0] = True
+    budgeted(world, budget_s)
+    assert comes_home(world, Velocity(12.0, 3.0, 3.0))
+
+
+def test_what_has_to_be_kept_grows_with_speed_away_from_home_and_with_roofs():
+    wall = box("wall", (60.0, 0.5, -30.0), (66.0, 199.5, 0.0))
+    free, walled = (
+        World(meadow([(30.0, 100.0, -1.0)], obstacles=obstacles), return_mode=True)
+        for obstacles in ([], [wall])
+    )
+    x = free.state.x[0].copy()
+    x[:3] = (90.0, 100.0, -3.0)
+    left_s = 60.0
+    at_rest_s = seconds_to_keep(free.arena, 0, x, left_s)
+    x[VX] = 12.0
+    away_s = seconds_to_keep(free.arena, 0, x, left_s)
+    assert away_s > at_rest_s + 3.0
+    # 27 m up and 29 m down
+    assert seconds_to_keep(walled.arena, 0, x, left_s) > away_s + 20.0
+
+
+FORMERLY_LOST = (
+    ("towns", "fast", 50_015),
+    ("crowd", "fast", 50_033),
+    ("hexacopters", "fast", 50_088),
+    ("short_steps", "fast", 50_083),
+    ("hexagon", "fast", 50_037),
+    ("clutter", "away", 50_049),
+    ("clutter", "fast", 50_002),
+    ("overhangs", "fast", 50_046),
+)
+
+
+@pytest.mark.parametrize(("family", "player", "seed"), FORMERLY_LOST)
+def test_random_players_on_which_uas_were_lost_bring_them_home(family, player, seed):
+    tally = fly(family, player, seed)
+    assert tally["battery"] == tally["still flying"] == tally["breaches"] == 0
+    assert tally["charge left"] > 0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_flight_for_the_benchmark_ends_with_all_at_home(family):
+    tally = fly(family, "away", 60_000)
+    assert tally["flights"] >= 1
+    assert sum(tally[name] for name in ("battery", "obstacle", "uas", "geofence")) == 0

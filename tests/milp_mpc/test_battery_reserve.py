@@ -87,7 +87,7 @@ def test_the_reserve_is_no_shorter_than_the_calibrated_way_home_from_a_hover(veh
     record = compile_vehicle(vehicle, 1.0)[()]
     for way_m in np.arange(50.0, 800.0, 50.0):
         allowed_s = seconds_home(vehicle, np.array([way_m, 0.0, -height_m])) + _ALLOWANCE_S
-        assert allowed_s > seconds_to_land(record, way_m, 0.0, height_m)
+        assert allowed_s > seconds_to_land(record, way_m, 0.0, height_m, -np.inf, way_m, 0.0)
 
 
 def test_a_battery_that_suffices_whatever_is_flown_needs_no_rows():

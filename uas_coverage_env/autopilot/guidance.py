@@ -6,6 +6,7 @@ import numpy as np
 
 from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
+from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY
@@ -20,7 +21,9 @@ CRUISE_ALTITUDE_M = 8.0
 """On a longer way UAS do not sink below this altitude above the floor [m]."""
 
 _GLIDE_SLOPE = 0.12
-_HEADROOM_M = 0.5
+HEADROOM_M = 0.5
+"""Roofs are passed this much above the distance of routes [m]."""
+
 _SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
 _TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
 _SHARE_WHEN_TURNED = 0.4
@@ -43,6 +46,24 @@ def path_length_home_m(arena, i, x):
     return route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)[2]
 
 
+@inlined_kernel
+def passes_over(obstacle, over, ends, leg, highest_m):
+    """Whether a leg that crosses an obstacle has to pass over it; `over`, `ends`: see `crossing`.
+
+    Args:
+        obstacle: A record of OBSTACLE_DTYPE.
+        over: Whether the leg starts or ends above (or below) the obstacle.
+        ends: Whether it ends in the widened footprint.
+        leg: CLEAR, IN_SIGHT, ROUND_CORNER or NO_WAY.
+        highest_m: The higher one of the altitudes of both ends [m].
+    """
+    if leg == CLEAR:
+        # the straight line passes beside or below what is higher than both of its ends, and
+        # where it ends there is nothing to stay above
+        return obstacle.roof_m <= highest_m and not ends
+    return over or not obstacle.tall or leg == NO_WAY
+
+
 @kernel
 def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     """Altitude needed over the low obstacles on a leg, and the speed that leaves time to climb.
@@ -60,15 +81,9 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
         if at > 1.0:
             continue
         roof_m = obstacle.roof_m
-        if leg == CLEAR:
-            # the straight line passes beside or below what is higher than both of its ends, and
-            # where it ends there is nothing to stay above
-            passes_over = roof_m <= max(altitude_m, altitude1_m) and not ends
-        else:
-            passes_over = over or not obstacle.tall or leg == NO_WAY
-        if not passes_over:
+        if not passes_over(obstacle, over, ends, leg, max(altitude_m, altitude1_m)):
             continue
-        needed_m = max(needed_m, roof_m + _HEADROOM_M)
+        needed_m = max(needed_m, roof_m + HEADROOM_M)
         rise_m = roof_m - altitude_m
         if rise_m > 0.0:
             climbing_s = rise_m / arena.uas[i].climb_mps + LEAD_S
@@ -132,6 +147,15 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
     """
     row, x1, y1, z1 = target_position(arena, i, target)
     end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
+    if leg != CLEAR and arena.rules[0].overhangs:
+        place_m = np.empty(3)
+        first = past_overhangs(arena, i, x[X], x[Y], x[Z], x1, y1, z1, place_m)
+        if first != LEG_TO_TARGET:
+            x1, y1, z1 = place_m[0], place_m[1], place_m[2]
+            end_x, end_y, way_m, leg = x1, y1, 0.0, CLEAR
+            if first == TARGET_IS_PLACE:
+                end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
+            stop = True
     lead_s = LEAD_S
     if not stop or leg == ROUND_CORNER:
         # to look beyond what is flown by would turn the UAS round before it gets there
@@ -157,10 +181,17 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
             write_command(command, VELOCITY, share * north_mps, share * east_mps, wanted_m)
             if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
                 return
-    if abs(altitude_m + x[Z]) > _HEADROOM_M:
+    if abs(altitude_m + x[Z]) > HEADROOM_M:
         write_command(command, VELOCITY, 0.0, 0.0, altitude_m)
         if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
             return
+    if leg == CLEAR and arena.rules[0].overhangs:
+        # what is in the way of a climb is not in the way of the straight line
+        held_m = -x[Z] - x[VZ]
+        for share in _SHARES_OF_SPEED:
+            write_command(command, VELOCITY, share * north_mps, share * east_mps, held_m)
+            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+                return
     for turn in _TURNS:
         cos = _SHARE_WHEN_TURNED * math.cos(turn)
         sin = _SHARE_WHEN_TURNED * math.sin(turn)

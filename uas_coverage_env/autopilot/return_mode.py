@@ -1,6 +1,7 @@
 """When a UAS has to turn home to arrive in time and with charge left."""
 
 from uas_coverage_env.autopilot.guidance import path_length_home_m
+from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.vehicle.range import RETURN_MODE, Speeds, flight_seconds
@@ -8,15 +9,44 @@ from uas_coverage_env.world.state import FLYING
 
 _CLOCK_RESERVE_S = 30.0
 
+_STEPS_LATER = 3.0
+"""What a step takes from what is left of the way home, in steps: the step itself, a step farther
+away at full speed, and half a turn more."""
+
+_FAR_FROM_EMPTY, _FAR_FROM_EMPTY_S = 2.0, 120.0
+"""With so many times the way home left, and so many seconds, nothing more is looked at."""
+
 
 @kernel
 def seconds_home(arena, i, x):
-    """Time [s] that UAS i needs to fly home and land, estimated with reserve (`RETURN_MODE`)."""
+    """Time [s] that UAS i is given to fly home and land, held up by others (`RETURN_MODE`)."""
     uas = arena.uas[i]
     altitude_m = max(-x[Z] + uas.home_m[2], 0.0)
     speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     way_m = path_length_home_m(arena, i, x)
     return flight_seconds(RETURN_MODE, speeds, 0.0, way_m, 0.0, altitude_m)
+
+
+@kernel
+def seconds_to_keep(arena, i, x, left_s):
+    """Time [s] that battery and clock must leave UAS i now, so that it still comes home.
+
+    The larger of two: the calibrated flight with its margin (`flight_home`), which knows of
+    braking, turning and climbing over roofs, some steps later; and the same from where it can come
+    to rest after one more step (`latest_flight_home`), looked at only where little is left.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x: (14,) its state.
+        left_s: What battery and clock leave [s].
+    """
+    seconds, margin_s = flight_home(arena, i, x)
+    now_s = seconds + margin_s
+    keep_s = now_s + _STEPS_LATER * arena.rules[0].dt_s
+    if keep_s < left_s < _FAR_FROM_EMPTY * now_s + _FAR_FROM_EMPTY_S:
+        keep_s = max(keep_s, latest_flight_home(arena, i, x))
+    return keep_s
 
 
 @kernel
@@ -29,11 +59,15 @@ def has_to_return(arena, state, i):
         return True
     x = state.x[i]
     rules = arena.rules[0]
+    uas = arena.uas[i]
     home_s = seconds_home(arena, i, x)
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
     if home_s + _CLOCK_RESERVE_S - RETURN_MODE.landing_s > time_left_s:
         return True
-    return x[DOD] + home_s * arena.uas[i].dod_per_s >= arena.uas[i].dod_max
+    if x[DOD] + home_s * uas.dod_per_s >= uas.dod_max:
+        return True
+    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / uas.dod_per_s)
+    return seconds_to_keep(arena, i, x, left_s) >= left_s
 
 
 @kernel

@@ -1,39 +1,15 @@
 """How long and how much charge from here to home, with what margin: calibrated (docs/range.md)."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import target_position
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.autopilot import flight_home as seconds_home
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
-from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
-from uas_coverage_env.world import CLEAR, HOME, build_arena, route
-
-
-@kernel
-def seconds_home(arena, i, x):
-    """Time to fly UAS i home and land it, past the fixed obstacles.
-
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x: (14,) its state.
-
-    Returns:
-        The expected time [s], and the margin to add to it [s].
-    """
-    row, x1, y1, z1 = target_position(arena, i, HOME)
-    _, _, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
-    north_m = x1 - x[X]
-    east_m = y1 - x[Y]
-    away_m = max(math.hypot(north_m, east_m), 1e-9)
-    towards_mps = (north_m * x[VX] + east_m * x[VY]) / away_m
-    seconds = seconds_to_land(arena.vehicles[i], way_m, towards_mps, z1 - x[Z])
-    return seconds, margin_to_land(seconds, leg != CLEAR)
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.world import build_arena
 
 
 @dataclass(frozen=True)

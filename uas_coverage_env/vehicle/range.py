@@ -131,23 +131,34 @@ which is climbed over, or passed more slowly. Fewer than 1 in 200 flights home t
 
 
 @kernel
-def seconds_to_land(vehicle, way_m, towards_mps, height_m):
+def seconds_to_land(vehicle, way_m, towards_mps, height_m, roof_m, before_m, after_m):
     """Expected time to fly home and land, nothing that moves in the way [s].
 
     Along the way at full speed, after a turn towards it, or down (up) to the altitude of home,
-    whichever takes longer: guidance does both at once.
+    whichever takes longer: guidance does both at once. Where roofs have to be passed over, the
+    climb is over before the first of them, and the descent begins after the last.
 
     Args:
         vehicle: Record of VEHICLE_DTYPE.
         way_m: Horizontal length of the way home past fixed obstacles [m].
         towards_mps: Velocity now in the direction of home [m/s].
         height_m: Above home; negative below it [m].
+        roof_m: Height above home at which the highest roof is passed; -inf without roofs [m].
+        before_m: Horizontal way before the first roof [m].
+        after_m: Horizontal way after the last roof [m].
     """
     turn_mps = vehicle.v_xy_max_mps - towards_mps
     turn_s = _TURNS * turn_mps / (vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad))
     speeds = Speeds(vehicle.v_xy_max_mps, vehicle.v_up_max_mps, vehicle.v_down_max_mps)
     up_m, down_m = max(-height_m, 0.0), max(height_m, 0.0)
-    return flight_seconds(CALIBRATED, speeds, turn_s, way_m, up_m, down_m)
+    seconds = flight_seconds(CALIBRATED, speeds, turn_s, way_m, up_m, down_m)
+    if roof_m == -math.inf:
+        return seconds
+    top_m = max(height_m, roof_m)
+    rising_s = max(before_m / speeds.level_mps, (top_m - height_m) / speeds.climb_mps)
+    over_s = max(way_m - before_m - after_m, 0.0) / speeds.level_mps
+    falling_s = flight_seconds(CALIBRATED, speeds, 0.0, after_m, 0.0, max(top_m, 0.0))
+    return max(seconds, turn_s + rising_s + over_s + falling_s)
 
 
 @kernel

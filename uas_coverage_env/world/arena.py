@@ -20,6 +20,7 @@ from uas_coverage_env.world.disturbance import (
     Disturbance,
     disturbance_tables,
 )
+from uas_coverage_env.world.overhangs import overhangs
 from uas_coverage_env.world.routes import node_distances
 
 NEAR_M = 20.0
@@ -92,6 +93,8 @@ OBSTACLE_DTYPE = _record(
         ("wall_m", "f8"),
         ("roof_m", "f8"),
         ("tall", "?"),
+        # there is room below a part of it
+        ("overhangs", "?"),
     ]
 )
 
@@ -129,6 +132,8 @@ RULES_DTYPE = _record(
         ("lookahead_steps", "i8"),
         # whether any disturbance acts
         ("disturbed", "?"),
+        # whether any obstacle overhangs
+        ("overhangs", "?"),
         # of `waypoint_columns`
         ("unit_m", "f8"),
         # the command to stop and hold still
@@ -214,6 +219,7 @@ def build_arena(
     offsets_m = np.concatenate([rows[1] for rows in planes])
     blocks, parameters = disturbance_tables(disturbances)
     rules["disturbed"] = blocks["acts"].any()
+    rules["overhangs"] = obstacles["overhangs"].any()
     nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
@@ -355,6 +361,7 @@ def _obstacles(
 ]:
     """The obstacles, the planes of their hulls and footprints, and the corners to turn at."""
     records = np.zeros(len(scenario.obstacles), dtype=OBSTACLE_DTYPE)
+    ground_m = float(-scenario.fence.vertices_m[:, 2].max())
     planes = []
     corners = []
     first = 0
@@ -393,6 +400,7 @@ def _obstacles(
         record["wall_m"] = wall_m
         record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m
+        record["overhangs"] = overhangs(hull, ground_m)
         if record["tall"]:
             outline = _footprint(_widened(kept, wall_m + NODE_MARGIN_M))
             corners.append(outline.points[outline.vertices])

@@ -108,7 +108,7 @@ def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
 
 
 @kernel
-def _obstructs(obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1):
+def obstructs(obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     """Whether a line in space does not keep the distance of routes from an obstacle."""
     first = obstacle.first_kept
     last = obstacle.last_kept
@@ -130,7 +130,7 @@ def line_is_clear(arena, x0, y0, z0, x1, y1, z1):
         n = min(BLOCK, columns.shape[1] - first)
         write_meetings(columns, BOX, first, n, x0, y0, z0, x1, y1, z1, meets)
         for o in range(min(n, n_obstacles - first)):
-            if meets[o] != 0.0 and _obstructs(
+            if meets[o] != 0.0 and obstructs(
                 arena.obstacles[first + o], arena.normals, arena.offsets_m, x0, y0, z0, x1, y1, z1
             ):
                 return False
@@ -207,6 +207,31 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
         return x1, y1, straight_m, NO_WAY
     north_m, east_m, way_m = _round(arena, corner, target, x0, y0)
     return north_m, east_m, way_m, ROUND_CORNER
+
+
+@kernel
+def leg_from_corner(arena, target, x0, y0, z0, x1, y1, z1):
+    """`route` from a corner of routes itself: (north [m], east [m], leg) of its next leg."""
+    if line_is_clear(arena, x0, y0, z0, x1, y1, z1):
+        return x1, y1, CLEAR
+    obstacles, normals, offsets_m = arena.obstacles, arena.normals, arena.offsets_m
+    if in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
+        return x1, y1, IN_SIGHT
+    shortest_m, corner = math.inf, -1
+    for n in range(arena.nodes_m.shape[0]):
+        north_m, east_m = arena.nodes_m[n, 0], arena.nodes_m[n, 1]
+        on_m = math.hypot(north_m - x0, east_m - y0)
+        length_m = on_m + arena.node_distance_m[target, n]
+        # not the corner itself
+        if (
+            on_m > _CREEP_M
+            and length_m < shortest_m
+            and in_sight(obstacles, normals, offsets_m, x0, y0, north_m, east_m)
+        ):
+            shortest_m, corner = length_m, n
+    if corner < 0:
+        return x1, y1, NO_WAY
+    return arena.nodes_m[corner, 0], arena.nodes_m[corner, 1], ROUND_CORNER
 
 
 @inlined_kernel

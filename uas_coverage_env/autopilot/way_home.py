@@ -1,0 +1,164 @@
+"""How far home is: time that the flight takes past the fixed obstacles, as guidance flies it."""
+
+import math
+
+from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.vehicle import VX, VY, X, Y, Z
+from uas_coverage_env.vehicle.range import margin_to_land, seconds_to_land
+from uas_coverage_env.world.commands import HOME
+from uas_coverage_env.world.overhangs import is_below_overhang, widest_overhang_m
+from uas_coverage_env.world.routes import (
+    CLEAR,
+    ROUND_CORNER,
+    box_apart,
+    crossing,
+    leg_from_corner,
+    route,
+)
+
+_MOST_LEGS = 12
+_STOPPING = 1.5
+"""Of the time that the largest acceleration takes to stop."""
+
+_ON_WHILE_STOPPING = 0.6
+_PLACES_AROUND = 8
+_RINGS = 2
+_LEAVING_MPS = 0.6
+_LEAVING_S = 15.0
+"""From below an overhang a UAS feels its way at about this speed, and turns at both ends."""
+
+
+@inlined_kernel
+def _roofs_on_leg(arena, x0, y0, altitude0_m, x1, y1, altitude1_m, leg):
+    """What a leg passes over.
+
+    Returns:
+        (highest roof [m], -inf without one; way to the first [m]; to the end of the last [m]).
+    """
+    length_m = math.hypot(x1 - x0, y1 - y0)
+    roof_m = -math.inf
+    first_m, last_m = length_m, 0.0
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x0, y0, x1, y1)
+        highest_m = max(altitude0_m, altitude1_m)
+        if at > 1.0 or not passes_over(obstacle, over, ends, leg, highest_m):
+            continue
+        back, _, _ = crossing(obstacle, arena.normals, arena.offsets_m, x1, y1, x0, y0)
+        roof_m = max(roof_m, obstacle.roof_m + HEADROOM_M)
+        first_m = min(first_m, at * length_m)
+        last_m = max(last_m, (1.0 - min(back, 1.0)) * length_m)
+    return roof_m, first_m, last_m
+
+
+@kernel
+def _out_of_overhangs_s(arena, i, x, y, z):
+    """Time to come out from below what overhangs a place, and to climb past it [s]."""
+    if not is_below_overhang(arena, x, y, z):
+        return 0.0
+    across_m, climb_m = widest_overhang_m(arena, x, y, z)
+    return _LEAVING_S + across_m / _LEAVING_MPS + climb_m / arena.uas[i].climb_mps
+
+
+@kernel
+def _flight_from(arena, i, x0, y0, z0, away_mps):
+    """See `flight_home`: from a place, flying away from home at away_mps."""
+    row, x1, y1, z1 = target_position(arena, i, HOME)
+    end_x, end_y, way_m, leg = route(arena, row, x0, y0, z0, x1, y1, z1)
+    obstructed = leg != CLEAR
+    roof_m, before_m, until_m = -math.inf, way_m, 0.0
+    flown_m = 0.0
+    here_x, here_y = x0, y0
+    for _ in range(_MOST_LEGS):
+        found_m, first_m, last_m = _roofs_on_leg(arena, here_x, here_y, -z0, end_x, end_y, -z1, leg)
+        if found_m > -math.inf:
+            roof_m = max(roof_m, found_m)
+            before_m = min(before_m, flown_m + first_m)
+            until_m = max(until_m, flown_m + last_m)
+        if leg != ROUND_CORNER:
+            break
+        flown_m += math.hypot(end_x - here_x, end_y - here_y)
+        here_x, here_y = end_x, end_y
+        end_x, end_y, leg = leg_from_corner(arena, row, here_x, here_y, z0, x1, y1, z1)
+    seconds = seconds_to_land(
+        arena.vehicles[i], way_m, -away_mps, z1 - z0, roof_m + z1, before_m,
+        max(way_m - until_m, 0.0),
+    )  # fmt: skip
+    if obstructed:
+        seconds += _out_of_overhangs_s(arena, i, x0, y0, z0)
+        seconds += _out_of_overhangs_s(arena, i, x1, y1, z1)
+    return seconds, margin_to_land(seconds, obstructed)
+
+
+@kernel
+def flight_home(arena, i, x):
+    """Time to fly UAS i home and land it, past the fixed obstacles.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x: (14,) its state.
+
+    Returns:
+        The expected time [s], and the margin to add to it [s].
+    """
+    home_m = arena.uas[i].home_m
+    north_m = home_m[0] - x[X]
+    east_m = home_m[1] - x[Y]
+    away_m = max(math.hypot(north_m, east_m), 1e-9)
+    away_mps = -(north_m * x[VX] + east_m * x[VY]) / away_m
+    return _flight_from(arena, i, x[X], x[Y], x[Z], away_mps)
+
+
+@kernel
+def _may_rest_at(arena, i, x, y, z):
+    """Whether a UAS can be at a place without a breach."""
+    rules = arena.rules[0]
+    normals, offsets_m = arena.normals, arena.offsets_m
+    first, last = rules.fence_first, rules.fence_last
+    if signed_distance(normals, offsets_m, first, last, x, y, z) > -rules.fence_margin_m:
+        return False
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        if not box_apart(obstacle, x, y, z, x, y, z):
+            first, last = obstacle.first_kept, obstacle.last_kept
+            required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
+            if signed_distance(normals, offsets_m, first, last, x, y, z) < required_m:
+                return False
+    return True
+
+
+@kernel
+def latest_flight_home(arena, i, x):
+    """Time to fly UAS i home if it flies one more step, whatever its command [s].
+
+    The way home may be much longer from behind the next building. So the UAS is taken to come to
+    rest first: where it would if it braked one step later, or at one of sixteen places around, as
+    far away as one and two steps of the largest acceleration lead. From the farthest of these it
+    flies home.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x: (14,) its state.
+    """
+    vehicle = arena.vehicles[i]
+    dt_s = vehicle.dt_s
+    most_mps2 = vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad)
+    stopping_s = _STOPPING * math.hypot(x[VX], x[VY]) / most_mps2
+    on_s = dt_s + _ON_WHILE_STOPPING * stopping_s
+    longest_s = _STOPPING * vehicle.v_xy_max_mps / most_mps2
+    around_m = most_mps2 * dt_s * (dt_s + _ON_WHILE_STOPPING * longest_s)
+    z = min(x[Z] + dt_s * vehicle.v_down_max_mps, -arena.rules[0].floor_m)
+    latest_s = 0.0
+    for k in range(_RINGS * _PLACES_AROUND + 1):
+        angle = 2.0 * math.pi * k / _PLACES_AROUND
+        aside_m = around_m * ((k + _PLACES_AROUND - 1) // _PLACES_AROUND)
+        north_m = x[X] + on_s * x[VX] + aside_m * math.cos(angle)
+        east_m = x[Y] + on_s * x[VY] + aside_m * math.sin(angle)
+        if _may_rest_at(arena, i, north_m, east_m, z):
+            seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, 0.0)
+            latest_s = max(latest_s, seconds + margin_s)
+    return dt_s + stopping_s + latest_s

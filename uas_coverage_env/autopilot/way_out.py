@@ -1,0 +1,171 @@
+"""A way out from below what overhangs a UAS, and in below what overhangs its target.
+
+Guidance flies over low obstacles and round tall ones; both begin with a climb, or end with a
+descent, that an overhang makes impossible. So what is below an overhang is left, or reached, along
+the shortest way through a grid to a place from which guidance can climb. That way is found if the
+grid has one; a single convex obstacle can always be left at the altitude at which the UAS is.
+"""
+
+import math
+
+import numpy as np
+
+from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
+from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.world.height import lowest_altitude
+from uas_coverage_env.world.overhangs import is_below_overhang
+from uas_coverage_env.world.routes import box_apart, line_is_clear
+
+LEG_TO_TARGET, LEG_TO_PLACE, TARGET_IS_PLACE = range(3)
+"""What `past_overhangs` returns."""
+
+_CELL_M = 2.0
+_REACH = 20
+_SIDE = 2 * _REACH + 1
+_N_CELLS = _SIDE**3
+_MOST_PLACES = 4 * _SIDE
+_FENCE_MARGIN_M = 0.5
+_CREEP_M = 1e-3
+_NEIGHBOURS = np.array(
+    [
+        (n, e, d)
+        for n in (-1, 0, 1)
+        for e in (-1, 0, 1)
+        for d in (-1, 0, 1)
+        if abs(n) + abs(e) + abs(d) == 1
+    ]
+)
+
+
+@kernel
+def _is_free(arena, i, x0, y0, z0, x, y, z):
+    """Whether routes may lead through a place, or it is not nearer to anything than the start."""
+    rules = arena.rules[0]
+    normals, offsets_m = arena.normals, arena.offsets_m
+    if -z > rules.ceiling_m or -z < min(lowest_altitude(arena, i, x, y), -z0):
+        return False
+    first, last = rules.fence_first, rules.fence_last
+    inside_m = rules.fence_margin_m + _FENCE_MARGIN_M
+    now_m = -signed_distance(normals, offsets_m, first, last, x0, y0, z0)
+    if -signed_distance(normals, offsets_m, first, last, x, y, z) < min(inside_m, now_m):
+        return False
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        if box_apart(obstacle, x, y, z, x, y, z):
+            continue
+        first, last = obstacle.first_kept, obstacle.last_kept
+        now_m = signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M
+        there_m = signed_distance(normals, offsets_m, first, last, x, y, z)
+        if there_m < min(obstacle.wall_m, now_m):
+            return False
+    return True
+
+
+@allocating_kernel
+def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
+    """The places along the way out from below the overhangs at a place.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x0: North of the place [m].
+        y0: East of it [m].
+        z0: Down of it [m].
+        x1: North of where it shall lead [m]: of several ways out, the shortest to there.
+        y1: East of it [m].
+        places_m: (P, 3) [m] written, in order, without the place itself.
+
+    Returns:
+        How many places; 0 where the grid has no way.
+    """
+    before = np.full(_N_CELLS, -1, np.int32)
+    queue = np.empty(_N_CELLS, np.int32)
+    depth = np.zeros(_N_CELLS, np.int32)
+    start = (_REACH * _SIDE + _REACH) * _SIDE + _REACH
+    before[start] = start
+    queue[0] = start
+    head, tail = 0, 1
+    best, best_m = -1, math.inf
+    while head < tail:
+        cell = queue[head]
+        head += 1
+        # what is found later is farther: it cannot be on a shorter way
+        if depth[cell] * _CELL_M >= best_m:
+            break
+        a, b, c = cell // (_SIDE * _SIDE), cell // _SIDE % _SIDE, cell % _SIDE
+        x = x0 + (a - _REACH) * _CELL_M
+        y = y0 + (b - _REACH) * _CELL_M
+        z = z0 + (c - _REACH) * _CELL_M
+        if not is_below_overhang(arena, x, y, z):
+            whole_m = depth[cell] * _CELL_M + math.hypot(x1 - x, y1 - y)
+            if whole_m < best_m:
+                best, best_m = cell, whole_m
+            continue
+        for n in range(_NEIGHBOURS.shape[0]):
+            a1, b1, c1 = a + _NEIGHBOURS[n, 0], b + _NEIGHBOURS[n, 1], c + _NEIGHBOURS[n, 2]
+            if not (0 <= a1 < _SIDE and 0 <= b1 < _SIDE and 0 <= c1 < _SIDE):
+                continue
+            following = (a1 * _SIDE + b1) * _SIDE + c1
+            if before[following] >= 0:
+                continue
+            there_x = x0 + (a1 - _REACH) * _CELL_M
+            there_y = y0 + (b1 - _REACH) * _CELL_M
+            there_z = z0 + (c1 - _REACH) * _CELL_M
+            if _is_free(arena, i, x0, y0, z0, there_x, there_y, there_z) and line_is_clear(
+                arena, x, y, z, there_x, there_y, there_z
+            ):
+                before[following] = cell
+                depth[following] = depth[cell] + 1
+                queue[tail] = following
+                tail += 1
+    if best < 0:
+        return 0
+    count = min(depth[best], places_m.shape[0])
+    cell = best
+    for k in range(depth[best] - 1, -1, -1):
+        if k < count:
+            places_m[k, 0] = x0 + (cell // (_SIDE * _SIDE) - _REACH) * _CELL_M
+            places_m[k, 1] = y0 + (cell // _SIDE % _SIDE - _REACH) * _CELL_M
+            places_m[k, 2] = z0 + (cell % _SIDE - _REACH) * _CELL_M
+        cell = before[cell]
+    return count
+
+
+@allocating_kernel
+def past_overhangs(arena, i, x0, y0, z0, x1, y1, z1, place_m):
+    """Where to fly first, where a place or a target lies below an overhang.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x0: North of the UAS [m].
+        y0: East of it [m].
+        z0: Down of it [m].
+        x1: North of its target [m].
+        y1: East of the target [m].
+        z1: Down of the target [m].
+        place_m: (3,) [m] written, unless LEG_TO_TARGET is returned.
+
+    Returns:
+        LEG_TO_TARGET: go on as if there was none; LEG_TO_PLACE: straight to the place, nothing is
+        in between; TARGET_IS_PLACE: the place is to be taken for the target.
+    """
+    places_m = np.empty((_MOST_PLACES, 3))
+    if is_below_overhang(arena, x0, y0, z0):
+        count = way_out(arena, i, x0, y0, z0, x1, y1, places_m)
+        for k in range(count - 1, -1, -1):
+            x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
+            if k == 0 or line_is_clear(arena, x0, y0, z0, x, y, z):
+                place_m[0], place_m[1], place_m[2] = x, y, z
+                return LEG_TO_PLACE
+        return LEG_TO_TARGET
+    if is_below_overhang(arena, x1, y1, z1):
+        count = way_out(arena, i, x1, y1, z1, x0, y0, places_m)
+        for k in range(count):
+            x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
+            place_m[0], place_m[1], place_m[2] = x, y, z
+            if line_is_clear(arena, x0, y0, z0, x, y, z):
+                return LEG_TO_PLACE
+        if count > 0:
+            return TARGET_IS_PLACE
+    return LEG_TO_TARGET
