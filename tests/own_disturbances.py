@@ -4,7 +4,7 @@ import math
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.disturbances import Disturbance, normal, uniform
-from uas_coverage_env.vehicle import LIFT
+from uas_coverage_env.vehicle import DEVIATIONS, LIFT
 
 
 @kernel
@@ -58,3 +58,29 @@ def _returns(arena, state, outcome, i, parameters, memory, random):
 
 
 RETURNS = Disturbance("returns", _returns)
+
+
+@kernel
+def _deviate(arena, state, outcome, i, parameters, memory, random):
+    for k in range(parameters.shape[0]):
+        outcome[i].deviation[k] += parameters[k]
+
+
+def deviating(**deviations):
+    """A vehicle that is another than is believed; by name, 0 where not named."""
+    names = [deviation.name for deviation in DEVIATIONS]
+    assert set(deviations) <= set(names)
+    return Disturbance(
+        "deviating", _deviate, tuple(float(deviations.get(name, 0.0)) for name in names)
+    )
+
+
+@kernel
+def _drain(arena, state, outcome, i, parameters, memory, random):
+    if state.step[0] == 0:
+        outcome[i].dod_lost += parameters[0]
+
+
+def drained(dod):
+    """A battery that loses a share of its capacity in the first step."""
+    return Disturbance("drained", _drain, (dod,))

@@ -18,10 +18,17 @@ from uas_coverage_env.env.settings import MissionSettings
 sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
 
 from own_actions import CLIMB_RATE
-from own_disturbances import gusts, push, weak_rotors
+from own_disturbances import deviating, drained, gusts, push, weak_rotors
 
 SEED, N_LANES, N_STEPS = 7, 2, 13
-OWN = (constant_wind(3.0, 250.0), gusts(), push(0.2, 0.0, 0.0), weak_rotors(0.05))
+OWN = (
+    constant_wind(3.0, 250.0),
+    gusts(),
+    push(0.2, 0.0, 0.0),
+    weak_rotors(0.05),
+    deviating(mass=0.05, drag=0.2, power=0.1),
+    drained(0.01),
+)
 
 
 def compare(**settings):

@@ -9,12 +9,18 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.views import Layout
 from uas_coverage_env.disturbances.act import disturb
 from uas_coverage_env.vehicle import (
+    DOD,
     N_INPUTS,
     X,
+    add_force,
+    deviates,
+    deviating_lpv_step,
+    deviating_plant_step,
     enter_air,
     leave_air,
     lpv_step,
     plant_step,
+    push,
     reseed_reference,
 )
 from uas_coverage_env.world.arena import ARENA
@@ -105,6 +111,14 @@ def write_all_inputs(arena, state, outcome):
             _write_inputs(arena, state, i, outcome)
 
 
+@kernel
+def _move_deviating(vehicle, deviation, nonlinear, x, u):
+    """Fly one step of a vehicle that is another than it is believed to be; in a call of its own."""
+    if nonlinear:
+        return deviating_plant_step(vehicle, deviation, x, u, x)
+    return deviating_lpv_step(vehicle, deviation, x, u, x)
+
+
 @inlined_kernel
 def _move(arena, state, nonlinear, disturbed, i, outcome):
     """Fly the inputs of a UAS for one step."""
@@ -114,12 +128,19 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
     vehicle = arena.vehicles[i]
     if disturbed:
         enter_air(x, event.wind_mps)
-    if nonlinear:
+    if disturbed and deviates(event.deviation):
+        voltage_V, current_A = _move_deviating(vehicle, event.deviation, nonlinear, x, u)
+    elif nonlinear:
         voltage_V, current_A = plant_step(vehicle, x, u, x)
     else:
         voltage_V, current_A = lpv_step(vehicle, x, u, x)
     if disturbed:
-        leave_air(vehicle, x, event.wind_mps, event.force_N)
+        leave_air(vehicle, x, event.wind_mps)
+        if deviates(event.deviation):
+            add_force(vehicle, event.deviation, x, event.force_N)
+        else:
+            push(vehicle, x, event.force_N)
+        x[DOD] += event.dod_lost
     event.voltage_V = voltage_V
     event.current_A = current_A
     event.energy_Wh = voltage_V * current_A * (arena.rules[0].dt_s / 3600.0)

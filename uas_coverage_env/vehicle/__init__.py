@@ -1,6 +1,6 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
-from uas_coverage_env.vehicle.air import enter_air, leave_air
+from uas_coverage_env.vehicle.air import enter_air, leave_air, push
 from uas_coverage_env.vehicle.battery import (
     battery_current_A,
     battery_segments,
@@ -9,6 +9,20 @@ from uas_coverage_env.vehicle.battery import (
 )
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE, compile_vehicle
 from uas_coverage_env.vehicle.data_sheet import DataSheet
+from uas_coverage_env.vehicle.deviation import (
+    CAPACITY,
+    DEVIATIONS,
+    DRAG,
+    MASS,
+    N_DEVIATIONS,
+    POWER,
+    RESISTANCE,
+    THRUST,
+    Deviation,
+    add_force,
+    deviates,
+    deviating_lpv_step,
+)
 from uas_coverage_env.vehicle.endurance import Endurance, endurance, flight_time_s
 from uas_coverage_env.vehicle.inner_loop import (
     acceleration_wrench,
@@ -61,26 +75,34 @@ from uas_coverage_env.vehicle.params import (
     return_threshold,
     vehicle_names,
 )
-from uas_coverage_env.vehicle.plant import plant_step
+from uas_coverage_env.vehicle.plant import deviating_plant_step, plant_step
 from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
 
 __all__ = [
+    "CAPACITY",
     "DELTA_THRUST",
+    "DEVIATIONS",
     "DOD",
+    "DRAG",
     "LIFT",
     "LIMITS",
     "LIMIT_NAMES",
+    "MASS",
+    "N_DEVIATIONS",
     "N_INPUTS",
     "N_LIMITS",
     "N_STATES",
     "PHI",
+    "POWER",
     "PSI",
+    "RESISTANCE",
     "TAU_X",
     "TAU_Y",
     "TAU_Z",
     "THETA",
+    "THRUST",
     "U_TH",
     "VEHICLE_DTYPE",
     "VX",
@@ -90,6 +112,7 @@ __all__ = [
     "WY",
     "WZ",
     "DataSheet",
+    "Deviation",
     "Endurance",
     "LinearModel",
     "MadeVehicle",
@@ -98,11 +121,15 @@ __all__ = [
     "Y",
     "Z",
     "acceleration_wrench",
+    "add_force",
     "battery_current_A",
     "battery_segments",
     "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
+    "deviates",
+    "deviating_lpv_step",
+    "deviating_plant_step",
     "dod_per_s",
     "endurance",
     "enter_air",
@@ -121,6 +148,7 @@ __all__ = [
     "open_circuit_V",
     "open_circuit_voltage",
     "plant_step",
+    "push",
     "reseed_reference",
     "return_threshold",
     "seconds_to_land",

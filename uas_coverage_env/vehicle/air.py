@@ -21,18 +21,28 @@ def enter_air(x, wind_mps):
 
 
 @inlined_kernel
-def leave_air(vehicle, x, wind_mps, force_N):
-    """Make the velocity one over ground again, after a step, and add what a force has done.
+def leave_air(vehicle, x, wind_mps):
+    """Make the velocity one over ground again, after a step.
 
     Args:
         vehicle: record of VEHICLE_DTYPE.
         x: (14,) state at the end of the step; written.
         wind_mps: (3,) NED [m/s].
-        force_N: (3,) NED [N], held over the step.
     """
     for axis in range(3):
         x[VX + axis] += wind_mps[axis]
         x[X + axis] += vehicle.dt_s * wind_mps[axis]
+
+
+@inlined_kernel
+def push(vehicle, x, force_N):
+    """Add to position and velocity, after a step, what a force has done that was held over it.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state at the end of the step; written.
+        force_N: (3,) NED [N].
+    """
     for axis in range(2):
         x[X + axis] += vehicle.horizontal_force_B[0] * force_N[axis]
         x[VX + axis] += vehicle.horizontal_force_B[1] * force_N[axis]

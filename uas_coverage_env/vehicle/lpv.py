@@ -32,7 +32,14 @@ def delta_thrust(vehicle, x, lift_N):
     dT = L + climb or descent + k_v |v_xy| + k_q |tilt beyond trim|, the norms as H_P-sided
     polygons; never below the vehicle's lower bound.
     """
-    k = vehicle.trim_rad_per_mps
+    total = static_thrust_deviation(vehicle, x, lift_N, vehicle.trim_rad_per_mps)
+    return max(total, vehicle.delta_thrust_min_N)
+
+
+@inlined_kernel
+def static_thrust_deviation(vehicle, x, lift_N, trim_rad_per_mps):
+    """`delta_thrust` without its lower bound, of a vehicle in trim at this tilt per speed."""
+    k = trim_rad_per_mps
     roll, pitch = x[PHI] - k * x[VY], x[THETA] + k * x[VX]
     speed, tilt = 0.0, 0.0
     for h in range(vehicle.faces.shape[0]):
@@ -41,12 +48,12 @@ def delta_thrust(vehicle, x, lift_N):
         tilt = max(tilt, a * roll + b * pitch)
     up = -x[VZ]
     vertical = max(vehicle.climb_N_per_mps * up, vehicle.descent_N_per_mps * up)
-    total = lift_N + vertical + vehicle.speed_N_per_mps * speed + vehicle.tilt_N_per_rad * tilt
-    return max(total, vehicle.delta_thrust_min_N)
+    return lift_N + vertical + vehicle.speed_N_per_mps * speed + vehicle.tilt_N_per_rad * tilt
 
 
 @inlined_kernel
-def _segment(vehicle, dod):
+def segment_of(vehicle, dod):
+    """Index of the piece of the discharge curve that holds at a depth of discharge."""
     for j in range(vehicle.n_segments - 1):
         if dod < vehicle.dod_end[j]:
             return j
@@ -57,7 +64,7 @@ def _segment(vehicle, dod):
 def open_circuit_V(vehicle, dod):
     """Open-circuit voltage at a depth of discharge [V]; the curve stays flat beyond its ends."""
     dod = min(max(dod, 0.0), 1.0)
-    j = _segment(vehicle, dod)
+    j = segment_of(vehicle, dod)
     return vehicle.ocv_V[j] - vehicle.ocv_slope_V[j] * dod
 
 
@@ -75,7 +82,7 @@ def lpv_step(vehicle, x, u, x_next):
         voltage_V and current_A at x, under u.
     """
     u[DELTA_THRUST] = delta_thrust(vehicle, x, u[LIFT])
-    j = _segment(vehicle, x[DOD])
+    j = segment_of(vehicle, x[DOD])
     drop = vehicle.ocv_slope_V[j] * x[DOD] + x[U_TH] - vehicle.drop_V[j]
     current = vehicle.current_A[j] + vehicle.current_A_per_V[j] * drop
     current += vehicle.current_A_per_N[j] * u[DELTA_THRUST]

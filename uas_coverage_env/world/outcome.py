@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uas_coverage_env.vehicle import N_INPUTS
+from uas_coverage_env.vehicle import N_DEVIATIONS, N_INPUTS
 from uas_coverage_env.world.commands import COMMAND_DTYPE
 
 NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY = range(6)
@@ -23,6 +23,11 @@ OUTCOME_DTYPE = np.dtype(
                 # what disturbances did over the step: velocity of the air, and another force, NED
                 ("wind_mps", "f8", (3,)),
                 ("force_N", "f8", (3,)),
+                # by how much the vehicle that flew was another than is believed: 0 as believed;
+                # places as in `vehicle.DEVIATIONS`
+                ("deviation", "f8", (N_DEVIATIONS,)),
+                # share of the capacity that the battery lost besides what the motors drew
+                ("dod_lost", "f8"),
                 ("voltage_V", "f8"),
                 ("current_A", "f8"),
                 ("energy_Wh", "f8"),
