@@ -189,8 +189,12 @@ def scenario_fields() -> str:
         if reference:
             title = f"`[[{name}]]`" if "items" in entry else f"`[{name}]`"
             tables.append((title, schema["$defs"][reference]))
-    schedule = schema["$defs"]["ScheduledVelocity"]
-    tables.append(("`[[moving_obstacles.schedule]]`", schedule))
+    nested = {
+        "`[[moving_obstacles.schedule]]`": "ScheduledVelocity",
+        "`[[wind.gusts]]`": "Gust",
+        "`[wind.random_gusts]`": "RandomGusts",
+    }
+    tables += [(title, schema["$defs"][model]) for title, model in nested.items()]
     parts = []
     for title, part in tables:
         rows = [

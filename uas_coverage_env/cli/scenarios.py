@@ -94,7 +94,15 @@ def _disturbances(scenario: Scenario) -> list[str]:
     lines = [name for name, _ in scenario.disturbances]
     if wind is not None:
         up = f", {wind.up_mps:g} m/s upward" if wind.up_mps else ""
-        lines.insert(0, f"wind of {wind.mean_mps:g} m/s from {wind.from_deg:g} degrees{up}")
+        unsteady = [
+            *(["turbulence"] if wind.turbulence and wind.mean_mps else []),
+            *(["gusts"] if wind.gusts or wind.random_gusts else []),
+        ]
+        more = f", with {' and '.join(unsteady)}" if unsteady else ""
+        lines.insert(0, f"wind of {wind.mean_mps:g} m/s from {wind.from_deg:g} degrees{up}{more}")
+    if scenario.uncertainty is not None:
+        bounds = [f"{name} {bound:.0%}" for name, bound in scenario.uncertainty if bound]
+        lines.append(f"vehicles other than believed: {', '.join(bounds) or 'by nothing'}")
     return lines
 
 

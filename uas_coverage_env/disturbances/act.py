@@ -135,6 +135,7 @@ def clear(event):
         event.force_N[axis] = 0.0
     for k in range(N_DEVIATIONS):
         event.deviation[k] = 0.0
+    event.rotor_power = False
     event.dod_lost = 0.0
 
 

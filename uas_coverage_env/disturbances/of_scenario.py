@@ -1,7 +1,12 @@
 """The disturbances that a scenario asks for."""
 
-from uas_coverage_env.disturbances.wind import constant_wind
-from uas_coverage_env.scenario import Scenario
+from collections.abc import Iterator
+
+from uas_coverage_env.disturbances.gusts import discrete_gusts, random_gusts
+from uas_coverage_env.disturbances.turbulence import turbulence
+from uas_coverage_env.disturbances.uncertainty import uncertainty
+from uas_coverage_env.disturbances.wind import mean_wind
+from uas_coverage_env.scenario import Scenario, Uncertainty, Wind
 from uas_coverage_env.world.disturbance import Disturbance, checked_disturbances
 
 
@@ -11,8 +16,23 @@ def disturbances_of(scenario: Scenario) -> tuple[Disturbance, ...]:
     Raises:
         ValueError: The table of another package makes no disturbance, or two have one name.
     """
-    found = [table.disturbance() for _, table in scenario.disturbances]
-    wind = scenario.wind
-    if wind is not None and (wind.mean_mps != 0.0 or wind.up_mps != 0.0):
-        found.insert(0, constant_wind(wind.mean_mps, wind.from_deg, wind.up_mps))
+    found: list[Disturbance] = []
+    if scenario.wind is not None:
+        found += _of_wind(scenario.wind)
+    if scenario.uncertainty is not None and scenario.uncertainty != Uncertainty():
+        found.append(uncertainty(scenario.uncertainty))
+    found += [table.disturbance() for _, table in scenario.disturbances]
     return checked_disturbances(found)
+
+
+def _of_wind(wind: Wind) -> Iterator[Disturbance]:
+    """The mean comes first: turbulence is flown through with the airspeed in it."""
+    unsteady = bool((wind.turbulence and wind.mean_mps) or wind.gusts or wind.random_gusts)
+    if wind.mean_mps or wind.up_mps or (unsteady and wind.power == "rotor"):
+        yield mean_wind(wind)
+    if wind.turbulence and wind.mean_mps:
+        yield turbulence(wind)
+    if wind.gusts:
+        yield discrete_gusts(wind)
+    if wind.random_gusts is not None:
+        yield random_gusts(wind)

@@ -1,4 +1,4 @@
-"""Wind that is the same everywhere and at all times.
+"""Mean wind, the same at all times, and over height constant or by a profile.
 
 What it does follows from the vehicle: it flies in moving air, with the drag, the trim tilt and the
 power of its velocity relative to the air (see `vehicle.air`).
@@ -6,14 +6,56 @@ power of its velocity relative to the air (see `vehicle.air`).
 
 import math
 
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, interpreted, kernel
+from uas_coverage_env.scenario.air import Wind
+from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world.disturbance import Disturbance
+
+LOWEST_M = 1.0
+"""Below, the wind of a profile is that of this height [m]."""
+
+CONSTANT, LOGARITHMIC, POWER_LAW = range(3)
+
+
+@kernel
+def profile_share(law, value, reference_m, height_m):
+    """Mean wind at a height, as a share of that at the reference height.
+
+    Args:
+        law: CONSTANT, LOGARITHMIC or POWER_LAW.
+        value: Roughness length [m], or exponent.
+        reference_m: [m] above ground.
+        height_m: [m] above ground.
+    """
+    height_m = max(height_m, LOWEST_M)
+    if law == LOGARITHMIC:
+        return math.log(height_m / value) / math.log(reference_m / value)
+    if law == POWER_LAW:
+        return (height_m / reference_m) ** value
+    return 1.0
+
+
+@inlined_kernel
+def _blow_by_profile(state, outcome, i, parameters):
+    event = outcome[i]
+    share = profile_share(parameters[3], parameters[4], parameters[5], -state.x[i, Z])
+    for axis in range(2):
+        event.wind_mps[axis] += share * parameters[axis]
+    event.wind_mps[2] += parameters[2]
+    event.rotor_power = parameters[6] != 0.0
 
 
 @kernel
 def blow(arena, state, outcome, i, parameters, memory, random):
-    """Add the wind; parameters: its velocity, NED [m/s]."""
+    """Add the wind.
+
+    Parameters: its velocity, NED [m/s]; where there are more, those of `profile_share`, and whether
+    the LPV model takes its power from the rotor model.
+    """
     event = outcome[i]
+    if parameters.shape[0] > 3:
+        _blow_by_profile(state, outcome, i, parameters)
+        return
     for axis in range(3):
         event.wind_mps[axis] += parameters[axis]
 
@@ -36,3 +78,27 @@ def wind_velocity_mps(
 def constant_wind(mean_mps: float, from_deg: float, up_mps: float = 0.0) -> Disturbance:
     """Constant wind; arguments as for `wind_velocity_mps`, and as in the table `[wind]`."""
     return Disturbance("wind", blow, wind_velocity_mps(mean_mps, from_deg, up_mps))
+
+
+def mean_wind(wind: Wind) -> Disturbance:
+    """The mean of the wind of a scenario."""
+    law, value = _profile(wind)
+    plain = constant_wind(wind.mean_mps, wind.from_deg, wind.up_mps)
+    if law == CONSTANT and wind.power == "fitted":
+        return plain
+    more = (float(law), value, wind.reference_height_m, float(wind.power == "rotor"))
+    return Disturbance("wind", blow, (*plain.parameters, *more))
+
+
+def mean_wind_mps(wind: Wind, height_m: float) -> float:
+    """Horizontal speed of the mean wind at a height above ground [m/s]."""
+    share = interpreted(profile_share)(*_profile(wind), wind.reference_height_m, height_m)
+    return wind.mean_mps * share
+
+
+def _profile(wind: Wind) -> tuple[int, float]:
+    if wind.roughness_m is not None:
+        return LOGARITHMIC, wind.roughness_m
+    if wind.exponent is not None:
+        return POWER_LAW, wind.exponent
+    return CONSTANT, 0.0

@@ -159,8 +159,8 @@ def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
     notes = []
     if scenario.moving_obstacles:
         notes.append("files of legs carry no time: moving obstacles are not avoided")
-    if scenario.wind is not None or scenario.disturbances:
-        notes.append("the report holds for still air")
+    if scenario.wind is not None or scenario.uncertainty is not None or scenario.disturbances:
+        notes.append("the report holds for still air, and for the vehicles as their files say")
     for one in exports:
         lost = one.point_of_no_return
         if lost is not None:

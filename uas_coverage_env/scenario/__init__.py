@@ -1,5 +1,6 @@
 """What a mission is: scenarios from files, from code and from a seed, checked at the door."""
 
+from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.checks import warnings
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.family import (
@@ -17,10 +18,10 @@ from uas_coverage_env.scenario.fields import (
     ScheduledVelocity,
     Uas,
     Waypoint,
-    Wind,
 )
 from uas_coverage_env.scenario.flood_village import flood_village
 from uas_coverage_env.scenario.generator import generate_scenario
+from uas_coverage_env.scenario.levels import LEVELS, Level, with_disturbances
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.source import (
@@ -30,24 +31,30 @@ from uas_coverage_env.scenario.source import (
     ScenarioLike,
     loaded_scenario,
 )
+from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 __all__ = [
     "FAMILIES",
+    "LEVELS",
     "SERIES",
     "Decoration",
     "DisturbanceTable",
     "GeneratedScenarios",
     "Geofence",
+    "Gust",
+    "Level",
     "MissionSource",
     "MovingObstacle",
     "Obstacle",
     "Place",
+    "RandomGusts",
     "Room",
     "Scenario",
     "ScenarioGenerator",
     "ScenarioLike",
     "ScheduledVelocity",
     "Uas",
+    "Uncertainty",
     "Waypoint",
     "Wind",
     "flood_village",
@@ -57,4 +64,5 @@ __all__ = [
     "sample_scenario",
     "scenario_names",
     "warnings",
+    "with_disturbances",
 ]

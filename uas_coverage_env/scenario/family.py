@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from uas_coverage_env.scenario.flood_village import FLOOD_VILLAGE, flood_village
 from uas_coverage_env.scenario.generator import generate_scenario
+from uas_coverage_env.scenario.levels import LEVELS, check_level
 from uas_coverage_env.scenario.model import Scenario
 
 Range = tuple[int, int]
@@ -28,6 +30,7 @@ def sample_scenario(
     n_waypoints: Range = N_WAYPOINTS,
     n_obstacles: Range = N_OBSTACLES,
     min_height_m: float = MIN_HEIGHT_M,
+    disturbances: str | None = None,
 ) -> Scenario:
     """The generated scenario of a seed, with counts that the seed draws.
 
@@ -37,6 +40,7 @@ def sample_scenario(
         n_waypoints: Least and most.
         n_obstacles: Least and most.
         min_height_m: See `generate_scenario`.
+        disturbances: Likewise.
 
     Raises:
         ValueError: See `generate_scenario`.
@@ -51,6 +55,7 @@ def sample_scenario(
         n_waypoints=waypoints,
         n_obstacles=obstacles,
         min_height_m=min_height_m,
+        disturbances=disturbances,
     )
 
 
@@ -66,17 +71,20 @@ class GeneratedScenarios:
         n_waypoints: Least and most.
         n_obstacles: Least and most.
         min_height_m: See `generate_scenario`.
+        disturbances: Likewise; turbulence, gusts and vehicles are drawn in every mission.
 
     Raises:
-        ValueError: A range is not two whole numbers, the least first.
+        ValueError: A range is not two whole numbers, the least first, or there is no such level.
     """
 
     n_uas: Range = N_UAS
     n_waypoints: Range = N_WAYPOINTS
     n_obstacles: Range = N_OBSTACLES
     min_height_m: float = MIN_HEIGHT_M
+    disturbances: str | None = None
 
     def __post_init__(self) -> None:
+        check_level(self.disturbances)
         for name in ("n_uas", "n_waypoints", "n_obstacles"):
             given = getattr(self, name)
             pair = isinstance(given, tuple | list) and len(given) == 2
@@ -90,11 +98,15 @@ class GeneratedScenarios:
         return sample_scenario(seed, **vars(self))
 
 
-FAMILIES: Mapping[str, GeneratedScenarios] = {"generated": GeneratedScenarios()}
+FAMILIES: Mapping[str, GeneratedScenarios] = {
+    "generated": GeneratedScenarios(),
+    **{f"generated-{level}": GeneratedScenarios(disturbances=level) for level in LEVELS},
+}
 """The families that are known by name."""
 
 SERIES: Mapping[str, Callable[[int], Scenario]] = {
     "generated": sample_scenario,
+    **{f"generated-{level}": partial(sample_scenario, disturbances=level) for level in LEVELS},
     FLOOD_VILLAGE: flood_village,
 }
 """Scenarios that are known by a name and a seed: name -> the scenario of a seed."""

@@ -23,7 +23,9 @@ from pydantic import (
 
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.scenario.air import Wind
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
+from uas_coverage_env.scenario.uncertainty import Uncertainty
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
 
 _NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
@@ -231,21 +233,6 @@ class Decoration(StrictModel):
     polygon_m: Outline_m
 
 
-class Wind(StrictModel):
-    """Wind, constant in space and time and unknown to planners.
-
-    Attributes:
-        mean_mps: Horizontal speed of the air [m/s].
-        from_deg: Where it comes from, clockwise from north [degrees]: 270 is a west wind, which
-            blows towards the east.
-        up_mps: Vertical speed of the air, positive upward [m/s].
-    """
-
-    mean_mps: Annotated[float, Field(ge=0.0, le=60.0)]
-    from_deg: Annotated[float, Field(ge=0.0, le=360.0)]
-    up_mps: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
-
-
 class Place(StrictModel):
     """Where the origin of the local metres lies on the Earth (WGS 84); nothing in flight uses it.
 
@@ -282,13 +269,16 @@ class UncheckedScenario(StrictModel):
     decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
     place: Place | None = None
     wind: Wind | None = None
+    uncertainty: Uncertainty | None = None
     disturbances: DisturbanceTables = ()
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
-        for name in ("place", "min_height_m", "from_ground", "wind", "disturbances"):
+        for name in (
+            *("place", "min_height_m", "from_ground", "wind", "uncertainty", "disturbances"),
+        ):
             if not getattr(self, name):
                 data.pop(name, None)
         return data

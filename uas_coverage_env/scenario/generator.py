@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.scenario.endurance import back_and_forth
 from uas_coverage_env.scenario.fields import Geofence, Obstacle, Uas, Waypoint
+from uas_coverage_env.scenario.levels import check_level, with_disturbances
 from uas_coverage_env.scenario.model import Scenario
 
 _VEHICLE = "s500_v2"
@@ -105,6 +106,7 @@ def generate_scenario(
     size_m: float | None = None,
     *,
     min_height_m: float = 0.0,
+    disturbances: str | None = None,
 ) -> Scenario:
     """A town that can always be flown; the same arguments give the same scenario.
 
@@ -117,6 +119,8 @@ def generate_scenario(
             of 68 m, or the blocks at one per 55 m x 55 m.
         min_height_m: Least height above ground and roofs but for take-off and landing, at most 10
             [m]. The town is the same whatever it is; waypoints that are too low for it are lifted.
+        disturbances: Level of wind and of wrong models, light, moderate or strong (see `LEVELS`);
+            None: still air and the vehicles as believed. The town is the same in all of them.
 
     Raises:
         ValueError: An argument is wrong, or no such scenario can be flown; the line names the
@@ -129,6 +133,7 @@ def generate_scenario(
     if size_m is not None:
         _check_size(size_m)
     _check_height(min_height_m)
+    check_level(disturbances)
     town = _town(n_uas, n_waypoints, n_obstacles, size_m)
     name = f"town-s{seed}-u{n_uas}-w{n_waypoints}-o{n_obstacles}"
     if size_m is not None:
@@ -158,7 +163,8 @@ def generate_scenario(
         if plan.complete:
             # three times what back and forth takes: room for planners that turn back early
             steps = 100 + math.ceil(3.0 * plan.makespan_s / draft.dt_s)
-            return draft.model_copy(update={"max_steps": steps})
+            flown = draft.model_copy(update={"max_steps": steps})
+            return with_disturbances(flown, disturbances, seed)
     raise ValueError(
         f"n_waypoints is {n_waypoints}, more than the batteries of n_uas = {n_uas} can cover"
         f"{'' if size_m is None else f' in size_m = {size_m:g}'}; take more UAS, fewer waypoints"

@@ -37,6 +37,8 @@ class Scenario(UncheckedScenario):
         decorations: Drawn only.
         place: Where on the Earth it is; without it, nowhere in particular.
         wind: Wind; without it, the air is still.
+        uncertainty: By how much the vehicles that fly may differ from their files; without it,
+            they are as planners believe.
         disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
             are those of the package that installed NAME.
     """

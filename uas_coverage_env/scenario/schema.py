@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
@@ -15,13 +16,13 @@ from uas_coverage_env.scenario.fields import (
     ScheduledVelocity,
     Uas,
     Waypoint,
-    Wind,
 )
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 _TABLES = (
     *(Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
-    *(Place, Wind),
+    *(Place, Wind, Gust, RandomGusts, Uncertainty),
 )
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 

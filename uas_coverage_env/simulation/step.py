@@ -112,11 +112,11 @@ def write_all_inputs(arena, state, outcome):
 
 
 @kernel
-def _move_deviating(vehicle, deviation, nonlinear, x, u):
+def _move_deviating(vehicle, event, nonlinear, x, u):
     """Fly one step of a vehicle that is another than it is believed to be; in a call of its own."""
     if nonlinear:
-        return deviating_plant_step(vehicle, deviation, x, u, x)
-    return deviating_lpv_step(vehicle, deviation, x, u, x)
+        return deviating_plant_step(vehicle, event.deviation, x, u, x)
+    return deviating_lpv_step(vehicle, event.deviation, event.rotor_power, x, u, x)
 
 
 @inlined_kernel
@@ -128,8 +128,8 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
     vehicle = arena.vehicles[i]
     if disturbed:
         enter_air(x, event.wind_mps)
-    if disturbed and deviates(event.deviation):
-        voltage_V, current_A = _move_deviating(vehicle, event.deviation, nonlinear, x, u)
+    if disturbed and (event.rotor_power or deviates(event.deviation)):
+        voltage_V, current_A = _move_deviating(vehicle, event, nonlinear, x, u)
     elif nonlinear:
         voltage_V, current_A = plant_step(vehicle, x, u, x)
     else:

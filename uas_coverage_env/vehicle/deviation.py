@@ -34,6 +34,7 @@ from uas_coverage_env.vehicle.layout import (
     Z,
 )
 from uas_coverage_env.vehicle.lpv import segment_of, static_thrust_deviation
+from uas_coverage_env.vehicle.thrust_correction import static_thrust_in_flow
 
 _current = kernel(battery_current_A)
 
@@ -77,7 +78,7 @@ def deviates(deviation):
 
 
 @inlined_kernel
-def deviating_lpv_step(vehicle, deviation, x, u, x_next):
+def deviating_lpv_step(vehicle, deviation, rotor_power, x, u, x_next):
     """`lpv_step` of the true vehicle: the LPV model that its own file would give, but for hover.
 
     It is linearised where the true vehicle hovers: a tilt accelerates it as it does any other.
@@ -86,6 +87,7 @@ def deviating_lpv_step(vehicle, deviation, x, u, x_next):
     Args:
         vehicle: record of VEHICLE_DTYPE, the believed one.
         deviation: (N_DEVIATIONS,).
+        rotor_power: Whether the power of level flight is at least that of the rotor model.
         x: (14,) state.
         u: (5,) lift and torques that were asked for; dT is computed.
         x_next: (14,) written; may be x itself.
@@ -93,7 +95,7 @@ def deviating_lpv_step(vehicle, deviation, x, u, x_next):
     Returns:
         voltage_V and current_A at x, under u.
     """
-    u[DELTA_THRUST] = _static_thrust(vehicle, deviation, x, u[LIFT])
+    u[DELTA_THRUST] = _static_thrust(vehicle, deviation, rotor_power, x, u[LIFT])
     more_resistance = 1.0 + deviation[RESISTANCE]
     more_power = 1.0 + deviation[POWER]
     resistance_0 = more_resistance * vehicle.resistance_0_ohm
@@ -123,16 +125,26 @@ def deviating_lpv_step(vehicle, deviation, x, u, x_next):
 
 
 @inlined_kernel
-def _static_thrust(vehicle, deviation, x, lift_N):
+def _static_thrust(vehicle, deviation, rotor_power, x, lift_N):
     """The thrust correction, with the trim and the thrust that the true drag needs [N].
 
-    More drag needs more tilt at a speed, and more thrust to carry the weight at this tilt.
+    More drag needs more tilt at a speed, and more thrust to carry the weight at this tilt. The fit
+    is linear in the speed and holds up to the vehicle's limit, which an airspeed may exceed: the
+    rotor model knows what that takes.
     """
     trim = vehicle.trim_rad_per_mps
     true_trim = trim * (1.0 + deviation[DRAG]) / (1.0 + deviation[MASS])
     square = x[VX] * x[VX] + x[VY] * x[VY]
-    lean = math.sqrt(1.0 + true_trim * true_trim * square) - math.sqrt(1.0 + trim * trim * square)
-    total = static_thrust_deviation(vehicle, x, lift_N, true_trim) + vehicle.weight_N * lean
+    leaning = math.sqrt(1.0 + true_trim * true_trim * square)
+    more = vehicle.weight_N * (leaning - math.sqrt(1.0 + trim * trim * square))
+    if rotor_power:
+        speed = math.sqrt(square)
+        across = speed / leaning
+        level = static_thrust_in_flow(
+            vehicle, vehicle.weight_N * leaning, across, across * true_trim * speed
+        )
+        more = max(more, level - vehicle.weight_N - vehicle.speed_N_per_mps * speed)
+    total = static_thrust_deviation(vehicle, x, lift_N, true_trim) + more
     return max(total, vehicle.delta_thrust_min_N)
 
 

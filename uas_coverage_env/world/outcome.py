@@ -26,6 +26,9 @@ OUTCOME_DTYPE = np.dtype(
                 # by how much the vehicle that flew was another than is believed: 0 as believed;
                 # places as in `vehicle.DEVIATIONS`
                 ("deviation", "f8", (N_DEVIATIONS,)),
+                # the LPV model takes the power of this step from the rotor model, where that needs
+                # more than the fit does
+                ("rotor_power", "?"),
                 # share of the capacity that the battery lost besides what the motors drew
                 ("dod_lost", "f8"),
                 ("voltage_V", "f8"),
