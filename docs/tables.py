@@ -201,7 +201,7 @@ def scenario_fields() -> str:
             (
                 f"`{name}`",
                 _type(entry),
-                "required" if name in part["required"] else "optional",
+                "required" if name in part.get("required", ()) else "optional",
                 entry["description"],
             )
             for name, entry in part["properties"].items()
@@ -216,6 +216,8 @@ def _type(entry: dict[str, Any]) -> str:
         return _type(entry["anyOf"][0])
     if "$ref" in entry:
         return "a table"
+    if "enum" in entry:
+        return " or ".join(f'`"{value}"`' for value in entry["enum"])
     if entry["type"] == "array":
         if "prefixItems" in entry:
             return f"{len(entry['prefixItems'])} numbers"

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 from practice_grounds import practice_ground
 
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.disturbances import disturbances_of
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.scenario import with_disturbances
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
 
@@ -21,8 +22,9 @@ from own_actions import CLIMB_RATE
 from own_disturbances import deviating, drained, gusts, push, weak_rotors
 
 SEED, N_LANES, N_STEPS = 7, 2, 13
+GROUND = practice_ground(n_uas=2, max_steps=6)
 OWN = (
-    constant_wind(3.0, 250.0),
+    *disturbances_of(with_disturbances(GROUND, "moderate", 1)),
     gusts(),
     push(0.2, 0.0, 0.0),
     weak_rotors(0.05),
@@ -33,10 +35,9 @@ OWN = (
 
 def compare(**settings):
     """Fly both ways past the end of missions; lanes have seeds of their own."""
-    ground = practice_ground(n_uas=2, max_steps=6)
-    missions = CudaMissions(N_LANES, ground, seed=SEED, disturbances=OWN, **settings)
+    missions = CudaMissions(N_LANES, GROUND, seed=SEED, disturbances=OWN, **settings)
     episodes = [
-        Episode(ground, MissionSettings(disturbances=OWN, **settings)) for _ in range(N_LANES)
+        Episode(GROUND, MissionSettings(disturbances=OWN, **settings)) for _ in range(N_LANES)
     ]
     flown = [0] * N_LANES
     for lane, episode in enumerate(episodes):

@@ -15,13 +15,14 @@ from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
 from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.disturbances import constant_wind, disturbances_of
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.cuda import CudaMissions
-from uas_coverage_env.scenario import Wind
+from uas_coverage_env.scenario import Wind, with_disturbances
 
-OWN = (constant_wind(3.0, 250.0), gusts(), push(0.2, 0.0, 0.0), weak_rotors(0.05))
 GROUND = practice_ground(n_uas=2, max_steps=12)
+LEVEL = disturbances_of(with_disturbances(GROUND, "moderate", 1))
+OWN = (*LEVEL, gusts(), push(0.2, 0.0, 0.0), weak_rotors(0.05))
 WINDY = GROUND.model_copy(update={"wind": Wind(mean_mps=5.0, from_deg=120.0)})
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
 
