@@ -6,16 +6,24 @@ import json
 import polars
 import pytest
 from leaderboard_rows import failed_row, row
+from small_worlds import meadow, waypoint
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     Comparison,
+    bounds_of,
     leaderboard_figure,
     published,
     scores_of,
     write,
 )
-from uas_coverage_env.leaderboard.table import NOTHING, markdown, outcome_cells, scenarios_cells
+from uas_coverage_env.leaderboard.table import (
+    NOTHING,
+    effort_cells,
+    markdown,
+    outcome_cells,
+    scenarios_cells,
+)
 
 
 def by_player(rows, reference="base"):
@@ -103,6 +111,30 @@ def test_cells_say_nothing_where_there_is_nothing_to_say():
     assert "nan" not in text
     assert r"q\|r" in text
     assert scenarios_cells(rows, ["p", "q|r", "s"])[1] == [["a", "failed", "violation", NOTHING]]
+
+
+def test_energy_is_compared_with_the_bound_where_there_is_one():
+    rows = [row("a", energy_Wh=12.0, steps=90), row("b", energy_Wh=30.0), row("c", energy_Wh=9.0)]
+    rows += [row("a", "q", accomplished=False, steps=90)]
+    scores = {one.player: one for one in scores_of(rows, "p", {("a", 90): 10.0, ("b", 100): 20.0})}
+    assert scores["p"].above_bound_percent.value == pytest.approx(35.0)
+    assert scores["p"].above_bound_percent.n == 2
+    assert scores["q"].above_bound_percent.value is None
+    headings, cells = effort_cells(list(scores.values()))
+    assert cells[0][headings.index("above the bound, %")].startswith("35.0")
+
+
+def test_accomplished_lpv_flights_have_a_bound():
+    mission = meadow(waypoints=(waypoint((190.0, 190.0, -10.0)),))
+    rows = [
+        row("meadow", steps=40),
+        row("meadow", steps=41, accomplished=False),
+        row("meadow", steps=42, dynamics="nonlinear"),
+        row("elsewhere"),
+    ]
+    bounds = bounds_of(rows, {"meadow": mission})
+    assert list(bounds) == [("meadow", 40)]
+    assert bounds["meadow", 40] > 0.0
 
 
 def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):

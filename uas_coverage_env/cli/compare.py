@@ -26,6 +26,7 @@ from uas_coverage_env.leaderboard import (
     Store,
     Sweep,
     WorkerLostError,
+    bounds_of,
     failures,
     flights_in,
     fly_all,
@@ -144,7 +145,8 @@ def compare(
         sys.stderr.write(f"error: nothing was flown: {one_line(trouble)}\n")
         raise typer.Exit(FAILED)
     how = f"{_all_or(side_by_side)} side by side"
-    comparison = Comparison.of(rows, len(entries), reference, command, how)
+    bounds = bounds_of(rows, sweep.scenarios)
+    comparison = Comparison.of(rows, len(entries), reference, command, how, bounds)
     names = write(comparison, out)
     _report(screen, comparison, out, names)
     failed = [row for row in rows if row.status != FLOWN]

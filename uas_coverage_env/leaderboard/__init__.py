@@ -1,5 +1,6 @@
 """Who is better: planners and policies on the same scenarios, flown, kept, counted, published."""
 
+from uas_coverage_env.leaderboard.bounds import Bounds, bounds_of
 from uas_coverage_env.leaderboard.machine import machine
 from uas_coverage_env.leaderboard.picture import leaderboard_figure
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec, planner_specs_of
@@ -31,6 +32,7 @@ __all__ = [
     "STORE",
     "TIMES",
     "Backend",
+    "Bounds",
     "Comparison",
     "Entry",
     "PlannerSpec",
@@ -40,6 +42,7 @@ __all__ = [
     "Store",
     "Sweep",
     "WorkerLostError",
+    "bounds_of",
     "failures",
     "flights_in",
     "fly",

@@ -7,11 +7,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
 from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
@@ -51,10 +53,16 @@ class Comparison:
 
     @classmethod
     def of(
-        cls, rows: Sequence[Row], planned: int, reference: str, command: str, jobs: str
+        cls,
+        rows: Sequence[Row],
+        planned: int,
+        reference: str,
+        command: str,
+        jobs: str,
+        bounds: Bounds = MappingProxyType({}),
     ) -> "Comparison":
         """Sum up rows, of which there is at least one."""
-        return cls(rows, planned, reference, command, jobs, scores_of(rows, reference))
+        return cls(rows, planned, reference, command, jobs, scores_of(rows, reference, bounds))
 
     def circumstances(self) -> list[str]:
         """Command, extent, machine and versions, a line each."""

@@ -3,10 +3,12 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.row import FLOWN, Row
 from uas_coverage_env.leaderboard.statistics import (
     Estimate,
@@ -43,6 +45,8 @@ class Scores:
         energy_Wh: Interquartile mean.
         Wh_per_percent: Energy per percent covered, of flights that covered something.
         steps: Interquartile mean of the makespan of accomplished flights.
+        above_bound_percent: Energy of accomplished flights beyond the least with which the mission
+            can be flown in as many steps (docs/bound.md); where that is known.
         decision_p50_ms: Median over flights of the median time of a decision.
         decision_p95_ms: Worst over flights of the 95th percentile.
         relative_energy_percent: Interquartile mean of the energy in percent of the reference's
@@ -71,6 +75,7 @@ class Scores:
     energy_Wh: Estimate
     Wh_per_percent: Estimate
     steps: Estimate
+    above_bound_percent: Estimate
     decision_p50_ms: float | None
     decision_p95_ms: float | None
     relative_energy_percent: Estimate
@@ -97,7 +102,9 @@ def drawn_anew(rows: Sequence[Row]) -> Over:
     return "seeds" if len({row.seed for row in rows}) > 1 else "scenarios"
 
 
-def scores_of(rows: Sequence[Row], reference: str) -> list[Scores]:
+def scores_of(
+    rows: Sequence[Row], reference: str, bounds: Bounds = MappingProxyType({})
+) -> list[Scores]:
     """The scores of every player, best first.
 
     More flights accomplished come first, then more coverage, then less energy.
@@ -105,6 +112,7 @@ def scores_of(rows: Sequence[Row], reference: str) -> list[Scores]:
     Args:
         rows: At least one; whatever part of the sweep has been flown.
         reference: Label of the planner that the others are compared with.
+        bounds: Least energies, as far as they are known.
     """
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
     over = drawn_anew(rows)
@@ -113,7 +121,7 @@ def scores_of(rows: Sequence[Row], reference: str) -> list[Scores]:
         for label in dict.fromkeys(row.player for row in rows)
     }
     theirs = tables.get(reference, [[] for _ in scenarios])
-    found = [_scores(label, mine, theirs, over) for label, mine in tables.items()]
+    found = [_scores(label, mine, theirs, over, bounds) for label, mine in tables.items()]
     return sorted(found, key=_place)
 
 
@@ -128,7 +136,11 @@ def _place(scores: Scores) -> tuple[Any, ...]:
 
 
 def _scores(
-    label: str, mine: Sequence[Sequence[Row]], theirs: Sequence[Sequence[Row]], over: Over
+    label: str,
+    mine: Sequence[Sequence[Row]],
+    theirs: Sequence[Sequence[Row]],
+    over: Over,
+    bounds: Bounds,
 ) -> Scores:
     rows = [row for scenario in mine for row in scenario]
     # a comparison is meant for more than these scenarios
@@ -151,6 +163,9 @@ def _scores(
         energy_Wh=estimate(_values(mine, _ranked_energy_Wh), over),
         Wh_per_percent=estimate(_values(mine, _Wh_per_percent), over),
         steps=estimate(_values(mine, lambda row: row.steps if row.accomplished else None), over),
+        above_bound_percent=estimate(
+            _values(mine, lambda row: _above_bound(row, bounds)), compared, mean
+        ),
         decision_p50_ms=_ms(np.median, [row.decision_p50_s for row in rows]),
         decision_p95_ms=_ms(np.max, [row.decision_p95_s for row in rows]),
         relative_energy_percent=_relative_energy(mine, theirs, compared),
@@ -184,6 +199,13 @@ def _values(table: Sequence[Sequence[Row]], measure: Measure) -> list[FloatArray
 
 def _ranked_energy_Wh(row: Row) -> float | None:
     return row.energy_Wh if row.ranked else None
+
+
+def _above_bound(row: Row, bounds: Bounds) -> float | None:
+    least_Wh = bounds.get((row.scenario, row.steps or 0)) if row.accomplished else None
+    if row.energy_Wh is None or not least_Wh:
+        return None
+    return _PERCENT * (row.energy_Wh / least_Wh - 1.0)
 
 
 def _Wh_per_percent(row: Row) -> float | None:

@@ -39,13 +39,14 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
 def effort_cells(scores: Sequence[Scores]) -> Cells:
     """Headings and rows: what it took."""
     headings = [
-        *("planner", "energy, Wh", "Wh per % covered", "steps"),
+        *("planner", "energy, Wh", "above the bound, %", "Wh per % covered", "steps"),
         *("decision p50, ms", "p95, ms"),
     ]
     return headings, [
         [
             one.player,
             _text(one.energy_Wh, ".2f"),
+            _text(one.above_bound_percent, ".1f"),
             _text(one.Wh_per_percent, ".3f"),
             _text(one.steps, ".1f"),
             _milliseconds(one.decision_p50_ms),
@@ -97,6 +98,8 @@ def notes(rows: Sequence[Row], reference: str) -> list[str]:
     return [
         f"Interquartile means with 95 % intervals [{over}]; no interval where the flights cannot "
         "tell. A flight with a violation has no energy, one that is not accomplished no steps.",
+        "Above the bound: mean over accomplished flights of the energy beyond the least with which "
+        "the mission can be flown in as many steps (docs/bound.md); intervals are over scenarios.",
         f"Against {reference}, intervals are over scenarios. Δ: mean paired difference where both "
         "accomplished the mission. P: probability of doing better; a flight that is not "
         "accomplished is worse than any that is.",

@@ -1,0 +1,146 @@
+"""What every triple of visits in a row costs at least: way and turn, for all pairs of neighbours.
+
+See docs/bound.md, "From visit to visit". Nodes are the waypoints, then each UAS setting off, then
+each UAS coming home.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.bound.turning import LONGEST, LONGEST_START, Turning
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_LANDING = 2  # steps: more change little
+
+
+class Places(NamedTuple):
+    """Where a mission leads, seen from above.
+
+    Attributes:
+        waypoints_m: (W, 2) [m].
+        radii_m: (W,) [m].
+        homes_m: (U, 2) [m].
+        landing_distance_m: [m].
+    """
+
+    waypoints_m: FloatArray
+    radii_m: FloatArray
+    homes_m: FloatArray
+    landing_distance_m: float
+
+
+class Legs(NamedTuple):
+    """The way between nodes: how many steps it takes at least, and where they are counted.
+
+    Attributes:
+        centre_m: (N, 2) of each node [m].
+        radius_m: (N,) [m].
+        before: (W, N) steps counted at a waypoint on the way from a node, at most LONGEST.
+        after: (W, N) steps counted at a waypoint on the way to a node.
+        start_steps: (W, U) steps counted where a UAS sets off, on the way to a waypoint.
+        landing_steps: (W, U) steps counted where it lands.
+    """
+
+    centre_m: FloatArray
+    radius_m: FloatArray
+    before: IntArray
+    after: IntArray
+    start_steps: IntArray
+    landing_steps: IntArray
+
+
+def legs_between(places: Places, reach_m: FloatArray, reach_from_rest_m: FloatArray) -> Legs:
+    """The legs of a mission.
+
+    Args:
+        places: Of the mission.
+        reach_m: (n+1,) how far so many steps lead at most.
+        reach_from_rest_m: (n+1,) the same from rest.
+    """
+    n, homes = len(places.waypoints_m), places.homes_m
+    centre_m = np.concatenate([places.waypoints_m, homes, homes])
+    landing = np.full(len(homes), places.landing_distance_m)
+    radius_m = np.concatenate([places.radii_m, np.zeros(len(homes)), landing])
+    between_m = np.linalg.norm(centre_m[:n, None] - centre_m[None], axis=2)
+    between_m = np.maximum(between_m - places.radii_m[:, None] - radius_m, 0.0)
+    starts, ends = slice(n, n + len(homes)), slice(n + len(homes), None)
+    steps = np.searchsorted(reach_m, between_m)
+    steps[:, starts] = np.searchsorted(reach_from_rest_m, between_m[:, starts])
+    before, after = steps // 2, (steps + 1) // 2
+    before[:, starts] = np.minimum(LONGEST, steps[:, starts] // 3)
+    landing_steps = np.clip(steps[:, ends] // 2, 1, _LANDING)
+    after[:, ends] = steps[:, ends] - landing_steps
+    return Legs(
+        centre_m,
+        radius_m,
+        np.minimum(before, LONGEST),
+        np.minimum(after, LONGEST),
+        np.minimum(steps[:, starts] - before[:, starts], LONGEST_START),
+        landing_steps,
+    )
+
+
+def straight_directions(legs: Legs) -> FloatArray:
+    """(W, N, 2) from each waypoint to each node, of unit length; zero where they coincide."""
+    n = len(legs.before)
+    way_m = legs.centre_m[None] - legs.centre_m[:n, None]
+    length_m = np.linalg.norm(way_m, axis=2, keepdims=True)
+    return np.divide(way_m, length_m, out=np.zeros_like(way_m), where=length_m > 1e-9)
+
+
+class Triples(NamedTuple):
+    """What a visit costs by the nodes visited before and after.
+
+    Attributes:
+        cost: (W, N, N) symmetric; infinite where the two are no such pair.
+        touched_m: (W, N, N, 2) where the waypoint's radius is touched then, from above [m].
+    """
+
+    cost: FloatArray
+    touched_m: FloatArray
+
+
+def triples(legs: Legs, turning: Turning, directions: FloatArray) -> Triples:
+    """The cost of each triple: half of either leg, the radius, the turn, and the ends of a route.
+
+    Args:
+        legs: Of the mission.
+        turning: Of the vehicle.
+        directions: (W, N, 2) unit vectors from each waypoint to each node, opposite from the
+            other end: any are valid, see docs/bound.md.
+    """
+    n, n_nodes = legs.before.shape
+    uas = (n_nodes - n) // 2
+    starts, ends = slice(n, n + uas), slice(n + uas, None)
+    waypoint = np.arange(n)[:, None, None]
+    half_m = 0.5 * np.einsum(
+        "ijx,ijx->ij", directions, legs.centre_m[None] - legs.centre_m[:n, None]
+    )
+    # directions of flight into and out of each waypoint, by the nodes before and after
+    change = -directions[:, :, None] - directions[:, None]
+    size = np.linalg.norm(change, axis=3)
+    half_angle = np.arcsin(np.clip(0.5 * size, 0.0, 1.0))
+    way_m = half_m[:, :, None] + half_m[:, None] - legs.radius_m[waypoint] * size
+    turn = turning.turn_cost(legs.before[:, :, None], legs.after[:, None], half_angle)
+    cost = turning.per_m * way_m + turn
+    whole_m = 2.0 * half_m
+    cost[:, starts] += (
+        turning.per_m * half_m[:, starts] + turning.start[legs.start_steps]
+    )[:, :, None]  # fmt: skip
+    landed = turning.landing[legs.landing_steps]
+    landed += turning.per_m * (whole_m[:, ends] - half_m[:, ends] - legs.radius_m[ends])
+    cost[:, :, ends] += landed[:, None]
+    # from the end of a route to a waypoint, and from a waypoint to its start, nothing flies
+    cost[:, ends] = cost[:, :, starts] = np.inf
+    cost[:, starts, ends] += np.where(np.eye(uas, dtype=bool), 0.0, np.inf)
+    cost[np.arange(n), :, np.arange(n)] = cost[np.arange(n), np.arange(n)] = np.inf
+    cost[:, np.arange(n), np.arange(n)] = np.inf
+    away = np.divide(change, size[..., None], out=np.zeros_like(change), where=size[..., None] > 0)
+    touched_m = legs.centre_m[:n, None, None] - legs.radius_m[waypoint][..., None] * away
+    return Triples(np.minimum(cost, cost.transpose(0, 2, 1)), touched_m)
