@@ -39,8 +39,7 @@ def random_mission(seed):
 def test_no_flight_takes_less_than_the_bound(planner, seed):
     mission = random_mission(seed)
     flight = rollout(mission, PLANNERS[planner](), seed=0)
-    if not accomplished(flight):
-        pytest.skip("not accomplished")
+    assert accomplished(flight)
     bound = bound_of(mission)
     used_Wh = float(energy_Wh(flight).sum())
     assert 0.0 < bound.energy_Wh() <= bound.energy_Wh(flight.steps) <= used_Wh
@@ -49,11 +48,11 @@ def test_no_flight_takes_less_than_the_bound(planner, seed):
 
 def test_on_one_waypoint_straight_ahead_the_bound_is_close():
     mission = plain([HOME], [(470.0, 20.0, -10.0)], radius_m=15.0)
-    flight = rollout(mission, Tour())
+    flight = rollout(mission, quick_trajectory())
     assert accomplished(flight)
     bound = MissionBound(mission)
-    assert energy_Wh(flight).sum() < 1.13 * bound.energy_Wh()
-    assert flight.steps < 1.06 * bound.steps
+    assert energy_Wh(flight).sum() < 1.09 * bound.energy_Wh()
+    assert flight.steps <= bound.steps + 2
 
 
 def test_names_and_order_do_not_matter():

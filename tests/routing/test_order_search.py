@@ -84,12 +84,12 @@ def seconds_of(task, u, route):
 def cost_of(task, seconds, left_out, total_weight):
     """What the search minimises, from everybody's seconds."""
     overtime = sum(max(s - b, 0.0) for s, b in zip(seconds, task.budget_s, strict=True))
-    left = sum(task.weight[w] for w in left_out)
+    left_s = search_module._left_out_s(task, total_weight)[list(left_out)].sum()
     return (
         max(0.0, *seconds)
         + total_weight * sum(seconds)
         + search_module._OVERTIME * overtime
-        + search_module._LEFT_OUT_S * left
+        + left_s
     )
 
 
@@ -190,9 +190,21 @@ def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
     )
     found = improve_routes(problem, empty_routes(2), SOME, seed)
     # so little overtime is cheaper than a waypoint; the guide's reserve is far more
-    slight_s = search_module._LEFT_OUT_S / search_module._OVERTIME
+    dearest_s = search_module._left_out_s(problem, SOME.total_weight).max()
+    slight_s = dearest_s / search_module._OVERTIME
     assert (found.seconds <= problem.budget_s + slight_s).all()
     assert len(found.left_out)
+
+
+def test_a_waypoint_far_from_everything_is_flown_to_as_long_as_a_battery_lasts():
+    alone = task(7, 1, 1)
+    far = replace(alone, first_s=np.full((1, 1), 200.0), home_s=np.full((1, 1), 200.0))
+    late = replace(alone, not_before_s=np.array([500.0]))
+    for problem in (far, late):
+        enough = replace(problem, budget_s=np.array([1000.0]))
+        assert not len(improve_routes(enough, empty_routes(1), SOME, 0).left_out)
+    small = replace(far, budget_s=np.array([300.0]))
+    assert len(improve_routes(small, empty_routes(1), SOME, 0).left_out)
 
 
 def test_a_uas_that_may_not_fly_gets_nothing():

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import uas_coverage_baselines.trajectory.program as program_module
 from small_fleets import FIELD, HOUSE, TOWER, field
-from small_worlds import meadow, mover
+from small_worlds import box, meadow, mover, waypoint
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
-from uas_coverage_env import rollout
+from uas_coverage_env import Scenario, rollout
 from uas_coverage_env.flight import accomplished, energy_Wh
 from uas_coverage_env.flight.metrics import home
 from uas_coverage_env.mission import MissionBrief
@@ -190,3 +190,15 @@ def test_energy_can_be_weighed_more_than_time():
     thrifty = rollout(scenario, planner(weight_energy=2.0))
     assert quick.steps <= thrifty.steps
     assert energy_Wh(thrifty).sum() <= energy_Wh(quick).sum()
+
+
+def test_a_single_waypoint_far_away_along_the_fence_is_flown_to():
+    alone = meadow(((4.0, 4.0, -1.0),), waypoints=(waypoint((196.0, 4.0, -10.0)),))
+    far = {"vertices_m": box("fence", (0.0, 0.0, -50.0), (700.0, 200.0, 0.0))["vertices_m"]}
+    wide = alone.model_dump(mode="json", by_alias=True)
+    wide["geofence"] |= far
+    wide["waypoints"][0]["position_m"] = (690.0, 4.0, -10.0)
+    flown = rollout(Scenario.model_validate(wide), planner())
+    assert accomplished(flown)
+    assert is_harmless(flown)
+    assert flown.steps < 140

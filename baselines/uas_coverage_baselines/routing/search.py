@@ -28,7 +28,7 @@ _TURN_OF_COSINE = np.interp(
     np.degrees(np.arccos(np.linspace(-1.0, 1.0, _TURN_STEPS + 1))), _TURN_DEG, _TURN_RADII
 )
 _OVERTIME = 200.0  # cost of a second beyond the budget, in seconds
-_LEFT_OUT_S = 120.0  # cost of leaving out a waypoint of weight 1
+_LEFT_OUT_S = 120.0  # cost of leaving out a waypoint of weight 1, beyond that of a visit
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,14 @@ class Routes:
         left_out: waypoints that no battery reaches.
         seconds: (U,) estimated flight time of each.
         cost_s: what the search minimises.
+        left_out_s: what is left out contributes to that.
     """
 
     routes: tuple[NDArray[np.int64], ...]
     left_out: NDArray[np.int64]
     seconds: FloatArray
     cost_s: float
+    left_out_s: float = 0.0
 
 
 def empty_routes(n_uas: int) -> Routes:
@@ -100,10 +102,11 @@ def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed:
     routes[U, lengths[U] : lengths[U] + len(missing)] = missing
     lengths[U] += len(missing)
     # missing waypoints begin as left out and go where they cost least
-    _insert_missing(_arrays(task), routes, lengths, missing, effort.total_weight)
+    arrays = _arrays(task, effort.total_weight)
+    _insert_missing(arrays, routes, lengths, missing, effort.total_weight)
     seconds = np.empty(U)
     cost = _search(
-        _arrays(task),
+        arrays,
         routes,
         lengths,
         seconds,
@@ -114,12 +117,23 @@ def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed:
         effort.total_weight,
         np.random.default_rng(seed),
     )
+    left_out = routes[U, : lengths[U]].copy()
     return Routes(
         tuple(routes[u, : lengths[u]].copy() for u in range(U)),
-        routes[U, : lengths[U]].copy(),
+        left_out,
         seconds,
         float(cost),
+        float(arrays.left_out_s[left_out].sum()),
     )
+
+
+def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
+    """(W,) what it costs to leave out each waypoint: more than for some UAS to fly there first."""
+    may_fly = task.budget_s > -np.inf
+    there_s = (task.first_s + task.home_s - task.idle_s[:, None])[may_fly]
+    visit_s = np.min(there_s, axis=0, initial=np.inf)
+    visit_s = np.where(np.isfinite(visit_s), np.maximum(visit_s, 0.0), 0.0) + task.not_before_s
+    return _LEFT_OUT_S * task.weight + (1.0 + total_weight) * visit_s
 
 
 class _Arrays(NamedTuple):
@@ -138,12 +152,12 @@ class _Arrays(NamedTuple):
     turn: FloatArray
     opens: FloatArray
     budget: FloatArray
-    weight: FloatArray
+    left_out_s: FloatArray
     neighbours: NDArray[np.int64]
     turn_of_cosine: FloatArray
 
 
-def _arrays(task: RoutingTask) -> _Arrays:
+def _arrays(task: RoutingTask, total_weight: float) -> _Arrays:
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
     return _Arrays(
         first=task.first_s,
@@ -158,7 +172,7 @@ def _arrays(task: RoutingTask) -> _Arrays:
         turn=task.turn_s,
         opens=task.not_before_s,
         budget=task.budget_s,
-        weight=task.weight,
+        left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
         turn_of_cosine=_TURN_OF_COSINE,
     )
@@ -211,7 +225,7 @@ def _route_s(task, u, route, length):
 
 @allocating_kernel
 def _cost_s(task, seconds, left_out, n_left_out, total_weight):
-    budget, weight = task.budget, task.weight
+    budget, left_out_s = task.budget, task.left_out_s
     longest, cost = 0.0, 0.0
     for u in range(len(seconds)):
         longest = max(longest, seconds[u])
@@ -219,7 +233,7 @@ def _cost_s(task, seconds, left_out, n_left_out, total_weight):
         if seconds[u] > max(budget[u], 0.0):  # a UAS that may not fly costs nothing where it stays
             cost += _OVERTIME * (seconds[u] - budget[u])
     for k in range(n_left_out):
-        cost += _LEFT_OUT_S * weight[left_out[k]]
+        cost += left_out_s[left_out[k]]
     return cost + longest
 
 

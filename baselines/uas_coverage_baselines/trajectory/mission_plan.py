@@ -28,7 +28,6 @@ from uas_coverage_baselines.trajectory.space import Body
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_LEFT_OUT_S = 120.0  # of a waypoint of weight 1, as in the order search
 _UNFLOWN_S = 1000.0
 _BATTERY = "the battery does not last"
 _BUDGETS = 3
@@ -197,6 +196,6 @@ def _flown(
             troubles[u] = why
     seconds = fleet.brief.dt_s * np.array([p.flight.steps for p in planned.values()] or [0.0])
     cost_s = float(seconds.max() + effort.total_weight * seconds.sum())
-    cost_s += _LEFT_OUT_S * sum(fleet.brief.waypoints[w].weight for w in order.left_out)
+    cost_s += order.left_out_s
     cost_s += _UNFLOWN_S * len(troubles)
     return MissionPlan(planned, order, cost_s, troubles)

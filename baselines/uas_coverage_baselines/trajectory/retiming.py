@@ -8,6 +8,7 @@ one by one. The effort is counted in programs solved.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ IntArray = NDArray[np.int64]
 _FIRST_SHARE, _LAST_SHARE = 0.12, 0.03
 _MENDABLE = 4.0
 _REPAIRS = 12
+_PATIENT = 240  # iterations: long legs beside a fence need more than usual
 
 
 class Worth(NamedTuple):
@@ -108,6 +110,9 @@ def quickest(
         budget: Programs to solve, about; the first flight is not counted.
     """
     flight = first_flight(program, terrain, uas, start, route)
+    if not np.isfinite(flight.violation):
+        program = replace(program, iterations=_PATIENT)
+        flight = first_flight(program, terrain, uas, start, route)
     if not flight.is_clear:
         return flight
     until = program.solved + budget
