@@ -1,6 +1,7 @@
 """Wind that is not constant: its profile, turbulence as in MIL-F-8785C, gusts; and its power."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from uas_coverage_env import World, load_scenario
 from uas_coverage_env.disturbances import constant_wind, disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Gust, RandomGusts, Wind
-from uas_coverage_env.vehicle import DOD, VX, VZ, X, Z
+from uas_coverage_env.vehicle import DOD, VX, VZ, X, Z, load_vehicle
+from uas_coverage_env.vehicle.derived import power_W
+from uas_coverage_env.vehicle.thrust_correction import level_flight_N
 from uas_coverage_env.world import Wrench
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
@@ -156,6 +159,27 @@ def test_the_power_of_the_rotor_model_at_airspeeds_beyond_the_limit(dynamics):
         assert currents["rotor", dynamics] == pytest.approx(exact, rel=0.08)
         if dynamics == "lpv":
             assert currents["fitted", "lpv"] < 0.9 * exact
+
+
+def test_the_page_tells_the_power_of_both_models():
+    page = (Path(__file__).parents[2] / "docs" / "wind_and_models.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("|")]
+    told = {
+        head: [float(cell) for cell in cells]
+        for head, *cells in rows
+        if cells[:1] in (["0"], ["194"])
+    }
+    s500 = load_vehicle("s500_v2")
+    for k, speed_mps in enumerate(told["airspeed, m/s"]):
+        rotor_N = level_flight_N(s500, speed_mps)
+        fitted_N = s500.thrust_correction.speed_N_per_mps * speed_mps
+        linear_W = [
+            s500.power.hover_W + s500.power.slope_W_per_N * extra_N
+            for extra_N in (fitted_N, max(fitted_N, rotor_N))
+        ]
+        expected = [power_W(s500, s500.weight_N + rotor_N), *linear_W]
+        names = ("rotor model", "LPV, fitted", 'LPV, `power = "rotor"`')
+        assert [told[name][k] for name in names] == pytest.approx(expected, abs=0.6)
 
 
 def test_the_power_of_the_fit_holds_where_it_needs_more():
