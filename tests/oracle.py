@@ -13,6 +13,7 @@ import numpy as np
 from uas_coverage_env.vehicle import linear_model
 
 FLYING, LANDED, LOST = 0, 1, 2
+ROUNDING_M = 1e-9
 
 
 def thrust_correction(vehicle, x, lift_N):
@@ -196,7 +197,7 @@ def _count_breaches(scenario, step, whole, end, results):
                 kept.append((max(math.hypot(x, y), abs(z)), both + scenario.uas_safe_distance_m))
         kept.append((-float(scenario.fence.signed_distance(end[i])), scenario.geofence.margin_m))
         results[i].too_low = too_low(scenario, i, end[i])
-        near = sum(distance < required for distance, required in kept)
+        near = sum(distance < required - ROUNDING_M for distance, required in kept)
         results[i].breaches = near + results[i].too_low
 
 
@@ -208,7 +209,10 @@ def too_low(scenario, i, position):
         return False
     # over a roof: inside of all of its faces once they are pushed up
     over_roofs = [
-        (hull.face_distances(position) < least * np.maximum(0.0, -hull.normals[:, 2])).all()
+        (
+            hull.face_distances(position)
+            < least * np.maximum(0.0, -hull.normals[:, 2]) - ROUNDING_M
+        ).all()
         for hull in scenario.hulls
     ]
-    return bool(-position[2] < least or any(over_roofs))
+    return bool(-position[2] < least - ROUNDING_M or any(over_roofs))

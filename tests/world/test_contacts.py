@@ -127,6 +127,17 @@ def test_nearer_to_the_fence_than_its_margin_is_a_breach():
     assert contacts(outcome) == ["none"]
 
 
+def test_held_exactly_at_the_margin_is_no_breach_whatever_the_last_digit_is():
+    world = World(meadow([(100.0, 100.0, -10.0)]))
+    margin_m = world.scenario.geofence.margin_m
+    for within_m, breaches in ((1e-10, 0), (1e-8, 1)):
+        world.reset()
+        world.state.x[0, 2] = -margin_m + within_m
+        outcome = world.step(hover(world))
+        assert outcome["fence_clearance_m"][0] < margin_m
+        assert outcome["breaches"][0] == breaches
+
+
 def test_the_clearance_is_exact_however_far_the_obstacles_are():
     hut = box("hut", (150.0, 150.0, -4.0), (154.0, 160.0, 0.0))
     world = World(meadow([(10.0, 20.0, -2.0)], obstacles=[hut]))

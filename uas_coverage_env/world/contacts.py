@@ -20,7 +20,15 @@ from uas_coverage_env.world.broad_phase import (
     write_meetings,
 )
 from uas_coverage_env.world.height import is_too_low
-from uas_coverage_env.world.outcome import BATTERY, FENCE, MOVING_OBSTACLE, NONE, OBSTACLE, UAS
+from uas_coverage_env.world.outcome import (
+    BATTERY,
+    BREACH_TOLERANCE_M,
+    FENCE,
+    MOVING_OBSTACLE,
+    NONE,
+    OBSTACLE,
+    UAS,
+)
 from uas_coverage_env.world.routes import box_apart
 from uas_coverage_env.world.state import FLYING
 
@@ -258,7 +266,7 @@ def _obstacle_breaches(arena, next_m, i, x, y, z):
             clearance = signed_distance(
                 arena.normals, arena.offsets_m, obstacle.first_face, obstacle.last_face, x, y, z
             )
-            if clearance < radius_m + obstacle.safe_distance_m:
+            if clearance < radius_m + obstacle.safe_distance_m - BREACH_TOLERANCE_M:
                 count += 1
     for m in range(arena.moving.shape[0]):
         moving = arena.moving[m]
@@ -269,7 +277,7 @@ def _obstacle_breaches(arena, next_m, i, x, y, z):
             y - next_m[m, 1],
             z - next_m[m, 2],
         )
-        if clearance < radius_m + moving.safe_distance_m:
+        if clearance < radius_m + moving.safe_distance_m - BREACH_TOLERANCE_M:
             count += 1
     return count
 
@@ -299,9 +307,9 @@ def count_breaches(arena, state, outcome):
             if j != i and state.status[j] == FLYING and outcome[j].contact == NONE:
                 other = state.x[j]
                 apart_m = outside_cylinder(0.0, 0.0, x - other[X], y - other[Y], z - other[Z])
-                if apart_m < keep_m:
+                if apart_m < keep_m - BREACH_TOLERANCE_M:
                     count += 1
-        if event.fence_clearance_m < rules.fence_margin_m:
+        if event.fence_clearance_m < rules.fence_margin_m - BREACH_TOLERANCE_M:
             count += 1
         if rules.min_height_m > 0.0 and is_too_low(arena, i, x, y, z):
             event.too_low = True

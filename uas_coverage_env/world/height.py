@@ -1,6 +1,7 @@
 """The least height above ground and roofs, and where it does not hold: near a UAS's start."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.world.outcome import BREACH_TOLERANCE_M
 from uas_coverage_env.world.routes import box_apart
 
 HEIGHT_MARGIN_M = 0.5
@@ -34,7 +35,7 @@ def _over_roof(arena, obstacle, x, y, z):
     normals = arena.normals
     for h in range(obstacle.first_face, obstacle.last_face):
         away_m = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + arena.offsets_m[h]
-        if away_m >= height_m * max(0.0, -normals[h, 2]):
+        if away_m >= height_m * max(0.0, -normals[h, 2]) - BREACH_TOLERANCE_M:
             return False
     return True
 
@@ -44,7 +45,7 @@ def is_too_low(arena, i, x, y, z):
     """Whether UAS i is below the least height at a place, outside of its landing zone."""
     if in_landing_zone(arena, i, x, y):
         return False
-    if -z < arena.rules[0].min_height_m:
+    if -z < arena.rules[0].min_height_m - BREACH_TOLERANCE_M:
         return True
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]

@@ -10,6 +10,10 @@ NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY = range(6)
 
 CONTACT_NAMES = ("none", "obstacle", "moving_obstacle", "uas", "geofence", "battery")
 
+BREACH_TOLERANCE_M = 1e-9
+"""Only what is nearer than a safe distance, or lower than the least height, by more than this is a
+breach: a UAS held exactly there is to the last digit on either side [m]."""
+
 OUTCOME_DTYPE = np.dtype(
     (
         np.record,
