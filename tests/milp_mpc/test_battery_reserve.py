@@ -17,7 +17,8 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
 )
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
-from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, WayHome
+from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -88,6 +89,31 @@ def test_the_reserve_is_no_shorter_than_the_calibrated_way_home_from_a_hover(veh
     for way_m in np.arange(50.0, 800.0, 50.0):
         allowed_s = seconds_home(vehicle, np.array([way_m, 0.0, -height_m])) + _ALLOWANCE_S
         assert allowed_s > seconds_to_land(record, way_m, 0.0, height_m, -np.inf, way_m, 0.0)
+
+
+def test_behind_a_wall_the_reserve_is_that_of_the_way_round_it():
+    corner_m, onward_s = np.array([400.0, 300.0, -20.0]), 40.0
+    problem = with_seconds_to_spare(3.0)
+    led = dataclasses.replace(problem, ways_home=(WayHome(corner_m, onward_s),))
+    x, u = flown(S500, problem.x0[0], [(0.0, 9.0, 0.0)] * 9)
+    moved = dataclasses.replace(problem, home_m=corner_m[None])
+    assert short_s(led, 0, x[-1]) == pytest.approx(short_s(moved, 0, x[-1]) + onward_s)
+    milp, v = written(led, Dynamics(), BatteryReserve())
+    built, short = milp.build(), milp.columns("reserve.a.short")
+    lower, upper = built.lower.copy(), built.upper.copy()
+    lower[v.u[0]], upper[v.u[0]] = u - 1e-9, u + 1e-9
+    least = solve(built, OPTIMAL, lower=lower, upper=upper)
+    assert least.values[short[0]] == pytest.approx(max(short_s(led, 0, x[-1]), 0.0), abs=1e-2)
+
+
+def test_a_way_home_is_written_to_a_file_and_read_back(tmp_path):
+    led = dataclasses.replace(
+        with_seconds_to_spare(3.0), ways_home=(WayHome(np.array([400.0, 300.0, -20.0]), 40.0),)
+    )
+    write_problems(tmp_path / "led.json", "a test", [led], [7])
+    (way,) = read_problems(tmp_path / "led.json")[7].ways_home
+    assert way.corner_m.tolist() == [400.0, 300.0, -20.0]
+    assert way.onward_s == 40.0
 
 
 def test_a_battery_that_suffices_whatever_is_flown_needs_no_rows():

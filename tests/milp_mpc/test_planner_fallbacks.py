@@ -95,7 +95,8 @@ def test_nobody_touches_anything_however_often_there_is_no_plan(monkeypatch, nam
 
 def test_when_plans_stop_coming_everybody_ends_in_a_hover(monkeypatch):
     decide = RoughDecisions(PATTERNS["all_after_ten"], seed=5)
-    positions, decisions, _ = flown_with(monkeypatch, load_scenario("village"), decide, 50)
+    # before they follow routes, after 30 s without progress
+    positions, decisions, _ = flown_with(monkeypatch, load_scenario("village"), decide, 36)
     assert all(decision.fallback for decision in decisions[10:])
     assert np.abs(np.diff(positions[-5:], axis=0)).max() < 0.05
     assert (np.ptp(positions[:12], axis=0).max(axis=1) > 1.0).any()

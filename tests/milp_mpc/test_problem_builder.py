@@ -5,11 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 from practice_missions import mission, obstacle, with_uas
-from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
+from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc.mode_problems import ModeProblems
+from uas_coverage_baselines.milp_mpc.model.ocp import formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, Target, Weights
 from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import return_threshold
 from uas_coverage_env.world import LANDED, Velocity
@@ -132,3 +135,68 @@ def test_the_return_rule_is_the_fences_or_that_of_the_vehicles_file(scenario, ar
         assert around.dod_return(uas.name, 2.0) == pytest.approx(by_fence)
         by_file = return_threshold(vehicle, uas.dod_max, vehicle.return_rule.distance_over_speed_s)
         assert around.dod_return(uas.name, None) == pytest.approx(by_file)
+
+
+BEHIND = [((40.0, 120.0, -6.0), 8.0)]
+WALL = obstacle((0.0, 80.0, -50.0), (150.0, 84.0, 0.0), "wall")
+
+
+def decision(scenario, ways=True):
+    """The first decision of `milp-mpc`, in transit to what it does not reach within the horizon."""
+    brief, options = MissionBrief.of(scenario), MilpMpcOptions(horizon=8)
+    by_modes = ModeProblems(brief, options, Ways(brief) if ways else None)
+    swarm = World(scenario).swarm_state()
+    hovering = by_modes.problem(swarm, None)
+    covers = np.zeros((1, 8, len(scenario.waypoints)), bool)
+    x = np.repeat(hovering.x0[:, None], 9, axis=1)
+    plan = Plan(hovering.names, x, np.zeros((1, 8, 5)), covers, 0.0, -np.inf)
+    return by_modes.problem(swarm, plan)
+
+
+def test_behind_a_wall_the_target_is_beyond_the_next_corner():
+    problem = decision(mission(BEHIND, [(40.0, 40.0, -1.0)], obstacles=[WALL]))
+    (target,) = problem.targets
+    start_m = problem.x0[0, :3]
+    assert target.position_m[0] - start_m[0] > 8 * 12.0 * 0.9
+    assert problem.ways_home == ()
+    back = mission([((40.0, 40.0, -6.0), 8.0)], [(40.0, 120.0, -1.0)], obstacles=[WALL])
+    brief = MissionBrief.of(back)
+    builder = ProblemBuilder(brief, MilpMpcOptions(horizon=8), Ways(brief))
+    there = World(back).swarm_state()
+    there.x[0, 1] = 40.0
+    seen_now = builder.problem(there, {"uas_1": None}, Weights(), 0.0)
+    (way,) = seen_now.ways_home
+    assert 150.0 < way.corner_m[0] < 160.0
+    assert way.onward_s > 110.0 / 12.0
+    straight = ProblemBuilder(brief, MilpMpcOptions(horizon=8))
+    assert builder.seconds_home("uas_1", there.x[0, :3]) > 1.5 * straight.seconds_home(
+        "uas_1", there.x[0, :3]
+    )
+
+
+def test_the_paper_aims_straight_through_the_wall():
+    scenario = mission(BEHIND, [(40.0, 40.0, -1.0)], obstacles=[WALL])
+    problem = decision(scenario, ways=False)
+    assert problem.targets[0].position_m.tolist() == list(BEHIND[0][0])
+    assert problem.ways_home == ()
+
+
+def test_where_nothing_shades_the_target_the_program_is_the_straight_one():
+    shed = obstacle((70.0, 75.0, -12.0), (90.0, 84.0, 0.0))
+    scenario = mission([((190.0, 190.0, -6.0), 8.0)], [(20.0, 20.0, -1.0)], obstacles=[shed])
+    built, straight = (formulate(decision(scenario, ways))[0].build() for ways in (True, False))
+    for name in ("cost", "lower", "upper", "row_lower", "row_upper"):
+        assert getattr(built, name).tobytes() == getattr(straight, name).tobytes()
+
+
+def test_an_order_that_begins_behind_a_wall_leads_round_it_first():
+    scenario = mission(BEHIND, [(40.0, 40.0, -1.0)], obstacles=[WALL])
+    made = MilpMpcGuided(GuidedOptions(deterministic=True, horizon=8))
+    made.reset(MissionBrief.of(scenario), 0)
+    problem = made.problem(World(scenario).swarm_state())
+    (tour,) = problem.tours
+    turns_m = tour.led_by_m(problem.waypoints_m)
+    assert turns_m is not None
+    assert turns_m[0] - problem.x0[0, 0] > 8 * 12.0 * 0.9
+    assert made.target("uas_1") == 0
+    assert made.mode("uas_1") == "covering"

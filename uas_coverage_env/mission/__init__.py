@@ -1,19 +1,28 @@
 """What planners and learners share: the brief of a mission, and what follows from it."""
 
+from uas_coverage_env.mission.approach import Approach, carefully, with_free_aims
+from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.views import WorldView, first_sight
+from uas_coverage_env.mission.ways import Way, Ways
 
 __all__ = [
+    "Approach",
+    "Attempts",
     "Legs",
     "MissionBrief",
     "MovingObstacleBrief",
     "Range",
     "ReturnEstimate",
+    "Way",
+    "Ways",
     "WorldView",
+    "carefully",
     "find_blocked",
     "first_sight",
     "seconds_home",
+    "with_free_aims",
 ]

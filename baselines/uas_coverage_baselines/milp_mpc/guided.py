@@ -7,20 +7,21 @@ the time still to go along one's own order, and as the few waypoints that get bi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
 
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
-from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Target
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Target, TourSegment
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
-from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.world import Mode, SwarmState
+from uas_coverage_env.mission import MissionBrief, Ways, first_sight
+from uas_coverage_env.vehicle import VX, VY
+from uas_coverage_env.world import HOME, Mode, SwarmState
 
 _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is left to visit
 
@@ -71,15 +72,24 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
             seed: of the search.
         """
         super().reset(brief, seed)
-        self._builder = ProblemBuilder(brief, self.options)
+        self._builder = ProblemBuilder(brief, self.options, Ways(brief))
         decision_s = self.options.threads * self.options.time_limit_s
         self._guide = RouteGuide(brief, self._builder, TourShape(), decision_s)
         self._guide.begin(first_sight(brief), seed)
         self._returning: set[str] = set()
+        self._next: dict[str, int] = {}
 
     def mode(self, name: str) -> Mode:
         """Covering while a UAS has anything left to visit."""
         return "return" if name in self._returning else "covering"
+
+    def target(self, name: str) -> int | None:
+        """The next waypoint of its order, or home."""
+        return self._next.get(name)
+
+    def waits_for(self) -> Set[int]:
+        """Waypoints that the order postpones while moving obstacles block them."""
+        return self._guide.blocked
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """The OCP along the order of each UAS."""
@@ -89,12 +99,35 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
         early = np.full(len(index), self.options.early_s)
         problem = self._builder.seen(swarm, self._weights, index, early)
         rows = np.split(np.arange(len(index)), np.cumsum([len(a) for a in ahead])[:-1])
-        tours = tuple(
+        self._next = {
+            name: int(a[0]) if len(a) else HOME for name, a in zip(swarm.active, ahead, strict=True)
+        }
+        straight = [
             self._guide.tour(name, row) for name, row in zip(swarm.active, rows, strict=True)
+        ]
+        tours, targets = zip(
+            *(self._led_round(swarm, n, t) for n, t in zip(swarm.active, straight, strict=True)),
+            strict=True,
         )
-        targets = tuple(
-            Target(self._builder.home_m[name], _HOMING_PER_M) if tour is None else None
-            for name, tour in zip(swarm.active, tours, strict=True)
-        )
-        self._returning = {n for n, t in zip(swarm.active, tours, strict=True) if t is None}
+        self._returning = {n for n, t in zip(swarm.active, straight, strict=True) if t is None}
         return replace(problem, tours=tours, targets=targets)
+
+    def _led_round(
+        self, swarm: SwarmState, name: str, tour: TourSegment | None
+    ) -> tuple[TourSegment | None, Target | None]:
+        """The tour of a UAS, or the way home of one without; by a corner where they are shaded."""
+        x = swarm.x[swarm.names.index(name)]
+        speed_mps = float(np.hypot(x[VX], x[VY]))
+        way = self._builder.way(name, self._next[name], x[:3], speed_mps)
+        aim_m = self._builder.home_m[name]
+        if way is not None:
+            aim_m = self._builder.aim_m(name, x[:3], way)
+        # at the end of the horizon alone a place within it may be reached as late as one likes
+        if tour is None or (way is not None and way.tight):
+            return None, Target(aim_m, _HOMING_PER_M)
+        if way is None:
+            return tour, None
+        aims, radius, onward = tour.aims_m.copy(), tour.radius_m.copy(), tour.onward_s.copy()
+        aims[0], radius[0] = aim_m, 0.0
+        onward[0] += way.onward_s
+        return replace(tour, aims_m=aims, radius_m=radius, onward_s=onward), None

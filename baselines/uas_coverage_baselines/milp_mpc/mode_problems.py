@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem, Target
+from uas_coverage_baselines.milp_mpc.modes import Mode as ModeOfUas
 from uas_coverage_baselines.milp_mpc.modes import (
     ModeMemory,
     Situation,
@@ -16,9 +18,9 @@ from uas_coverage_baselines.milp_mpc.modes import (
 )
 from uas_coverage_baselines.milp_mpc.options import ModeOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.vehicle import DOD, VX, VZ
-from uas_coverage_env.world import Mode, SwarmState
+from uas_coverage_env.world import HOME, Mode, SwarmState
 
 
 class ModeProblems:
@@ -27,18 +29,28 @@ class ModeProblems:
     Args:
         brief: the mission.
         options: of the planner.
+        ways: past the fixed obstacles; where None, targets are aimed at straight, as the paper's.
     """
 
-    def __init__(self, brief: MissionBrief, options: ModeOptions) -> None:
+    def __init__(self, brief: MissionBrief, options: ModeOptions, ways: Ways | None = None) -> None:
         self._options, self._weights = options, options.weights
         self._choice = TargetChoice(among_candidates=options.target_scale == "candidates")
-        self._builder = ProblemBuilder(brief, options)
+        self._builder = ProblemBuilder(brief, options, ways)
+        self.blocked: set[int] = set()
+        self._planless: dict[str, int] = {}  # the nearest open waypoint of UAS without any plan
         self._memories = {uas.name: ModeMemory() for uas in brief.uas}
         self._detour = options.return_detour if options.return_rule == "fence" else None
 
     def mode(self, name: str) -> Mode:
         """The operation mode of a UAS."""
         return self._memories[name].mode.label
+
+    def target(self, name: str) -> int | None:
+        """The waypoint or home that a UAS flies to; None while it covers what is around it."""
+        memory = self._memories[name]
+        if memory.mode is ModeOfUas.RETURN:
+            return HOME
+        return self._planless.get(name) if memory.waypoint is None else memory.waypoint
 
     def problem(self, swarm: SwarmState, plan: Plan | None) -> PlanningProblem:
         """The decision to make now.
@@ -48,16 +60,18 @@ class ModeProblems:
             plan: what is left of the last plan, beginning now.
         """
         planned = _still_planned(plan)
+        self.blocked = self._builder.blocked_waypoints(swarm)
         situations = [self._situation(swarm, name, planned.get(name)) for name in swarm.active]
         memories = update_modes(
             [self._memories[name] for name in swarm.active],
             situations,
             self._builder.waypoints_m,
             set().union(*planned.values()),
-            self._builder.blocked_waypoints(swarm),
+            self.blocked,
             self._choice,
         )
         self._memories.update(zip(swarm.active, memories, strict=True))
+        self._planless = self._nearest(swarm, situations) if plan is None else {}
         targets = self._targets(swarm, situations)
         return self._builder.problem(swarm, targets, self._weights, self._options.priority_per_s)
 
@@ -79,16 +93,42 @@ class ModeProblems:
         # within the horizon count alike, a UAS goes on covering there
         level = self._options.return_scale == "horizon"
         return {
-            name: target_of(
-                self._memories[name],
+            name: self._led_round(
+                name,
                 now,
-                self._builder.home_m[name],
-                self._builder.waypoints_m,
-                self._builder.seconds_left(name, now.dod),
-                self._builder.seconds_home(name, now.position_m),
-                self._builder.horizon_m(name) if level else 0.0,
-                self._weights,
+                target_of(
+                    self._memories[name],
+                    now,
+                    self._builder.home_m[name],
+                    self._builder.waypoints_m,
+                    self._builder.seconds_left(name, now.dod),
+                    self._builder.seconds_home(name, now.position_m),
+                    self._builder.horizon_m(name) if level else 0.0,
+                    self._weights,
+                ),
             )
+            for name, now in zip(swarm.active, situations, strict=True)
+        }
+
+    def _led_round(self, name: str, now: Situation, target: Target | None) -> Target | None:
+        """The target, or the next corner of the way there where an obstacle shades it."""
+        if target is None:
+            return None
+        to = HOME if target.waypoint is None else target.waypoint
+        speed_mps = float(np.hypot(*now.velocity_mps[:2]))
+        way = self._builder.way(name, to, now.position_m, speed_mps)
+        if way is None:
+            return target
+        return replace(target, position_m=self._builder.aim_m(name, now.position_m, way))
+
+    def _nearest(self, swarm: SwarmState, situations: Sequence[Situation]) -> dict[str, int]:
+        """The open waypoint nearest to each UAS."""
+        open_now = np.flatnonzero(swarm.uncovered)
+        if not len(open_now):
+            return {}
+        waypoints_m = self._builder.waypoints_m[open_now]
+        return {
+            name: int(open_now[np.linalg.norm(waypoints_m - now.position_m, axis=1).argmin()])
             for name, now in zip(swarm.active, situations, strict=True)
         }
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import dataclasses
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Generic, Self, TypeVar
+
+import numpy as np
 
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
-from uas_coverage_baselines.milp_mpc.fallback.return_home import ReturnHome
+from uas_coverage_baselines.milp_mpc.fallback.route_following import RouteFollower, Sent
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named, checked
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
@@ -20,8 +22,8 @@ from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.world import Command, Mode, SwarmState
+from uas_coverage_env.mission import Attempts, MissionBrief, first_sight
+from uas_coverage_env.world import HOME, Command, Mode, SwarmState
 
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
 
@@ -52,6 +54,14 @@ class MovingHorizon(ABC, Generic[Chosen]):
     def mode(self, name: str) -> Mode:
         """What a UAS is doing, for the record."""
 
+    @abstractmethod
+    def target(self, name: str) -> int | None:
+        """The waypoint that a UAS flies to, `world.HOME`, or None where it is to none of them."""
+
+    def waits_for(self) -> Set[int]:
+        """Waypoints that moving obstacles block now: who waits for them is at no standstill."""
+        return frozenset()
+
     def rehearsal(self) -> Self:
         """The same planner with time enough to compile everything."""
         return type(self)(self.options.model_copy(update={"time_limit_s": 10.0}), self._given)
@@ -65,15 +75,17 @@ class MovingHorizon(ABC, Generic[Chosen]):
         problem = rehearsal.problem(swarm)
         evasion(problem, brief.dt_s)
         last = dataclasses.replace(swarm, step=brief.max_steps)
-        rehearsal._return_home.apply(problem, last, None, ())
+        rehearsal._follower.apply(problem, last, None, ())
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission."""
         self.dt_s = brief.dt_s
         self.plan = self._backup = None
         self._round_robin = RoundRobin()
-        self._return_home = ReturnHome(brief, self.options.margin_m, self.blocks)
+        self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
+        self._attempts = Attempts(brief)
+        self._called = set[str]()  # UAS whose plans have left no charge but for the way home
         self.last_decision = None
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
@@ -81,7 +93,10 @@ class MovingHorizon(ABC, Generic[Chosen]):
         if not swarm.active:
             return {}
         began, self._returning_home = time.perf_counter(), frozenset[str]()
-        problem = self.problem(swarm)
+        wanted = self._attempts.wanted(swarm.uncovered)
+        seen = swarm if wanted is swarm.uncovered else dataclasses.replace(swarm, uncovered=wanted)
+        problem = self.problem(seen)
+        overruled = self._overruled(problem, swarm)
         found = decide(
             problem,
             self.plan,
@@ -103,9 +118,14 @@ class MovingHorizon(ABC, Generic[Chosen]):
             if backup is None or not still_holds(problem, backup, self.blocks):
                 plan = backup = evasion(problem, self.dt_s)
         renewed = () if reason or plan is None else plan.renewed
-        returning = self._return_home.apply(problem, swarm, backup, renewed)
-        if returning is not None:
-            (plan, self._returning_home), backup = returning, returning[0]
+        followed = self._follower.apply(
+            problem, swarm, backup, renewed, {name: to for name, (to, _) in overruled.items()}
+        )
+        if followed is not None:
+            plan = backup = followed.plan
+            self._returning_home = followed.home
+            reasons = [why for name, (_, why) in overruled.items() if name in followed.names]
+            reason = reason or next(iter(reasons), None)
         if plan is None or backup is None:
             return self._hover(swarm, reason)
         self.plan, self._backup = plan.advanced(), backup.advanced()
@@ -113,6 +133,29 @@ class MovingHorizon(ABC, Generic[Chosen]):
         gap = None if reason else plan.relative_gap()
         self.last_decision = Decision(paths, reason is not None, gap, reason)
         return first_inputs(plan, swarm, self._announced)
+
+    def _overruled(
+        self, problem: PlanningProblem, swarm: SwarmState
+    ) -> dict[str, tuple[Sent, Reason]]:
+        """UAS that follow a route whatever is planned: where to, and why."""
+        targets = {name: self.target(name) for name in problem.names}
+        known = {name: target for name, target in targets.items() if target is not None}
+        blocked = np.zeros(len(swarm.uncovered), np.bool_)
+        blocked[list(self.waits_for())] = True
+        self._attempts.update(swarm, known, blocked)
+        result: dict[str, tuple[Sent, Reason]] = {}
+        for uas, name in enumerate(problem.names):
+            if self._follower.has_to_return(problem, uas):
+                self._called.add(name)
+            target = HOME if name in self._called else known.get(name)
+            if target is None:
+                continue
+            hard = self._attempts.is_hard(swarm.names.index(name), target)
+            if name in self._called:
+                result[name] = Sent(HOME, careful=hard), Reason.CHARGE
+            elif hard:
+                result[name] = Sent(target, careful=True), Reason.STANDSTILL
+        return result
 
     def _effort(self) -> Effort:
         return Effort(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 from uas_coverage_baselines.milp_mpc.mode_problems import ModeProblems
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, MovingHorizonOptions
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.world import Mode, SwarmState
 
 
@@ -37,11 +37,19 @@ class MilpMpc(MovingHorizon[MilpMpcOptions]):
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
         super().reset(brief, seed)
-        self._by_modes = ModeProblems(brief, self.options)
+        self._by_modes = ModeProblems(brief, self.options, Ways(brief))
 
     def mode(self, name: str) -> Mode:
         """The operation mode."""
         return self._by_modes.mode(name)
+
+    def target(self, name: str) -> int | None:
+        """The transit target, or home in return mode."""
+        return self._by_modes.target(name)
+
+    def waits_for(self) -> Set[int]:
+        """Waypoints that are left alone while moving obstacles block them."""
+        return self._by_modes.blocked
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3, then the OCP's data."""

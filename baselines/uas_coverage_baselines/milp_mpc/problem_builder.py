@@ -11,27 +11,47 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
-from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import seconds_home
+from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
+    seconds_home,
+    seconds_onward,
+)
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.model.problem import (
     MovingHull,
     PlanningProblem,
     Target,
+    WayHome,
     Weights,
 )
 from uas_coverage_baselines.milp_mpc.options import OcpOptions
 from uas_coverage_env.geometry import inner_factor
-from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.vehicle import DOD, VehicleParams, dod_per_s, linear_model, return_threshold
-from uas_coverage_env.world import SwarmState
+from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
+from uas_coverage_env.vehicle import (
+    DOD,
+    VX,
+    VY,
+    VehicleParams,
+    dod_per_s,
+    linear_model,
+    return_threshold,
+)
+from uas_coverage_env.world import HOME, SwarmState
 
 FloatArray = NDArray[np.float64]
 
 
 class ProblemBuilder:
-    """What stays the same over a mission, and the view of it at one sample."""
+    """What stays the same over a mission, and the view of it at one sample.
 
-    def __init__(self, brief: MissionBrief, options: OcpOptions) -> None:
+    Args:
+        brief: the mission.
+        options: of the planner.
+        ways: past the fixed obstacles; where None, aims and the way home are straight, as the
+            paper's are.
+    """
+
+    def __init__(self, brief: MissionBrief, options: OcpOptions, ways: Ways | None = None) -> None:
+        self._ways = ways
         self.brief, self._options, self._form = brief, options, options.form
         self._view = WorldView(brief)
         self.dt_s = brief.dt_s
@@ -39,6 +59,7 @@ class ProblemBuilder:
         self.home_m = {uas.name: np.array(uas.start_m, float) for uas in brief.uas}
         self._vehicles = dict(zip((u.name for u in brief.uas), brief.vehicles, strict=True))
         self._uas = {uas.name: uas for uas in brief.uas}
+        self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
         self._obstacles = tuple(
             (obstacle.name, hull)
             for obstacle, hull in zip(brief.obstacles, brief.kept_hulls, strict=True)
@@ -73,7 +94,44 @@ class ProblemBuilder:
 
     def seconds_home(self, name: str, position_m: FloatArray) -> float:
         """Flight time home, with a detour and the landing, see `BatteryReserve`."""
-        return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
+        way = self._way_home(name, self.way(name, HOME, position_m))
+        if way is None:
+            return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
+        return seconds_home(self._vehicles[name], way.corner_m - position_m) + way.onward_s
+
+    def way(
+        self, name: str, target: int, position_m: FloatArray, speed_mps: float = 0.0
+    ) -> Way | None:
+        """The way round what shades a waypoint or home; None where the straight one will do.
+
+        Args:
+            name: of the UAS.
+            target: the scenario's waypoint, or `world.HOME`.
+            position_m: (3,).
+            speed_mps: of the UAS.
+        """
+        if self._ways is None:
+            return None
+        way = self._ways.to(self._row[name], target, position_m, speed_mps)
+        return way if way.shaded else None
+
+    def aim_m(self, name: str, position_m: FloatArray, way: Way) -> FloatArray:
+        """(3,) what to aim at to pass a corner: as far as a horizon goes, in its direction.
+
+        A plan that can reach its aim slows down for it, which is right at a narrow gap only.
+        """
+        if way.tight:
+            return way.aim_m
+        away_m = way.aim_m - position_m
+        farthest_m = self.horizon_s * self._vehicles[name].limits.v_xy_max_mps
+        return position_m + away_m * max(farthest_m / max(float(np.linalg.norm(away_m)), 1.0), 1.0)
+
+    def _way_home(self, name: str, way: Way | None) -> WayHome | None:
+        if way is None:
+            return None
+        down_m = float(self.home_m[name][2] - way.aim_m[2])
+        onward_s = seconds_onward(self._vehicles[name], way.onward_m, abs(down_m))
+        return WayHome(way.aim_m, onward_s)
 
     @property
     def horizon_s(self) -> float:
@@ -145,6 +203,10 @@ class ProblemBuilder:
         fixed = np.array([self.brief.obstacles[o].safe_distance_m for o in obstacles])
         moving = np.array([o.safe_distance_m for o in self.brief.moving_obstacles])
         vehicles = tuple(self._vehicles[name] for name in names)
+        ways_home = tuple(
+            self._way_home(name, self.way(name, HOME, x[:3], float(np.hypot(x[VX], x[VY]))))
+            for name, x in zip(names, x0, strict=True)
+        )
         return PlanningProblem(
             names=names,
             vehicles=vehicles,
@@ -173,6 +235,7 @@ class ProblemBuilder:
             home_m=np.array([self.home_m[name] for name in names]),
             dod_max=np.array([u.dod_max for u in uas]),
             targets=(None,) * len(names),
+            ways_home=ways_home if any(ways_home) else (),
             dt_s=self.dt_s,
             min_height_m=least_m + margin_m if least_m else 0.0,
             landing_zone_m=self.brief.landing_zone_m - margin_m,

@@ -73,6 +73,7 @@ class RouteGuide:
         self._radius_m = np.array([w.radius_m for w in brief.waypoints])
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._order: Routes | None = None
+        self.blocked: set[int] = set()
         self._waits = False  # whether blocked waypoints are waited for, once little else is left
 
     @property
@@ -152,7 +153,8 @@ class RouteGuide:
         # when a blocked waypoint opens is not known: it is left aside as long as there is other
         # work, since an order that waits has no reason to be quick with the rest
         wanted, opens = swarm.uncovered.copy(), np.zeros(len(self._weight))
-        blocked = list(self._builder.blocked_waypoints(swarm))
+        self.blocked = self._builder.blocked_waypoints(swarm)
+        blocked = list(self.blocked)
         if self._order is not None and self._order.seconds.max() < _WAIT_WHEN_LEFT_S:
             self._waits = True
         if not self._waits:

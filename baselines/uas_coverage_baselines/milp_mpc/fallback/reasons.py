@@ -20,3 +20,7 @@ class Reason(StrEnum):
     """Of all teams that hold the cheapest goes on with what it has."""
     NO_BACKUP = "no backup trajectory"
     """From no step of the plan could the UAS stop clear of everything."""
+    STANDSTILL = "no progress"
+    """There is a plan, but a UAS comes no nearer to its target: it follows a route."""
+    CHARGE = "charge for the way home"
+    """There is a plan, but what a UAS has left is what its way home takes: it flies that."""

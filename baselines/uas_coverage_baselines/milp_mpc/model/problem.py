@@ -80,6 +80,24 @@ class TourSegment:
     lead_s: float
     onward_s: FloatArray
 
+    def led_by_m(self, waypoints_m: FloatArray) -> FloatArray | None:
+        """(3,) where the way to the first waypoint turns; None where it leads straight there."""
+        straight = np.array_equal(self.aims_m[0], waypoints_m[self.waypoints[0]])
+        return None if straight else self.aims_m[0]
+
+
+@dataclass(frozen=True)
+class WayHome:
+    """The way home of a UAS whose home is shaded by an obstacle, see `mission.Ways`.
+
+    Attributes:
+        corner_m: (3,) where the way turns, or where it begins to lead over a roof.
+        onward_s: flight time home from there, as the reserve takes it.
+    """
+
+    corner_m: FloatArray
+    onward_s: float
+
 
 @dataclass(frozen=True)
 class MovingHull:
@@ -160,6 +178,7 @@ class PlanningProblem:
         landing_zone_m: its radius, around `home_m`.
         tours: (U) each UAS's own order, where it has one: it plans these waypoints only; empty
             where no UAS has one.
+        ways_home: (U) the way home where an obstacle shades it; empty where none does.
         dt_s: sampling time.
         weights: see `Weights`.
         physical_sides: H_P of what is no limit, a multiple of 4.
@@ -195,6 +214,7 @@ class PlanningProblem:
     dod_max: FloatArray
     targets: tuple[Target | None, ...]
     tours: tuple[TourSegment | None, ...] = ()
+    ways_home: tuple[WayHome | None, ...] = ()
     dt_s: float = 1.0
     min_height_m: float = 0.0
     landing_zone_m: float = 0.0
@@ -280,6 +300,7 @@ class PlanningProblem:
             dod_max=self.dod_max[row],
             targets=(self.targets[uas],),
             tours=self.tours[uas : uas + 1],
+            ways_home=self.ways_home[uas : uas + 1],
         )
 
     def torque_max_Nm(self, axis: int) -> FloatArray:

@@ -19,6 +19,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     PlanningProblem,
     Target,
     TourSegment,
+    WayHome,
     Weights,
 )
 from uas_coverage_env.geometry import ConvexPolytope
@@ -115,6 +116,10 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
             for target in problem.targets
         ],
         "tours": [None if tour is None else _tour(tour) for tour in problem.tours],
+        "ways_home": [
+            None if way is None else {"corner_m": way.corner_m.tolist(), "onward_s": way.onward_s}
+            for way in problem.ways_home
+        ],
         "weights": asdict(problem.weights),
     }
 
@@ -160,8 +165,12 @@ def _problem(
             else Target(np.array(target["position_m"], float), target["weight"], target["waypoint"])
             for target in row["targets"]
         ),
-        # files from before these were written: no tours, the default weights
+        # files from before these were written: no tours, straight ways, the default weights
         tours=tuple(None if tour is None else _read_tour(tour) for tour in row.get("tours", ())),
+        ways_home=tuple(
+            None if way is None else WayHome(np.array(way["corner_m"], float), way["onward_s"])
+            for way in row.get("ways_home", ())
+        ),
         weights=Weights(**row.get("weights", {})),
         **fields,
     )

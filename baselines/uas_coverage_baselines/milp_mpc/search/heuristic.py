@@ -69,7 +69,8 @@ def construct(
     target = problem.targets[uas]
     aim = np.full(3, np.nan) if target is None else target.position_m
     if problem.tours and (tour := problem.tours[uas]) is not None:
-        aim = tour.aims_m[-1]
+        turns_m = _turns_m(problem, uas)
+        aim = tour.aims_m[-1] if turns_m is None else turns_m
     best: dict[bytes, tuple[float, Trajectory]] = {}
     for lead_s in _LEADS_S:
         positions, visits, depth = _fly_all(
@@ -122,7 +123,10 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
     if not problem.n_waypoints:
         return np.full((1, _DEPTH), -1, np.int64)
     if problem.tours:
-        return _along(problem.tours[uas])
+        along = _along(problem.tours[uas])
+        # round a corner first: straight to the first waypoint the way is obstructed
+        led = _turns_m(problem, uas) is not None
+        return np.vstack([np.full((1, _TOUR_DEPTH), -1, np.int64), along]) if led else along
     waypoints = problem.waypoints_m
     ahead = problem.x0[uas, :3] + 1.5 * problem.x0[uas, VX : VZ + 1]
     near = np.argsort(_travel_m(waypoints - ahead), kind="stable")[: _BRANCHES[0]]
@@ -143,6 +147,12 @@ def _sequences(problem: PlanningProblem, uas: int) -> NDArray[np.int64]:
     for row, sequence in enumerate(sequences):
         padded[row, : len(sequence)] = sequence
     return padded
+
+
+def _turns_m(problem: PlanningProblem, uas: int) -> FloatArray | None:
+    """(3,) where the way to the first waypoint of a tour turns; None where it is straight."""
+    tour = problem.tours[uas] if problem.tours else None
+    return None if tour is None else tour.led_by_m(problem.waypoints_m)
 
 
 def _along(tour: TourSegment | None) -> NDArray[np.int64]:

@@ -6,7 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
-from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
+from uas_coverage_baselines.milp_mpc.model.problem import (
+    PlanningProblem,
+    Trajectories,
+    Variables,
+    WayHome,
+)
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle import (
     DELTA_THRUST,
@@ -43,6 +48,9 @@ class BatteryReserve:
     in seconds of cruising. DoD(N) is written in Delta T, which the dynamics make it a function of,
     so that the rows are the same whether the battery's states have columns or not.
 
+    Where an obstacle shades home (`WayHome`), p_home is the corner at which the way home turns, and
+    the time from there is taken off the room.
+
     It never makes the OCP infeasible: short >= 0 is bounded by what the left side exceeds the right
     one by at most, over all reachable p(N) and all Delta T within its limits, so that every point
     of the other rows has a `short` that fits. It is zero wherever it can be: a second of it costs
@@ -57,7 +65,7 @@ class BatteryReserve:
             vehicle, model = problem.vehicles[uas], problem.models[uas]
             faces, rate = _time_faces(problem, uas), _rate(problem, uas)
             start, gain = _last_dod(model, problem.x0[uas, _BATTERY], problem.horizon)
-            room = _room_s(problem, uas) - start / rate + faces @ problem.home_m[uas]
+            room = _room_s(problem, uas) - start / rate + faces @ _towards_m(problem, uas)
             thrust = vehicle.limits.delta_thrust_max_N, vehicle.limits.delta_thrust_min_N
             most = np.maximum(gain * thrust[0], gain * thrust[1]).sum() / rate
             excess = problem.reach.support(faces)[uas, -1] + most - room
@@ -99,7 +107,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
         x: (14,) the state.
         allowance: whether it still has to brake to a hover.
     """
-    way_s = float((_time_faces(problem, uas) @ (x[:3] - problem.home_m[uas])).max())
+    way_s = float((_time_faces(problem, uas) @ (x[:3] - _towards_m(problem, uas))).max())
     spent_s = float(x[DOD]) / _rate(problem, uas)
     result = spent_s + way_s - _room_s(problem, uas)
     return result if allowance else result - _ALLOWANCE_S
@@ -116,6 +124,18 @@ def seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
     return flight_seconds(MILP_RESERVE, speeds_of(vehicle), 0.0, way_m, 0.0, height_m)
 
 
+def seconds_onward(vehicle: VehicleParams, way_m: float, height_m: float) -> float:
+    """Flight time of a part of the way home that is not its end [s].
+
+    Args:
+        vehicle: that flies.
+        way_m: its horizontal length.
+        height_m: between its ends.
+    """
+    seconds = flight_seconds(MILP_RESERVE, speeds_of(vehicle), 0.0, way_m, 0.0, height_m)
+    return seconds - MILP_RESERVE.landing_s
+
+
 def _rate(problem: PlanningProblem, uas: int) -> float:
     """Depth of discharge that a second of flight takes, at the end of the way home [1/s]."""
     return dod_per_s(problem.vehicles[uas], float(problem.dod_max[uas]))
@@ -124,7 +144,19 @@ def _rate(problem: PlanningProblem, uas: int) -> float:
 def _room_s(problem: PlanningProblem, uas: int) -> float:
     """Seconds of cruising in a battery that is full, less landing and allowance."""
     full_s = float(problem.dod_max[uas]) / _rate(problem, uas)
-    return full_s - MILP_RESERVE.landing_s - _ALLOWANCE_S
+    way = _way_home(problem, uas)
+    onward_s = 0.0 if way is None else way.onward_s
+    return full_s - MILP_RESERVE.landing_s - _ALLOWANCE_S - onward_s
+
+
+def _way_home(problem: PlanningProblem, uas: int) -> WayHome | None:
+    return problem.ways_home[uas] if problem.ways_home else None
+
+
+def _towards_m(problem: PlanningProblem, uas: int) -> FloatArray:
+    """(3,) where the next leg home ends."""
+    way = _way_home(problem, uas)
+    return problem.home_m[uas] if way is None else way.corner_m
 
 
 def _time_faces(problem: PlanningProblem, uas: int) -> FloatArray:

@@ -1,15 +1,17 @@
-"""Return without a solver: flown by a UAS whose charge runs short while there is no plan.
+"""Routes flown without a solver: home on the last charge, and out of a standstill.
 
 A backup trajectory ends in a hover, which uses up the battery. Where a UAS has had no new plan and
 could soon not come home any more, it takes the way home that the world's guidance would fly (`GoTo`
 home), some steps of it and then the brakes, verified like any other backup trajectory. So at every
-later decision there is either more of the way home or the rest of this one.
+later decision there is either more of the way home or the rest of this one. The same is flown in
+place of a plan where the plan leaves no charge for the way home, and, to a waypoint or home, where
+plans have led nowhere for too long.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.autopilot import guide
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.mission import MissionBrief, seconds_home
+from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
 from uas_coverage_env.vehicle import (
     DOD,
     VX,
@@ -33,16 +35,45 @@ from uas_coverage_env.vehicle import (
     reseed_reference,
     velocity_climb_wrench,
 )
-from uas_coverage_env.world import COMMAND_DTYPE, SwarmState, build_arena
+from uas_coverage_env.world import COMMAND_DTYPE, HOME, SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
 _RESERVE_S = 30.0  # what is to be left at home, since other UAS may be in the way
 _PURSUED_S = (8.0, 4.0, 2.0, 1.0)  # how long the way home is followed before the brakes
 _LONGEST_WAY_S = 900.0
+_NEXT_STEPS = 2  # a decision later it is later by a step, and as far again away
 
 
-class ReturnHome:
-    """The guidance's ways home in a mission.
+@dataclass(frozen=True)
+class Sent:
+    """The route that a UAS is to follow.
+
+    Attributes:
+        target: waypoint of the scenario, or `world.HOME`.
+        careful: whether slowly.
+    """
+
+    target: int
+    careful: bool = False
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Backup trajectories of which some follow routes.
+
+    Attributes:
+        plan: of all UAS.
+        names: the UAS that follow routes.
+        home: those of them that fly home.
+    """
+
+    plan: Plan
+    names: frozenset[str]
+    home: frozenset[str]
+
+
+class RouteFollower:
+    """The guidance's ways in a mission.
 
     Args:
         brief: the mission.
@@ -56,11 +87,15 @@ class ReturnHome:
             obstacle.model_copy(update={"safe_distance_m": obstacle.safe_distance_m + margin_m})
             for obstacle in brief.obstacles
         ]
+        aims = with_free_aims(brief).waypoints
         fence = brief.geofence
         fence = fence.model_copy(update={"margin_m": fence.margin_m + margin_m})
         self._arena = build_arena(
-            brief.model_copy(update={"obstacles": tuple(wider), "geofence": fence}).as_scenario()
+            brief.model_copy(
+                update={"obstacles": tuple(wider), "geofence": fence, "waypoints": aims}
+            ).as_scenario()
         )
+        self._careful = carefully(self._arena)
         self._brief = brief
         self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
 
@@ -70,35 +105,53 @@ class ReturnHome:
         swarm: SwarmState,
         backup: Plan | None,
         planned: Collection[str],
-    ) -> tuple[Plan, frozenset[str]] | None:
-        """The backup trajectories, some of them replaced by ways home; None where none is.
+        sent: Mapping[str, Sent] | None = None,
+    ) -> Followed | None:
+        """The backup trajectories, some of them replaced by routes; None where none is.
 
         Args:
             problem: the decision.
             swarm: what is seen.
             backup: what is flown otherwise; None: every UAS brakes.
             planned: names of the UAS with a new plan, which sees to it itself.
-
-        Returns:
-            The backup trajectories, and the names of the UAS on their way home.
+            sent: UAS that are to follow a route whether they have a plan or not.
         """
+        sent = sent or {}
         left_s = {
             uas: self._left_at_home_s(problem, swarm, uas)
             for uas, name in enumerate(problem.names)
-            if name not in planned
+            if name not in planned and (name not in sent or sent[name].target != HOME)
         }
-        returning: list[str] = []
-        for uas in sorted(left_s, key=lambda uas: left_s[uas]):
-            if left_s[uas] >= _RESERVE_S:
-                break
+        short = sorted((s, uas) for uas, s in left_s.items() if s < _RESERVE_S)
+        # ways home before any others
+        routes = {name: route for name, route in sent.items() if route.target == HOME}
+        routes |= {problem.names[uas]: Sent(HOME) for _, uas in short}
+        routes |= {name: route for name, route in sent.items() if name not in routes}
+        followed: dict[str, int] = {}
+        for name, route in routes.items():
             for pursued_s in _PURSUED_S:
-                trial = self._replaced(problem, backup, uas, pursued_s)
+                trial = self._replaced(problem, backup, problem.names.index(name), pursued_s, route)
                 moving = prolonged(problem, trial.u.shape[1])
                 if trouble(replace(problem, moving=moving), trial, self._blocks) is None:
                     backup = trial
-                    returning.append(problem.names[uas])
+                    followed[name] = route.target
                     break
-        return None if backup is None or not returning else (backup, frozenset(returning))
+        if backup is None or not followed:
+            return None
+        home = frozenset(name for name, target in followed.items() if target == HOME)
+        return Followed(backup, frozenset(followed), home)
+
+    def has_to_return(self, problem: PlanningProblem, uas: int) -> bool:
+        """Whether a UAS has no more charge than its way home takes, with margin (`mission.Range`).
+
+        Args:
+            problem: the decision.
+            uas: row of the UAS.
+        """
+        x, most = problem.x0[uas], float(problem.dod_max[uas])
+        left_s = (most - float(x[DOD])) / dod_per_s(problem.vehicles[uas], most)
+        home_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
+        return left_s - home_s < _NEXT_STEPS * self._brief.dt_s
 
     def _left_at_home_s(self, problem: PlanningProblem, swarm: SwarmState, uas: int) -> float:
         """Flight time that battery and mission still give once it is home; -inf: never there."""
@@ -121,9 +174,14 @@ class ReturnHome:
         return min(battery_s, clock_s - int(there[0]) * rules.dt_s)
 
     def _replaced(
-        self, problem: PlanningProblem, backup: Plan | None, uas: int, pursued_s: float
+        self,
+        problem: PlanningProblem,
+        backup: Plan | None,
+        uas: int,
+        pursued_s: float,
+        route: Sent,
     ) -> Plan:
-        """The backup trajectories with that of one UAS replaced by its way home."""
+        """The backup trajectories with that of one UAS replaced by its route."""
         dt_s = self._brief.dt_s
         pursued = max(round(pursued_s / dt_s), 1)
         steps = pursued + int(np.ceil(BRAKING_S / dt_s))
@@ -131,7 +189,7 @@ class ReturnHome:
         flown = []
         for row, name in enumerate(problem.names):
             if row == uas:
-                flown.append(self._flown(problem, row, pursued, steps))
+                flown.append(self._flown(problem, row, pursued, steps, route))
                 continue
             x, u = problem.x0[row, None], np.zeros((0, 5))
             if backup is not None:
@@ -144,16 +202,24 @@ class ReturnHome:
         return Plan(problem.names, x, u, covers, 0.0, -np.inf)
 
     def _flown(
-        self, problem: PlanningProblem, uas: int, pursued: int, steps: int
+        self,
+        problem: PlanningProblem,
+        uas: int,
+        pursued: int,
+        steps: int,
+        route: Sent | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """States (steps+1, 14) and inputs (steps, 5) of the way home, then the brakes."""
+        """States (steps+1, 14) and inputs (steps, 5) of a route, then the brakes."""
         command = np.zeros(1, COMMAND_DTYPE)
         row = self._row[problem.names[uas]]
-        return _homeward(self._arena, row, problem.x0[uas], pursued, steps, command)
+        arena, target = self._arena, HOME
+        if route is not None:
+            arena, target = self._careful if route.careful else arena, route.target
+        return _pursued(arena, row, problem.x0[uas], target, pursued, steps, command)
 
 
 @allocating_kernel
-def _homeward(arena, i, start, pursued, steps, commands):
+def _pursued(arena, i, start, target, pursued, steps, commands):
     states, inputs = np.empty((steps + 1, start.shape[0])), np.zeros((steps, 5))
     x, reference = start.copy(), np.empty(2)
     vehicle, command = arena.vehicles[i], commands[0]
@@ -161,7 +227,7 @@ def _homeward(arena, i, start, pursued, steps, commands):
     states[0] = x
     for step in range(steps):
         if step < pursued:
-            guide(arena, i, x, reference, -1, True, False, command)
+            guide(arena, i, x, reference, target, True, False, command)
             command_wrench(vehicle, x, reference, command, inputs[step])
         else:
             velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[step])

@@ -1,0 +1,124 @@
+"""A wall stops nobody: aims go round it, and what plans cannot do a route does.
+
+The missions are small ones of the kind in which `milp-mpc` and `milp-mpc-guided` stood before a
+wall until their batteries were empty.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from uas_coverage_baselines.braking import brake
+from uas_coverage_baselines.milp_mpc import moving_horizon
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
+
+from uas_coverage_env.flight import load_planner
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle import DOD, compile_vehicle
+from uas_coverage_env.world import FLYING, LANDED
+
+WALLS = Path(__file__).parent / "walls"
+CHEAP = {
+    "deterministic": "true",
+    "at_once": "1",
+    "horizon": "10",
+    "time_limit_s": "0.25",
+    "threads": "1",
+}
+
+
+class Flight:
+    """A flight of one of the walls' missions, step by step."""
+
+    def __init__(self, name, planner):
+        self.scenario = load_scenario(str(WALLS / f"{name}.toml"))
+        self.world, self.planner = World(self.scenario), load_planner(planner, CHEAP)
+        self.planner.reset(MissionBrief.of(self.scenario), 0)
+        self.reasons, self.breaches = [], 0
+
+    def behind(self, *position_m):
+        """All UAS on the ground but the first, which has covered everything and is there."""
+        self.world.state.x[0, :3] = position_m
+        self.world.state.departed[0] = True
+        self.world.state.status[1:] = LANDED
+        self.world.state.uncovered[:] = False
+        return self
+
+    def until(self, over, at_most):
+        for _ in range(at_most):
+            if over(self.world.state) or self.world.done:
+                break
+            commands = self.planner.act(self.world.swarm_state())
+            self.reasons.append(self.planner.last_decision.reason)
+            outcome = self.world.step(commands)
+            assert (outcome["contact"] == 0).all()
+            self.breaches += int(outcome["breaches"].sum())
+        return self
+
+
+def covered(state):
+    return not state.uncovered.any()
+
+
+def landed(state):
+    return not (state.status == FLYING).any()
+
+
+@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
+def test_what_lies_behind_a_wall_is_covered(planner):
+    flight = Flight("wall", planner).until(covered, 45)
+    assert covered(flight.world.state)
+    assert flight.breaches == 0
+    assert Reason.STANDSTILL not in flight.reasons
+
+
+@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
+@pytest.mark.parametrize(
+    ("name", "behind_m"), [("wall", (70.0, 62.0, -10.0)), ("canyon", (70.0, 97.0, -10.0))]
+)
+def test_from_behind_walls_and_through_gaps_a_uas_comes_home(planner, name, behind_m):
+    flight = Flight(name, planner).behind(*behind_m).until(landed, 90)
+    assert landed(flight.world.state)
+    assert flight.world.state.status[0] == LANDED
+    assert flight.breaches == 0
+
+
+class Hovering:
+    """Plans, one after the other, to stay."""
+
+    def __call__(self, problem, previous, dt_s, effort, **rest):
+        flown = [
+            brake(compile_vehicle(vehicle, dt_s)[()], x, problem.horizon)
+            for vehicle, x in zip(problem.vehicles, problem.x0, strict=True)
+        ]
+        x = np.array([np.vstack([x0, x]) for x0, (x, _) in zip(problem.x0, flown, strict=True)])
+        u = np.array([inputs for _, inputs in flown])
+        covers = np.zeros((*u.shape[:2], problem.n_scenario_waypoints), bool)
+        return Plan(problem.names, x, u, covers, 0.0, -np.inf, renewed=problem.names)
+
+
+@pytest.mark.parametrize("name", ["wall", "low_wall"])
+@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
+def test_plans_that_lead_nowhere_are_overruled_by_a_route_and_counted(monkeypatch, planner, name):
+    monkeypatch.setattr(moving_horizon, "decide", Hovering())
+    flight = Flight(name, planner).until(covered, 150)
+    assert covered(flight.world.state)
+    assert flight.breaches == 0
+    assert set(flight.reasons[:30]) == {None}
+    assert Reason.STANDSTILL in flight.reasons
+
+
+def test_charge_for_the_way_home_overrules_every_plan(monkeypatch):
+    monkeypatch.setattr(moving_horizon, "decide", Hovering())
+    flight = Flight("wall", "milp-mpc-guided").behind(70.0, 62.0, -10.0)
+    flight.world.state.uncovered[:] = True
+    flight.world.state.x[0, DOD] = 0.70
+    flight.until(landed, 100)
+    assert flight.world.state.status[0] == LANDED
+    assert Reason.CHARGE in flight.reasons
+    first = flight.reasons.index(Reason.CHARGE)
+    assert set(flight.reasons[first:]) == {Reason.CHARGE}, "it is not sent out again"
+    assert 0.70 < flight.world.state.x[0, DOD] < 0.75
