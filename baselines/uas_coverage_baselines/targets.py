@@ -5,16 +5,21 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission import MissionBrief, WorldView
+from uas_coverage_env.mission import Approach, Attempts, MissionBrief, WorldView
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 
 class Targets:
-    """One target per UAS, kept until it is covered, or blocked by a moving obstacle."""
+    """One target per UAS, kept until it is covered, blocked by a moving obstacle, or given up.
+
+    A target to which a UAS comes no nearer is flown to with care, then left for later, and given up
+    in the end: see `Attempts`.
+    """
 
     def __init__(self, brief: MissionBrief) -> None:
         self._waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         self._view = WorldView(brief)
+        self._attempts, self._approach = Attempts(brief), Approach(brief)
         self._target: dict[str, int] = {}
 
     def commands(
@@ -26,10 +31,12 @@ class Targets:
             swarm: What the planner sees.
             choose: (swarm, index of the UAS, (W,) candidates) -> one of the candidates.
         """
-        if not swarm.uncovered.any():
+        wanted = self._attempts.wanted(swarm.uncovered)
+        if not wanted.any():
             return {name: GoTo(None) for name in swarm.active}
         self._view.update(swarm)
-        free = swarm.uncovered & ~self._view.blocked()
+        blocked = self._view.blocked()
+        free = wanted & ~blocked
         self._target = {
             name: target
             for name, target in self._target.items()
@@ -37,16 +44,23 @@ class Targets:
         }
         for name in swarm.active:
             if name not in self._target:
-                candidates = self._candidates(swarm, free)
+                candidates = self._candidates(wanted, free)
                 self._target[name] = choose(swarm, swarm.names.index(name), candidates)
-        return {name: GoTo(self._target[name], mode="covering") for name in swarm.active}
+        self._attempts.update(swarm, self._target, blocked)
+        return {name: self._command(swarm, name) for name in swarm.active}
 
     def nearest(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         """The candidate nearest to a UAS."""
         distances_m = np.linalg.norm(self._waypoints_m - swarm.x[uas, :3], axis=1)
         return int(np.where(candidates, distances_m, np.inf).argmin())
 
-    def _candidates(self, swarm: SwarmState, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _command(self, swarm: SwarmState, name: str) -> Command:
+        target, uas = self._target[name], swarm.names.index(name)
+        if self._attempts.is_hard(uas, target):
+            return self._approach.command(swarm, uas, target)
+        return GoTo(target, mode="covering")
+
+    def _candidates(self, wanted: NDArray[np.bool_], free: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(W,) open waypoints that are free and no UAS's target, else the next best.
 
         The last waypoints are shared: a UAS that is called home may never reach its target.
@@ -56,4 +70,4 @@ class Targets:
         for candidates in (free & unclaimed, free):
             if candidates.any():
                 return candidates
-        return swarm.uncovered
+        return wanted

@@ -12,7 +12,7 @@ from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission import Approach, MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState, Velocity
 
 LAYOUT = "uas_coverage_v0"
@@ -64,19 +64,28 @@ class VelocityRunner:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; nothing is drawn."""
         self._observer = Observer(brief)
+        self._approach = Approach(brief)
         self._stuck = StuckDetection(len(brief.uas), len(brief.waypoints), brief.dt_s)
         ranges = actions_of("velocity", brief.as_scenario()).ranges
         lowest, self._middle, highest = np.moveaxis(ranges, 2, 0)
         self._below, self._above = self._middle - lowest, highest - self._middle
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
-        """The mean action of the policy, scaled to the vehicle as the environment does."""
+        """The mean action of the policy, scaled to the vehicle as the environment does.
+
+        A waypoint that the policy has tried in vain before is flown to as guidance does.
+        """
         view = self._stuck.filter(self._observer.observe(swarm), self._observer.candidates)
         outputs = self._policy.forward(view)
         shares = np.clip(outputs, -1.0, 1.0)
         values = self._middle + shares * np.where(shares < 0.0, self._below, self._above)
+        hard = self._stuck.hard_ones
         return {
-            name: Velocity(float(north_mps), float(east_mps), float(altitude_m))
-            for name, (north_mps, east_mps, altitude_m) in zip(swarm.names, values, strict=True)
+            name: self._approach.command(swarm, i, int(hard[i]))
+            if hard[i] >= 0
+            else Velocity(float(north_mps), float(east_mps), float(altitude_m))
+            for i, (name, (north_mps, east_mps, altitude_m)) in enumerate(
+                zip(swarm.names, values, strict=True)
+            )
             if name in swarm.active
         }

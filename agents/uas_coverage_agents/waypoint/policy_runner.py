@@ -25,7 +25,7 @@ from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_p
 from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, next_to_decide
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission import Approach, Attempts, MissionBrief, WorldView, first_sight
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     HOME,
@@ -98,6 +98,7 @@ class WaypointRunner:
             moving_velocity_mps=_NOWHERE,
         )
         self._legs = legs_of(self._still)
+        self._attempts, self._approach = Attempts(brief), Approach(brief)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
@@ -119,18 +120,25 @@ class WaypointRunner:
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Keep the targets that are still good, and choose those that are missing."""
         self._decide(swarm)
-        return {name: self._command(swarm.names.index(name)) for name in swarm.active}
+        targets = {name: int(self._targets[swarm.names.index(name)]) for name in swarm.active}
+        flown_to = {name: target for name, target in targets.items() if target >= 0}
+        self._attempts.update(swarm, flown_to, self._blocked)
+        return {name: self._command(swarm, swarm.names.index(name)) for name in swarm.active}
 
-    def _command(self, i: int) -> Command:
+    def _command(self, swarm: SwarmState, i: int) -> Command:
         # a UAS called by return mode is also sent home here: the world may fly without it
         if self._returning[i] or self._targets[i] == HOME:
             return GoTo(None)
-        return GoTo(int(self._targets[i]), mode="covering")
+        target = int(self._targets[i])
+        if target >= 0 and self._attempts.is_hard(i, target):
+            return self._approach.command(swarm, i, target)
+        return GoTo(target, mode="covering")
 
     def _decide(self, swarm: SwarmState) -> None:
         """Choose a target for every UAS that needs one now."""
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
+        state.uncovered[:] = self._attempts.wanted(swarm.uncovered)
         state.returning[:] |= self._returning
         choices = self._workspace.choices
         looked_ahead = self._simulations == 0
