@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_attempts import mission
+from hard_missions import mission
 
 from uas_coverage_env.mission import Ways
 from uas_coverage_env.mission.ways import SHADED_S

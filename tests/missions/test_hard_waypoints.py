@@ -1,16 +1,10 @@
 """One hard waypoint does not take the mission down: reached with care, or left and given up."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from hard_missions import TOWER, mission
 
 from uas_coverage_env.flight import load_planner, rollout
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "mission"))
-
-from test_attempts import TOWER, mission
 
 EASY = ((60.0, 120.0, -14.0), 10.0)
 HARD = {

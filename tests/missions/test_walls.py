@@ -5,6 +5,7 @@ wall until their batteries were empty.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,8 @@ class Flight:
 
     def __init__(self, name, planner):
         self.scenario = load_scenario(str(WALLS / f"{name}.toml"))
-        self.world, self.planner = World(self.scenario), load_planner(planner, CHEAP)
+        self.world = World(self.scenario)
+        self.planner: Any = load_planner(planner, CHEAP)
         self.planner.reset(MissionBrief.of(self.scenario), 0)
         self.reasons, self.breaches = [], 0
 
