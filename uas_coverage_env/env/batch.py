@@ -38,7 +38,10 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.simulation import swarm_state
 from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
 """When a mission that has ended begins anew."""
@@ -292,23 +295,9 @@ class CoverageBatch:
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a player of this lane sees now, in arrays of their own."""
-        scenario = self.scenario_of(lane)
-        n_uas, step = len(scenario.uas), int(self.worlds.step[lane, 0])
-        time_s = step * scenario.dt_s
-        return SwarmState(
-            time_s=time_s,
-            step=step,
-            names=tuple(uas.name for uas in scenario.uas),
-            x=self.worlds.x[lane, :n_uas].copy(),
-            reference_mps=self.worlds.reference[lane, :n_uas].copy(),
-            status=self.worlds.status[lane, :n_uas].copy(),
-            departed=self.worlds.departed[lane, :n_uas].copy(),
-            returning=self.worlds.returning[lane, :n_uas].copy(),
-            uncovered=self.worlds.uncovered[lane, : len(scenario.waypoints)].copy(),
-            home_m=np.array([uas.start_m for uas in scenario.uas]),
-            moving_position_m=np.array(scenario.moving_positions(time_s)).reshape(-1, 3),
-            moving_velocity_mps=np.array(scenario.moving_velocities(time_s)).reshape(-1, 3),
-        )
+        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scenario[lane]))
+        state = STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
+        return swarm_state(self.scenario_of(lane), arena, state)
 
     def actions_of(
         self, commands: Sequence[Mapping[str, Command]], *, clip: bool = False
@@ -403,7 +392,8 @@ class CoverageBatch:
     def _compiled_rules(self) -> BatchRules:
         settings = self.settings
         kind = self.actions.kind
-        called = assistants(settings.return_mode, settings.safety_filter, goes_to=kind.goes_to)
+        goes_to = kind.goes_to or self.pool.goes_home
+        called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
         paying = paying_of(settings.reward, settings.weights)
         observing = observing_of(settings.observation)
         nonlinear = settings.dynamics == "nonlinear"

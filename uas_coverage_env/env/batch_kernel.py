@@ -47,6 +47,7 @@ from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.world import ABSENT, FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.events import begin_events
 from uas_coverage_env.world.state import STATE
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
@@ -179,10 +180,11 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     lanes.orders[lane] = FLY
     state = state_of(missions.worlds, lane, pool.arenas, s)
     copy_arrays(start_of(pool.starts, s), state)
+    arena = arena_of(pool.arenas, s)
     begin_random(
-        arena_of(pool.arenas, s).disturbances, state.disturbance_random, lanes.seed[lane],
-        lanes.mission[lane],
-    )  # fmt: skip
+        arena.disturbances, state.disturbance_random, lanes.seed[lane], lanes.mission[lane]
+    )
+    begin_events(arena, state, lanes.seed[lane], lanes.mission[lane])
     first = first_learners_at(pool.learners, s)
     copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
     n_uas = first.report.shape[0]

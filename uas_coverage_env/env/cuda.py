@@ -64,7 +64,8 @@ from uas_coverage_env.simulation.step import (
 )
 from uas_coverage_env.world import FLYING, WorldState
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
+from uas_coverage_env.world.events import begin_events, goes_home, heed
+from uas_coverage_env.world.state import STATE, as_told
 
 THREADS_PER_BLOCK = 64
 
@@ -107,10 +108,10 @@ def _flies(pool, missions, lane):
         missions.ended[lane] = False
         missions.mission[lane] += 1
         copy_arrays(start_of(pool.starts, 0), state)
-        begin_random(
-            arena_of(pool.arenas, 0).disturbances, state.disturbance_random, missions.seed[lane],
-            missions.mission[lane],
-        )  # fmt: skip
+        arena = arena_of(pool.arenas, 0)
+        seed, mission = missions.seed[lane], missions.mission[lane]
+        begin_random(arena.disturbances, state.disturbance_random, seed, mission)
+        begin_events(arena, state, seed, mission)
         copy_arrays(first_learners_at(pool.learners, 0), learners)
         copy_arrays(first_observation_at(pool.first_observations, 0), seen)
         for i in range(state.status.shape[0]):
@@ -126,8 +127,11 @@ def _decide(pool, acting, missions, lane):
     learners = learners_of(missions.learners, lane, pool.arenas, 0)
     scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
     arena, tables = arena_of(pool.arenas, 0), tables_at(pool.tables, 0)
-    write_commands(arena, state, tables, learners, scratch, acting, True)
+    seen = as_told(arena, state)
+    write_commands(arena, seen, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
+    if arena.rules[0].eventful:
+        heed(arena, state, scratch.outcome)
 
 
 @kernel
@@ -171,7 +175,8 @@ def _write_with(write: Any) -> Any:
             if state.status[i] == FLYING:
                 command = scratch.commands[i]
                 values = scratch.values[i]
-                write(arena, state, tables, learners, i, acting.parameters, values, command)
+                seen = as_told(arena, state)
+                write(arena, seen, tables, learners, i, acting.parameters, values, command)
                 refuse_unflyable(arena, learners, acting, i, command)
 
     return write_own
@@ -276,6 +281,11 @@ class CudaMissions:
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
         pool = ScenarioPool(scenario, given)
+        if goes_home(pool.scenarios[0]):
+            raise ValueError(
+                f"scenario {pool.scenarios[0].name!r} has an event that sends UAS home, which does "
+                f'not run on a GPU; let them do another thing (then = "hover")'
+            )
         acting = acting_of(given.kind, on_gpu=True)
         acts = tuple(disturbance.act for disturbance in pool.disturbances)
         self._launched = _step_of(
@@ -332,13 +342,16 @@ def _begin_all(pool: MissionPool, missions: Missions) -> None:
     for arrays, first in parts:
         for array, start in zip(arrays, first, strict=True):
             array[:] = start
-    disturbances = ARENA.mission(pool.arenas, 0).disturbances
-    if len(disturbances):
-        _begin_random_of_all(disturbances, missions)
+    arena = ARENA.mission(pool.arenas, 0)
+    if len(arena.disturbances) or arena.rules["eventful"][0]:
+        _begin_random_of_all(pool, missions)
 
 
 @kernel
-def _begin_random_of_all(disturbances, missions):
+def _begin_random_of_all(pool, missions):
+    arena = arena_of(pool.arenas, 0)
     for lane in range(missions.seed.shape[0]):
-        random = missions.worlds.disturbance_random[lane]
-        begin_random(disturbances, random, missions.seed[lane], missions.mission[lane])
+        state = state_of(missions.worlds, lane, pool.arenas, 0)
+        seed, mission = missions.seed[lane], missions.mission[lane]
+        begin_random(arena.disturbances, state.disturbance_random, seed, mission)
+        begin_events(arena, state, seed, mission)

@@ -17,6 +17,7 @@ from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import fitted_to, in_slots
+from uas_coverage_env.world.events import goes_home, is_eventful
 from uas_coverage_env.world.state import STATE
 
 _MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, FIRST_OBSERVATION)
@@ -41,6 +42,7 @@ class DrawnPool:
         actions: The kind of action.
         sizes: The largest that the arrays of a lane may need.
         disturbances: One of each kind that may act: of those in `source.examples`.
+        goes_home: Whether an event may send a UAS home, in any of `source.examples`.
         drawn_from: (L, 6) states of the generators from which the missions now flown were drawn;
             zero where none was drawn.
     """
@@ -50,10 +52,14 @@ class DrawnPool:
         self._source = source
         acting = [settings.disturbances_in(scenario) for scenario in source.examples]
         self.disturbances, _ = in_slots(acting)
+        self.goes_home = any(goes_home(scenario) for scenario in source.examples)
         example = ScenarioPool(source.example, settings, self.disturbances)
         self.scenarios = [example.scenarios[0]] * num_envs
         self.actions = example.actions
         self.sizes = {**example.sizes, "U": source.room.n_uas, "W": source.room.n_waypoints}
+        self.sizes["E"] = max(len(scenario.events) for scenario in source.examples)
+        eventful = any(is_eventful(scenario) for scenario in source.examples)
+        self.sizes["S"] = source.room.n_uas if eventful else 0
         self._slots: list[Slots[Any]] = [Slots(memory, num_envs) for memory in _MEMORIES]
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self.drawn_from = np.zeros((num_envs, _WORDS), dtype=np.uint64)
@@ -110,8 +116,22 @@ class DrawnPool:
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             scenario = scenario or self._source.draw(rng)
             fitted_to(self.disturbances, self.settings.disturbances_in(scenario))
+            self._check_events(scenario)
             missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
+
+    def _check_events(self, scenario: Scenario) -> None:
+        """Refuse more events, or others, than there is room for."""
+        n_events, n_sensed = len(scenario.events), len(scenario.uas) * is_eventful(scenario)
+        if (
+            n_events > self.sizes["E"]
+            or n_sensed > self.sizes["S"]
+            or goes_home(scenario) > self.goes_home
+        ):
+            raise ValueError(
+                f"scenario {scenario.name!r} has more events or [sensing], or others, than the "
+                f"{len(self._source.examples)} examples that this batch was made for"
+            )
 
     def check_drawn(self) -> None:
         """Refuse to put missions aside that cannot be drawn again.

@@ -24,6 +24,7 @@ from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.events import goes_home
 
 # numpy takes as long to find them as to use them
 _FLOAT32, _empty = np.dtype(np.float32), np.empty
@@ -98,7 +99,8 @@ class Episode:
             world.arena, world.state, self.tables, self._learners, self._scratch,
             self._acting, self._paying, self._observing,
         )  # fmt: skip
-        called = assistants(world.return_mode, world.safety_filter, goes_to=kind.goes_to)
+        goes_to = kind.goes_to or goes_home(self.scenario)
+        called = assistants(world.return_mode, world.safety_filter, goes_to=goes_to)
         # what the kernel is given in every step: the arrays are written in place
         at = np.array([*addresses, *disturbance_code(world.disturbances), *called])
         self._given = (at, world.dynamics == "nonlinear")
@@ -194,7 +196,7 @@ class Episode:
         world = self._world
         own = np.zeros((len(self.names), OWN.size), np.float32)
         observes = np.ones(len(self.names), dtype=np.bool_)
-        arrays = (world.arena, world.state, self.tables, self._learners)
+        arrays = (world.arena, world.state.as_told(), self.tables, self._learners)
         observe(*arrays, observing_of([OWN]), observes, own)
         return own
 
@@ -210,5 +212,5 @@ class Episode:
     def moment(self) -> Moment:
         """The mission now, for `express`."""
         world = self._world
-        arrays = (world.arena, world.state, self.tables, self._learners)
+        arrays = (world.arena, world.state.as_told(), self.tables, self._learners)
         return Moment(self.names, *arrays, world.dynamics == "nonlinear")

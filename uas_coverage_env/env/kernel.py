@@ -26,6 +26,7 @@ from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.reward_kernel import compute_rewards
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.world import FLYING
+from uas_coverage_env.world.state import as_told
 
 ACCEPTED = -1
 
@@ -69,9 +70,10 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         amounts[i, REWARD] = reward
     if newly_covered > 0:
         count_company(state.uncovered, tables.neighbours, learners.company)
+    seen = as_told(arena, state)
     for i in range(report.shape[0]):
         if outcome[i].flew:
-            observe_one(arena, state, tables, learners, observing, i, observation[i], on_gpu)
+            observe_one(arena, seen, tables, learners, observing, i, observation[i], on_gpu)
 
 
 @inlined_kernel
@@ -87,7 +89,8 @@ def step_learners(arena, state, tables, learners, scratch, rules, observation):
         rules: `Rules`.
         observation: (U, V) float32; that of a UAS that did not fly stays.
     """
-    write_commands(arena, state, tables, learners, scratch, rules.acting, None)
+    seen = as_told(arena, state)
+    write_commands(arena, seen, tables, learners, scratch, rules.acting, None)
     advance(
         arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.disturbances,
         scratch.outcome,

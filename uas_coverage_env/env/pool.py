@@ -18,6 +18,7 @@ from uas_coverage_env.scenario import Scenario, loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import Disturbance, fitted_to, in_slots
+from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.state import STATE
 
 
@@ -67,6 +68,7 @@ class ScenarioPool:
         n_uas: (S,).
         n_waypoints: (S,).
         disturbances: One of each kind that acts in any of the scenarios.
+        goes_home: Whether an event of any of them may send a UAS home.
 
     Raises:
         ValueError: There is no scenario, or one is none of what is allowed.
@@ -86,6 +88,7 @@ class ScenarioPool:
         settings = settings or MissionSettings()
         self.settings = settings
         self.scenarios = tuple(settings.limited(loaded_scenario(entry)) for entry in given)
+        self.goes_home = any(goes_home(scenario) for scenario in self.scenarios)
         acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
         if disturbances is None:
             self.disturbances, slots = in_slots(acting)

@@ -8,8 +8,9 @@ import re
 import tomllib
 import types
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -189,7 +190,13 @@ def _without_echoes(mistakes: Iterable[Mapping[str, Any]]) -> list[Mapping[str, 
 
 def _line(mistake: Mapping[str, Any], model: type[BaseModel]) -> str:
     location, kind = mistake["loc"], mistake["type"]
-    field = _field(location)
+    at = _along(location, model)
+    field = _field(at.keys)
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        tag, known = mistake["ctx"]["discriminator"].strip("'"), ", ".join(at.choices)
+        if kind == "union_tag_not_found":
+            return f"{field}.{tag}: is missing; take one of {known}"
+        return f"{field}.{tag}: there is no {mistake['ctx']['tag'][:40]!r}; take one of {known}"
     if kind == "extra_forbidden":
         return f"{field}: unknown key; {_instead(location, model)}"
     if kind == "missing":
@@ -234,22 +241,59 @@ def _instead(location: tuple[str | int, ...], model: type[BaseModel]) -> str:
 
 
 def _keys_at(location: tuple[str | int, ...], model: type[BaseModel]) -> list[str]:
-    current: type[BaseModel] | None = model
-    for part in location:
-        if isinstance(part, int) or current is None:
-            continue
-        fields = {field.alias or name: field for name, field in current.model_fields.items()}
-        current = _model_in(fields[part].annotation) if part in fields else None
+    current = _along(location, model).model
     if current is None:
         return []
     return [field.alias or name for name, field in current.model_fields.items()]
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The model inside `Model`, `tuple[Model, ...]`, `Model | None`, `dict[str, Model]`."""
+@dataclass(frozen=True)
+class _Place:
+    """Where a location leads to."""
+
+    keys: tuple[str | int, ...]
+    """The location as it is written in the file: without the names of kinds of tables."""
+    model: type[BaseModel] | None
+    """What is there, if it is a table."""
+    choices: Mapping[str, type[BaseModel]]
+    """Instead: the kinds of tables that may be there."""
+
+
+def _along(location: tuple[str | int, ...], model: type[BaseModel]) -> _Place:
+    current: type[BaseModel] | None = model
+    choices: Mapping[str, type[BaseModel]] = {}
+    keys: list[str | int] = []
+    for part in location:
+        if isinstance(part, int):
+            keys.append(part)
+            continue
+        if part in choices:  # pydantic names the kind, which is no key
+            current, choices = choices[part], {}
+            continue
+        keys.append(part)
+        fields = {field.alias or name: field for name, field in _fields_of(current).items()}
+        found = _models_in(fields[part].annotation) if part in fields else []
+        current = found[0] if len(found) == 1 else None
+        choices = {_kind_of(each): each for each in found} if len(found) > 1 else {}
+    return _Place(tuple(keys), current, choices)
+
+
+def _fields_of(model: type[BaseModel] | None) -> Mapping[str, Any]:
+    return {} if model is None else model.model_fields
+
+
+def _kind_of(model: type[BaseModel]) -> str:
+    """The value of the field `kind`, by which tables of several kinds are told apart."""
+    field = model.model_fields.get("kind")
+    return str(get_args(field.annotation)[0]) if field is not None else model.__name__
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    """The models inside `Model`, `tuple[Model, ...]`, `Model | None`, `dict[str, Model]`."""
     if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
-        return annotation if issubclass(annotation, BaseModel) else None
+        return [annotation] if issubclass(annotation, BaseModel) else []
+    if get_origin(annotation) is Annotated:
+        return _models_in(get_args(annotation)[0])
     if get_origin(annotation) in (Union, types.UnionType, tuple, list, dict):
-        found = (_model_in(argument) for argument in get_args(annotation))
-        return next((inner for inner in found if inner is not None), None)
-    return None
+        return [inner for argument in get_args(annotation) for inner in _models_in(argument)]
+    return []

@@ -116,8 +116,18 @@ def _run(flight: FlightRecord) -> dict[str, Any]:
         "return_mode": flight.return_mode,
         "safety_filter": flight.safety_filter,
         **disturbed,
+        **_events(flight),
         "ended": flight.ended,
         "decisions": [dataclasses.asdict(decision) for decision in flight.decisions],
+    }
+
+
+def _events(flight: FlightRecord) -> dict[str, Any]:
+    if flight.open_waypoints is None:
+        return {}
+    return {
+        "events": [dataclasses.asdict(event) for event in flight.events],
+        "open_waypoints": flight.open_waypoints,
     }
 
 

@@ -19,10 +19,12 @@ from uas_coverage_env.flight.record import (
     PLAN_DTYPE,
     RETURN,
     DecisionRecord,
+    EventRecord,
     Violation,
     last_samples,
 )
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import (
     DOD,
@@ -35,6 +37,7 @@ from uas_coverage_env.vehicle import (
 )
 from uas_coverage_env.world import CONTACT_NAMES, FLYING, Command, command_mode
 from uas_coverage_env.world import LANDED as HAS_LANDED
+from uas_coverage_env.world.outcome import FAULT, NONE
 
 
 @dataclass(frozen=True)
@@ -59,8 +62,9 @@ class FlightLog:
     def __init__(self, world: World, scenario: Scenario) -> None:
         self._world = world
         self._scenario = scenario
-        self._start = self._sample()
         self._steps: list[_Step] = []
+        self._covered = int((~world.state.uncovered).sum())
+        self._start = self._sample()
 
     @property
     def steps(self) -> int:
@@ -88,6 +92,7 @@ class FlightLog:
         filtered = int(outcome["filtered"].sum())
         record = _decision_record(duration_s, decision, filtered)
         plan = _plan_rows(decision, self.steps, names)
+        self._covered += int(outcome["newly_covered"].sum())
         # one append, so that there is no half a step
         self._steps.append(_Step(outcome, modes, record, plan, self._sample()))
 
@@ -111,20 +116,38 @@ class FlightLog:
         return {
             **{"x": x, "u": u, "voltage_V": voltage_V, "current_A": current_A, "mode": mode},
             "covered": np.array([sample.covered for sample in samples], np.int64),
-            "moving_position_m": np.array(self._world.arena.moving_path_m[: len(samples)]),
+            "moving_position_m": np.array(self._moving_path_m(len(samples))),
             "plan": np.concatenate([np.empty(0, PLAN_DTYPE), *(step.plan for step in self._steps)]),
             "decisions": tuple(step.decision for step in self._steps),
             "violations": tuple(self._violations()),
             "breaches": sum(int(step.outcome["breaches"].sum()) for step in self._steps),
             "height_breaches": sum(int(step.outcome["too_low"].sum()) for step in self._steps),
+            "events": self._events(),
+            "open_waypoints": int(self._world.state.uncovered.sum())
+            if self._scenario.events
+            else None,
             "min_separation_m": self._smallest("separation_m"),
             "min_obstacle_clearance_m": self._smallest("obstacle_clearance_m"),
         }
 
+    def _moving_path_m(self, n_samples: int) -> NDArray[np.float64]:
+        """(T, M, 3) [m] of the obstacles that the scenario began with."""
+        n_moving = len(self._scenario.moving_obstacles)
+        return self._world.arena.moving_path_m[:n_samples, :n_moving]
+
+    def _events(self) -> tuple[EventRecord, ...]:
+        state, names = self._world.state, self._world.names
+        found = []
+        for e, event in enumerate(self._scenario.events):
+            sample, uas = int(state.event_step[e]), int(state.event_uas[e])
+            if sample <= self.steps:
+                name = names[uas] if isinstance(event, OfUas) else None
+                found.append(EventRecord(sample * self._scenario.dt_s, event.kind, name, e))
+        return tuple(sorted(found, key=lambda event: event.time_s))
+
     def _sample(self) -> _Sample:
         state = self._world.state
-        covered = len(state.uncovered) - int(state.uncovered.sum())
-        return _Sample(state.x.copy(), state.status.copy(), covered)
+        return _Sample(state.x.copy(), state.status.copy(), self._covered)
 
     def _mode(self, status: NDArray[np.int64]) -> NDArray[np.int8]:
         """(T, U) the mode of the command that acts from a sample on, or how the UAS has ended."""
@@ -135,10 +158,10 @@ class FlightLog:
         return np.where(status == FLYING, [*modes, final], ended).astype(np.int8)
 
     def _violations(self) -> list[Violation]:
-        scenario = self._scenario
+        scenario, known = self._scenario, self._world.known
         partners = {
-            "obstacle": [obstacle.name for obstacle in scenario.obstacles],
-            "moving_obstacle": [obstacle.name for obstacle in scenario.moving_obstacles],
+            "obstacle": [obstacle.name for obstacle in known.obstacles],
+            "moving_obstacle": [obstacle.name for obstacle in known.moving_obstacles],
             "uas": self._world.names,
         }
         found: dict[tuple[int, str], Violation] = {}
@@ -146,7 +169,7 @@ class FlightLog:
             time_s = (k + 1) * scenario.dt_s
             for i, name in enumerate(self._world.names):
                 entry = step.outcome[i]
-                if entry["contact"]:
+                if entry["contact"] not in (NONE, FAULT):
                     kind = CONTACT_NAMES[entry["contact"]]
                     partner = partners[kind][entry["contact_with"]] if kind in partners else None
                     found[i, kind] = Violation(time_s, name, kind, partner)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, FlightRecord, Violation
+from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, EventRecord, FlightRecord, Violation
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH
 
@@ -14,8 +14,20 @@ _J_PER_WH = 3600.0
 
 
 def coverage(flight: FlightRecord) -> float:
-    """Fraction of the waypoints that the swarm has covered, 0..1."""
-    return float(flight.covered[-1] / len(flight.scenario.waypoints))
+    """Fraction of the waypoints that the swarm has covered, 0..1.
+
+    Of those that events have dropped before they were covered none counts; of those that events
+    have added, all that were added in time.
+    """
+    left = _open_waypoints(flight)
+    covered = int(flight.covered[-1])
+    return float(covered / (covered + left)) if covered + left else 1.0
+
+
+def _open_waypoints(flight: FlightRecord) -> int:
+    if flight.open_waypoints is not None:
+        return flight.open_waypoints
+    return len(flight.scenario.waypoints) - int(flight.covered[-1])
 
 
 def covered_at(flight: FlightRecord) -> NDArray[np.int64]:
@@ -43,9 +55,15 @@ def home(flight: FlightRecord) -> NDArray[np.bool_]:
 
 
 def accomplished(flight: FlightRecord) -> bool:
-    """Whether the mission succeeded: everything covered, everyone home, no violation."""
-    everything = flight.covered[-1] == len(flight.scenario.waypoints)
-    return bool(everything and home(flight).all() and not flight.violations)
+    """Whether the mission succeeded: everything covered, everyone home, no violation.
+
+    A UAS that an event of the scenario took away need not be home.
+    """
+    taken = {event.uas for event in flight.events if event.kind == "uas_lost"}
+    all_home = all(
+        landed or name in taken for landed, name in zip(home(flight), flight.names, strict=True)
+    )
+    return bool(_open_waypoints(flight) == 0 and all_home and not flight.violations)
 
 
 def decision_time_s(flight: FlightRecord) -> dict[str, float | None]:
@@ -113,6 +131,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "min_separation_m": flight.min_separation_m,
         "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
         "violations": [_entry(violation) for violation in flight.violations],
+        # without events the file is as it was before there were any
+        **({"events": [_happened(event) for event in flight.events]} if flight.events else {}),
         "breaches": flight.breaches,
         # without the rule the file is as it was before there was one
         **({"height_breaches": flight.height_breaches} if flight.scenario.min_height_m else {}),
@@ -124,6 +144,10 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "seed": flight.seed,
         "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
     }
+
+
+def _happened(event: EventRecord) -> dict[str, Any]:
+    return {"t_s": event.time_s, "kind": event.kind, "uas": event.uas}
 
 
 def _entry(violation: Violation) -> dict[str, Any]:

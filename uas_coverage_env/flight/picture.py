@@ -91,6 +91,7 @@ def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState
         home_m=flight.x[0, :, 0:3],
         moving_position_m=flight.moving_position_m[now],
         moving_velocity_mps=np.zeros_like(flight.moving_position_m[now]),
+        responds=np.ones(len(status), dtype=np.bool_),
     )
 
 

@@ -21,7 +21,14 @@ from uas_coverage_env.flight.directory import (
     PLAN_COLUMNS,
     STATE_COLUMNS,
 )
-from uas_coverage_env.flight.record import LIMIT, MODES, PLAN_DTYPE, DecisionRecord, Violation
+from uas_coverage_env.flight.record import (
+    LIMIT,
+    MODES,
+    PLAN_DTYPE,
+    DecisionRecord,
+    EventRecord,
+    Violation,
+)
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES
@@ -82,11 +89,20 @@ class _Decision(StrictModel):
     reason: str | None = None
 
 
+class _Event(StrictModel):
+    time_s: Seconds
+    kind: str
+    uas: str | None
+    event: Count
+
+
 class _Run(StrictModel):
     dynamics: Dynamics
     return_mode: bool
     safety_filter: bool
     disturbances: tuple[str, ...] = ()
+    events: tuple[_Event, ...] = ()
+    open_waypoints: Count | None = None
     ended: Literal["complete", "steps", "stopped"]
     decisions: tuple[_Decision, ...]
 
@@ -127,6 +143,7 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     mode, covered = np.zeros(shape, np.int8), np.zeros(shape[0], np.int64)
     last = np.zeros(len(index), np.int64)
     found = np.zeros(shape, np.bool_)
+    most_covered = len(scenario.waypoints) + len(scenario.events)
 
     def put(row: list[str]) -> None:
         told = dict(zip(FLIGHT_COLUMNS, row, strict=True))
@@ -136,7 +153,7 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
         voltage_V[k, i], current_A[k, i] = _number(told["voltage_V"]), _number(told["current_A"])
         mode[k, i] = _chosen("mode", told["mode"], modes)
         u[k, i] = [_number(told[name]) for name in INPUT_COLUMNS]
-        covered[k] = _whole("covered", told["covered"], len(scenario.waypoints))
+        covered[k] = _whole("covered", told["covered"], most_covered)
         last[i] = k
         found[k, i] = True
 
@@ -193,7 +210,8 @@ def _run_fields(path: Path, steps: int) -> dict[str, Any]:
             f"{path}: was damaged: it holds {len(run.decisions)} decisions for {steps} steps"
         )
     decisions = tuple(DecisionRecord(**decision.model_dump()) for decision in run.decisions)
-    return {**dict(run), "decisions": decisions}
+    events = tuple(EventRecord(**event.model_dump()) for event in run.events)
+    return {**dict(run), "decisions": decisions, "events": events}
 
 
 def _summary_fields(path: Path, scenario: Scenario) -> dict[str, Any]:

@@ -68,6 +68,28 @@ class Violation:
 
 
 @dataclass(frozen=True)
+class EventRecord:
+    """An event of the scenario that has happened.
+
+    Attributes:
+        time_s: The sample at which it happened [s].
+        kind: Its kind, as in the scenario.
+        uas: The UAS that it concerned; None: no one in particular, or all.
+        event: Its place among the scenario's events, from 0 on.
+    """
+
+    time_s: float
+    kind: str
+    uas: str | None
+    event: int
+
+    def __str__(self) -> str:
+        """As a line for people."""
+        concerned = f" of {self.uas}" if self.uas else ""
+        return f"{self.kind}{concerned} at {self.time_s:g} s"
+
+
+@dataclass(frozen=True)
 class DecisionRecord:
     """One decision of the planner: how long it took, how it came about, what was left of it.
 
@@ -115,6 +137,9 @@ class FlightRecord:
         wall_time_s: Time the flight took to compute [s], compilation apart.
         versions: Package -> version.
         height_breaches: How many of the breaches are below the least height.
+        events: What has happened, in order of time; none where the scenario has no events.
+        open_waypoints: How many were still to be covered at the end, where the scenario has events;
+            None: all of the scenario's that are not covered.
     """
 
     scenario: Scenario
@@ -142,6 +167,8 @@ class FlightRecord:
     wall_time_s: float
     versions: Mapping[str, str]
     height_breaches: int = 0
+    events: tuple[EventRecord, ...] = ()
+    open_waypoints: int | None = None
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""

@@ -98,7 +98,7 @@ def rollout(
     started = time.perf_counter()
     ended = "stopped"
     with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid
-        ended = _fly(world, planner, log, limit, on_step, should_stop)
+        ended = _fly(world, planner, log, limit, seed, on_step, should_stop)
     return Flight(
         scenario=scenario,
         planner=name_of(planner),
@@ -135,11 +135,12 @@ def _fly(
     planner: Planner,
     log: FlightLog,
     limit: int,
+    seed: int,
     on_step: Callable[[Progress], object] | None,
     should_stop: Callable[[], bool] | None,
 ) -> str:
     """Fly until the end; returns how it came about, see `Flight.ended`."""
-    swarm = world.swarm_state()
+    swarm, revisions = world.swarm_state(), 0
     if on_step is not None:
         on_step(Progress(swarm, limit, log.covered, None))
     while not world.done:
@@ -151,6 +152,9 @@ def _fly(
         outcome = world.step(packed)
         log.add(commands, decision, getattr(planner, "last_decision", None), outcome)
         swarm = world.swarm_state()
+        if world.revisions != revisions:
+            revisions = world.revisions
+            planner.reset(MissionBrief.of(world.known), seed)
         if on_step is not None:
             on_step(Progress(swarm, limit, log.covered, decision))
     return "complete"

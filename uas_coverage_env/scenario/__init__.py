@@ -13,6 +13,7 @@ from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
     MovingObstacle,
+    NoFlyZone,
     Obstacle,
     Place,
     ScheduledVelocity,
@@ -24,6 +25,7 @@ from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.levels import LEVELS, Level, with_disturbances
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.source import (
     MissionSource,
     Room,
@@ -45,6 +47,7 @@ __all__ = [
     "Level",
     "MissionSource",
     "MovingObstacle",
+    "NoFlyZone",
     "Obstacle",
     "Place",
     "RandomGusts",
@@ -53,6 +56,7 @@ __all__ = [
     "ScenarioGenerator",
     "ScenarioLike",
     "ScheduledVelocity",
+    "Sensing",
     "Uas",
     "Uncertainty",
     "Waypoint",

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.scenario.endurance import back_and_forth
-from uas_coverage_env.scenario.fields import Geofence, Obstacle, UncheckedScenario
+from uas_coverage_env.scenario.fields import Geofence, NoFlyZone, Obstacle
+from uas_coverage_env.scenario.unchecked import UncheckedScenario
 from uas_coverage_env.vehicle import load_vehicle, vehicle_names
 
 
@@ -37,6 +38,7 @@ def problems(scenario: UncheckedScenario) -> list[str]:
         *_starts_and_moving_obstacles(scenario),
         *_starts_and_each_other(scenario),
         *_batteries(scenario),
+        *_events(scenario),
     ]
 
 
@@ -94,6 +96,8 @@ def _waypoints(scenario: UncheckedScenario) -> Iterator[str]:
             f"{outside_m[index]:.3g} m outside the geofence; move it inside"
         )
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        if isinstance(obstacle, NoFlyZone):  # what lies in it is dropped
+            continue
         distance_m = hull.signed_distance(positions)
         for index in np.flatnonzero(distance_m < 0.0):
             yield (
@@ -171,6 +175,32 @@ def _batteries(scenario: UncheckedScenario) -> Iterator[str]:
                 f"uas[{index}].soc_0: {uas.soc_0:g} is a depth of discharge of "
                 f"{1.0 - uas.soc_0:.3g}, not below dod_max {uas.dod_max:g}; charge it"
             )
+
+
+def _events(scenario: UncheckedScenario) -> Iterator[str]:
+    """What an event names and is not there, and what makes the scene wrong that it leaves."""
+    for index, event in enumerate(scenario.events):
+        field = f"events[{index}]"
+        wrong = [f"{field}.{line}" for line in event.mistakes(scenario)]
+        yield from wrong
+        if wrong or not event.changes_scene:
+            continue
+        name = getattr(event, "uas", None)
+        concerned = [i for i, uas in enumerate(scenario.uas) if name in (None, uas.name)]
+        lines: dict[str, None] = {}
+        for i in concerned:
+            after = scenario.after(event, event.at_s or scenario.dt_s, i)
+            lines |= dict.fromkeys(_scene(after))
+        yield from (f"{field} ({event.kind}): then {line}" for line in lines)
+
+
+def _scene(scenario: UncheckedScenario) -> list[str]:
+    found = [*_names_used_twice(scenario), *_bodies_without_volume(scenario)]
+    return found or [
+        *_waypoints(scenario),
+        *_starts_and_fixed_things(scenario),
+        *_starts_and_each_other(scenario),
+    ]
 
 
 def _waypoints_out_of_reach(scenario: UncheckedScenario) -> Iterator[str]:

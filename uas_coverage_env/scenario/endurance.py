@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.scenario.fields import UncheckedScenario
+from uas_coverage_env.scenario.unchecked import UncheckedScenario
 from uas_coverage_env.vehicle.range import (
     GENERATED,
     Speeds,

@@ -14,25 +14,17 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
-    SerializerFunctionWrapHandler,
     Strict,
     ValidationInfo,
     field_validator,
-    model_serializer,
 )
 
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.scenario.air import Wind
-from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
-from uas_coverage_env.scenario.uncertainty import Uncertainty
-from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
+from uas_coverage_env.vehicle import vehicle_names
 
 _NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 _LONGEST_NAME = 64
-
-GLIDE = 2.0
-"""Way over height of the flattest descent from the least height to a start, and of the climb."""
 
 
 def _checked_name(name: str) -> str:
@@ -107,6 +99,13 @@ class Obstacle(StrictModel):
     def hull(self) -> ConvexPolytope:
         """The obstacle as plane inequalities."""
         return ConvexPolytope.from_points(self.vertices_m)
+
+
+class NoFlyZone(Obstacle):
+    """A convex volume in which nothing stands, and which is kept clear of like an obstacle.
+
+    To be in it, or too near, is a breach, no contact.
+    """
 
 
 class ScheduledVelocity(StrictModel):
@@ -247,72 +246,3 @@ class Place(StrictModel):
     latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)]
     height_m: Annotated[float, Field(ge=-1_000.0, le=10_000.0)] = 0.0
-
-
-class UncheckedScenario(StrictModel):
-    """The fields of a `Scenario`, each allowed by itself; what checks and estimates read."""
-
-    schema_version: int = Field(alias="schema", ge=1, le=1)
-    name: Name
-    dt_s: Annotated[float, Field(ge=0.1, le=2.0)]
-    max_steps: Annotated[int, Field(ge=1, le=100_000)]
-    landing_distance_m: Length_m
-    landing_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)]
-    uas_safe_distance_m: Distance_m
-    min_height_m: Distance_m = 0.0
-    from_ground: bool = False
-    geofence: Geofence
-    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = ()
-    moving_obstacles: Annotated[tuple[MovingObstacle, ...], Strict(False)] = ()
-    uas: Annotated[tuple[Uas, ...], Strict(False), Field(min_length=1)]
-    waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
-    decorations: Annotated[tuple[Decoration, ...], Strict(False)] = ()
-    place: Place | None = None
-    wind: Wind | None = None
-    uncertainty: Uncertainty | None = None
-    disturbances: DisturbanceTables = ()
-
-    @model_serializer(mode="wrap")
-    def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # files, and what is computed from their content, are those of scenarios before the field
-        data = serialise(self)
-        for name in (
-            *("place", "min_height_m", "from_ground", "wind", "uncertainty", "disturbances"),
-        ):
-            if not getattr(self, name):
-                data.pop(name, None)
-        return data
-
-    @cached_property
-    def fence(self) -> ConvexPolytope:
-        """The geofence as plane inequalities."""
-        return self.geofence.hull
-
-    @cached_property
-    def hulls(self) -> tuple[ConvexPolytope, ...]:
-        """One hull per fixed obstacle, in their order."""
-        return tuple(obstacle.hull for obstacle in self.obstacles)
-
-    @property
-    def kept_hulls(self) -> tuple[ConvexPolytope, ...]:
-        """What commands keep the safe distance from: the hulls, raised where that is not enough.
-
-        Beyond a face of a raised hull by radius and safe distance, the least height above the
-        roof is kept as well.
-        """
-        radius_m = min(uas.radius_m for uas in self.uas)
-        return tuple(
-            hull.raised(self.min_height_m, radius_m + obstacle.safe_distance_m)
-            for obstacle, hull in zip(self.obstacles, self.hulls, strict=True)
-        )
-
-    @property
-    def landing_zone_m(self) -> float:
-        """Horizontal distance from its start within which a UAS may fly low [m]."""
-        return self.landing_distance_m + GLIDE * self.min_height_m
-
-    @cached_property
-    def vehicles(self) -> tuple[VehicleParams, ...]:
-        """The vehicle of each UAS, in their order."""
-        loaded = {name: load_vehicle(name) for name in {uas.vehicle for uas in self.uas}}
-        return tuple(loaded[uas.vehicle] for uas in self.uas)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uas_coverage_env.scenario.fields import UncheckedScenario
+from uas_coverage_env.scenario.unchecked import UncheckedScenario
 from uas_coverage_env.vehicle.vertical_flight import VerticalFlight, vertical_flight
 
 

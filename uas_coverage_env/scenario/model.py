@@ -10,8 +10,8 @@ from pydantic import model_validator
 
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.scenario.checks import first_of, problems
-from uas_coverage_env.scenario.fields import UncheckedScenario
 from uas_coverage_env.scenario.toml_text import toml_text
+from uas_coverage_env.scenario.unchecked import UncheckedScenario
 
 
 class Scenario(UncheckedScenario):
@@ -41,6 +41,8 @@ class Scenario(UncheckedScenario):
             they are as planners believe.
         disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
             are those of the package that installed NAME.
+        sensing: How well UAS are known to planners and autopilots; without it, exactly.
+        events: What happens during the mission; a table `[[events]]` for each.
     """
 
     def __getstate__(self) -> dict[Any, Any]:

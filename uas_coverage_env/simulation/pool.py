@@ -13,6 +13,7 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import begin_mission
 from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world.arena import ARENA, build_arena
+from uas_coverage_env.world.events import is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, STATE, WorldState
 
@@ -50,6 +51,9 @@ def pool_worlds(
         disturbed = [scenario.name for scenario in scenarios if disturbances_of(scenario)]
         if disturbed:
             raise ValueError(f"scenario {disturbed[0]} has disturbances; here the air is still")
+        eventful = [scenario.name for scenario in scenarios if is_eventful(scenario)]
+        if eventful:
+            raise ValueError(f"scenario {eventful[0]} has events or [sensing]; here is neither")
         slots = [()] * len(scenarios)
     for scenario, disturbances in zip(scenarios, slots, strict=True):
         arena = build_arena(scenario, measured_m=measured_m, disturbances=disturbances)

@@ -33,8 +33,9 @@ from uas_coverage_env.world.contacts import (
     count_breaches,
 )
 from uas_coverage_env.world.coverage import cover, land
+from uas_coverage_env.world.events import happen, heed, rest, sense
 from uas_coverage_env.world.outcome import NONE
-from uas_coverage_env.world.state import FLYING, LOST, STATE
+from uas_coverage_env.world.state import FLYING, LOST, STATE, as_felt, as_sensed
 
 ACCEPTED = -1
 
@@ -86,6 +87,7 @@ def begin_step(state, commands, outcome):
         event.fence_clearance_m = math.inf
         event.filtered = False
         event.returning = False
+        event.grounded = False
         given = commands[i]
         applied = event.applied_command
         applied.kind = given.kind
@@ -106,9 +108,10 @@ def _write_inputs(arena, state, i, outcome):
 @inlined_kernel
 def write_all_inputs(arena, state, outcome):
     """What the motors of all UAS are asked for: a disturbance of one may depend on the others'."""
+    felt = as_felt(arena, state)
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            _write_inputs(arena, state, i, outcome)
+            _write_inputs(arena, felt, i, outcome)
 
 
 @kernel
@@ -149,11 +152,19 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
 
 
 @inlined_kernel
+def _move_or_rest(arena, state, nonlinear, disturbed, i, outcome):
+    if outcome[i].grounded:
+        rest(arena, state, i, outcome)
+    else:
+        _move(arena, state, nonlinear, disturbed, i, outcome)
+
+
+@inlined_kernel
 def move_all(arena, state, nonlinear, outcome):
     """Fly the inputs, the winds and the forces in `outcome` for one step."""
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            _move(arena, state, nonlinear, True, i, outcome)
+            _move_or_rest(arena, state, nonlinear, True, i, outcome)
 
 
 @inlined_kernel
@@ -163,12 +174,13 @@ def _fly(arena, state, nonlinear, disturbances, outcome):
     if disturbed:
         write_all_inputs(arena, state, outcome)
         disturb(arena, state, disturbances, outcome)
+    felt = as_felt(arena, state)
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING:
             continue
         if not disturbed:
-            _write_inputs(arena, state, i, outcome)
-        _move(arena, state, nonlinear, disturbed, i, outcome)
+            _write_inputs(arena, felt, i, outcome)
+        _move_or_rest(arena, state, nonlinear, disturbed, i, outcome)
 
 
 @inlined_kernel
@@ -192,6 +204,9 @@ def carry_out(arena, state, nonlinear, disturbances, outcome):
 @inlined_kernel
 def judge(arena, state, nonlinear, outcome):
     """Judge what happened in a step that has been flown."""
+    eventful = arena.rules[0].eventful
+    if eventful:
+        happen(arena, state, outcome)
     check_obstacles(arena, state, outcome)
     check_separation(arena, state, outcome)
     check_fence_and_battery(arena, state, outcome)
@@ -201,6 +216,8 @@ def judge(arena, state, nonlinear, outcome):
     check_limits(arena, state, nonlinear, outcome)
     _mark_lost(state, outcome)
     state.step[0] += 1
+    if eventful:
+        sense(arena, state)
 
 
 @kernel
@@ -221,8 +238,11 @@ def advance(arena, state, commands, nonlinear, assistants, disturbances, outcome
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     begin_step(state, commands, outcome)
+    if arena.rules[0].eventful:
+        heed(arena, state, outcome)
+    seen = as_sensed(arena, state)
     for k in range(len(assistants)):
-        assist(assistants[k], arena, state, nonlinear, outcome)
+        assist(assistants[k], arena, seen, nonlinear, outcome)
     carry_out(arena, state, nonlinear, disturbances, outcome)
 
 

@@ -12,13 +12,14 @@ from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.disturbances.act import begin_random, disturbance_code
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.scenario.ground_phases import take_off
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
 from uas_coverage_env.vehicle import DOD, U_TH
-from uas_coverage_env.world.arena import build_arena
+from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.disturbance import checked_disturbances
+from uas_coverage_env.world.events import begin_events, is_eventful, responding
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState
 
@@ -29,7 +30,9 @@ _OUTCOMES_IN_BLOCK = 256
 
 def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
     """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off."""
-    sizes = {"U": len(scenario.uas), "W": len(scenario.waypoints), "D": n_disturbances}
+    n_uas = len(scenario.uas)
+    sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": n_disturbances}
+    sizes |= {"E": len(scenario.events), "S": n_uas if is_eventful(scenario) else 0}
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
     state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
@@ -39,7 +42,37 @@ def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
             x[DOD], x[U_TH] = flown.dod, flown.u_th_V
     state.status[:] = FLYING
     state.uncovered[:] = True
+    if len(state.sensed):
+        # where and how they start is known
+        state.felt[:] = state.sensed[:] = state.told[:] = state.delayed[:, 0] = state.x
     return state
+
+
+def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmState:
+    """What players see of a mission, in arrays of their own.
+
+    Args:
+        scenario: As it is now.
+        arena: The same as arrays.
+        state: The state.
+    """
+    step = int(state.step[0])
+    sample = min(step, len(arena.moving_path_m) - 1)
+    return SwarmState(
+        time_s=step * scenario.dt_s,
+        step=step,
+        names=tuple(uas.name for uas in scenario.uas),
+        x=state.as_told().x.copy(),
+        reference_mps=state.reference.copy(),
+        status=state.status.copy(),
+        departed=state.departed.copy(),
+        returning=state.returning.copy(),
+        uncovered=state.uncovered.copy(),
+        home_m=arena.uas["home_m"].copy(),
+        moving_position_m=arena.moving_path_m[sample].copy(),
+        moving_velocity_mps=arena.moving_velocity_mps[sample].copy(),
+        responds=responding(arena, state),
+    )
 
 
 class World:
@@ -58,7 +91,9 @@ class World:
         scenario: As given; likewise dynamics, return_mode and safety_filter.
         disturbances: What pushes back.
         names: Names of the UAS, in order.
-        arena: The scenario as arrays; not to be changed.
+        known: The scenario as it is now: events may have changed the scene.
+        arena: The same as arrays; not to be changed.
+        revisions: How often events have changed the scene since t = 0.
     """
 
     def __init__(
@@ -82,10 +117,13 @@ class World:
         self.names = tuple(uas.name for uas in scenario.uas)
         given = disturbances_of(scenario) if disturbances is None else disturbances
         self.disturbances = checked_disturbances(given)
-        self.arena = build_arena(scenario, measured_m=measured_m, disturbances=self.disturbances)
+        self._measured_m = measured_m
+        self.known, self.revisions = scenario, 0
+        self.arena = self._first_arena = self._arena_of(scenario)
         self._start = initial_state(scenario, len(self.disturbances))
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
+        self._scene_events = [e for e, event in enumerate(scenario.events) if event.changes_scene]
         self._nonlinear = dynamics == "nonlinear"
         self._prepare()
         self._seed = 0
@@ -127,8 +165,14 @@ class World:
             if not whole or not 0 <= seed < SEEDS:
                 raise ValueError(f"seed is {seed!r}; give a whole number from 0 to 2**64 - 1")
             self._seed = int(seed)
+        if self.revisions:
+            self.known, self.arena, self.revisions = self.scenario, self._first_arena, 0
+            self._state = self._start.copy()
+            self._prepare()
         for array, start in zip(self.state, self._start, strict=True):
             array[:] = start
+        if self.arena.rules["eventful"][0]:
+            begin_events(self.arena, self.state, np.uint64(self._seed), mission)
         if self.disturbances:
             begin_random(
                 self.arena.disturbances, self.state.disturbance_random, np.uint64(self._seed),
@@ -149,7 +193,7 @@ class World:
         """
         if not isinstance(commands, np.ndarray):
             active = self.active
-            commands = pack(commands, self.names, active, len(self.scenario.waypoints))
+            commands = pack(commands, self.names, active, len(self.known.waypoints))
         elif commands.dtype != COMMAND_DTYPE or commands.shape != (len(self.names),):
             raise ValueError(
                 f"commands have dtype {commands.dtype} and shape {commands.shape}; "
@@ -169,7 +213,32 @@ class World:
         invalid = self._step(*arguments)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
+        if self._scene_events:
+            self._change_scene()
         return outcome
+
+    def _arena_of(self, scenario: Scenario) -> Arena:
+        return build_arena(scenario, measured_m=self._measured_m, disturbances=self.disturbances)
+
+    def _change_scene(self) -> None:
+        """Let happen at this sample what changes the scene: it is another one from now on."""
+        state = self.state
+        now = [e for e in self._scene_events if state.event_step[e] == state.step[0]]
+        if not now:
+            return
+        for e in now:
+            event = self.scenario.events[e]
+            self.known = self.known.after(event, self.time_s, int(state.event_uas[e]))
+        self.arena = self._arena_of(self.known)
+        uncovered = np.ones(len(self.known.waypoints), dtype=np.bool_)
+        uncovered[: len(state.uncovered)] = state.uncovered
+        positions_m = self.arena.waypoints["position_m"]
+        for obstacle, hull in zip(self.known.obstacles, self.known.hulls, strict=True):
+            if isinstance(obstacle, NoFlyZone):
+                uncovered &= hull.signed_distance(positions_m) >= 0.0
+        self._state = state._replace(uncovered=uncovered)
+        self.revisions += 1
+        self._prepare()
 
     def _fresh_outcome(self) -> NDArray[np.void]:
         """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""
@@ -206,20 +275,4 @@ class World:
 
     def swarm_state(self) -> SwarmState:
         """What players see now, in arrays of their own."""
-        state = self.state
-        step = int(state.step[0])
-        sample = min(step, len(self.arena.moving_path_m) - 1)
-        return SwarmState(
-            time_s=self.time_s,
-            step=step,
-            names=self.names,
-            x=state.x.copy(),
-            reference_mps=state.reference.copy(),
-            status=state.status.copy(),
-            departed=state.departed.copy(),
-            returning=state.returning.copy(),
-            uncovered=state.uncovered.copy(),
-            home_m=self.arena.uas["home_m"].copy(),
-            moving_position_m=self.arena.moving_path_m[sample].copy(),
-            moving_velocity_mps=self.arena.moving_velocity_mps[sample].copy(),
-        )
+        return swarm_state(self.known, self.arena, self.state)

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.geometry import ConvexPolytope, corners_of
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
@@ -21,7 +21,21 @@ from uas_coverage_env.world.disturbance import (
     disturbance_tables,
 )
 from uas_coverage_env.world.overhangs import overhangs
+from uas_coverage_env.world.events import (
+    EVENT_DTYPE,
+    SENSING_DTYPE,
+    event_records,
+    is_eventful,
+    sensing_records,
+)
 from uas_coverage_env.world.routes import node_distances
+from uas_coverage_env.world.waypoints import (
+    N_WAYPOINT_COLUMNS,
+    WAYPOINT_DTYPE,
+    unit_m_of,
+    waypoint_columns,
+    waypoint_records,
+)
 
 NEAR_M = 20.0
 """Obstacles that are farther need no exact distance, unless nothing is nearer [m]."""
@@ -34,12 +48,6 @@ NODE_MARGIN_M = 1.0
 
 LOOKAHEAD_S = 14.0
 """A braking flight takes less than this from the highest speed [s]."""
-
-ALL_SHARES = 2.0**30
-"""The weight of all waypoints, as a whole number. With it and positions of at most 2²², every sum
-of `Arena.waypoint_columns` stays below 2⁵³, up to where floats hold all whole numbers."""
-
-N_WAYPOINT_COLUMNS = 8
 
 SAMPLES_AFTER_END = 64
 """Moving obstacles are known this long after max_steps, for missions flown over time."""
@@ -95,15 +103,13 @@ OBSTACLE_DTYPE = _record(
         ("tall", "?"),
         # there is room below a part of it
         ("overhangs", "?"),
+        # nothing stands there: no contact
+        ("no_fly_zone", "?"),
     ]
 )
 
 MOVING_DTYPE = _record(
     [("radius_m", "f8"), ("half_height_m", "f8"), ("safe_distance_m", "f8")],
-)
-
-WAYPOINT_DTYPE = _record(
-    [("position_m", "f8", (3,)), ("radius_m", "f8"), ("weight", "f8")],
 )
 
 RULES_DTYPE = _record(
@@ -134,6 +140,8 @@ RULES_DTYPE = _record(
         ("disturbed", "?"),
         # whether any obstacle overhangs
         ("overhangs", "?"),
+        # whether any event may happen, or anything is sensed otherwise than it is
+        ("eventful", "?"),
         # of `waypoint_columns`
         ("unit_m", "f8"),
         # the command to stop and hold still
@@ -178,6 +186,9 @@ class Arena(NamedTuple):
     """As many as `WorldState` has room for; that is the same in all missions of a pool."""
     disturbance_parameters: Annotated[NDArray[np.float64], "parameters"]
     """Of all disturbances."""
+    events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
+    sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
+    """One for each UAS, or none where they are known as they are."""
 
 
 ARENA = Memory(Arena)
@@ -205,8 +216,8 @@ def build_arena(
     uas = _uas(scenario)
     radius_m = max(entry.radius_m for entry in scenario.uas)
     rules = _rules(scenario, radius_m, measured_m)
-    waypoints = _waypoints(scenario)
-    rules["unit_m"] = _unit_m(waypoints["position_m"])
+    waypoints = waypoint_records(scenario)
+    rules["unit_m"] = unit_m_of(waypoints["position_m"])
     targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
     overfly_m = _overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
     obstacles, planes, corners = _obstacles(scenario, radius_m, overfly_m)
@@ -220,6 +231,7 @@ def build_arena(
     blocks, parameters = disturbance_tables(disturbances)
     rules["disturbed"] = blocks["acts"].any()
     rules["overhangs"] = obstacles["overhangs"].any()
+    rules["eventful"] = is_eventful(scenario)
     nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
@@ -236,7 +248,7 @@ def build_arena(
         moving_path_m=moving_path_m,
         moving_velocity_mps=moving_velocity_mps,
         waypoints=waypoints,
-        waypoint_columns=_columns(waypoints, float(rules["unit_m"][0])),
+        waypoint_columns=waypoint_columns(waypoints, float(rules["unit_m"][0])),
         rules=rules,
         nodes_m=nodes_m,
         node_distance_m=node_distances(
@@ -244,6 +256,8 @@ def build_arena(
         ),
         disturbances=blocks,
         disturbance_parameters=parameters,
+        events=event_records(scenario),
+        sensing=sensing_records(scenario),
     )
 
 
@@ -262,26 +276,6 @@ def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
             path_m[k] = scenario.moving_positions(k * scenario.dt_s)
             velocity_mps[k] = scenario.moving_velocities(k * scenario.dt_s)
     return path_m, velocity_mps
-
-
-def _waypoints(scenario: Scenario) -> NDArray[np.void]:
-    rows = [(w.position_m, w.radius_m, w.weight) for w in scenario.waypoints]
-    return np.array(rows, dtype=WAYPOINT_DTYPE)
-
-
-def _unit_m(positions_m: NDArray[np.float64]) -> float:
-    """A power of two of which all horizontal positions are at most 2²² [m]."""
-    farthest_m = float(np.abs(positions_m[:, :2]).max())
-    return 2.0 ** (math.ceil(math.log2(max(farthest_m, 1.0))) - 22)
-
-
-def _columns(waypoints: NDArray[np.void], unit_m: float) -> NDArray[np.float64]:
-    reach_m2 = waypoints["radius_m"] * waypoints["radius_m"]
-    weight = waypoints["weight"]
-    shares = np.round(weight / weight.sum() * ALL_SHARES)
-    north, east = np.round(waypoints["position_m"].T[:2] / unit_m)
-    rows = [*waypoints["position_m"].T, reach_m2, weight, shares, shares * north, shares * east]
-    return np.array(rows, dtype=np.float64, order="C")
 
 
 def _uas(scenario: Scenario) -> NDArray[np.void]:
@@ -401,6 +395,7 @@ def _obstacles(
         record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m
         record["overhangs"] = overhangs(hull, ground_m)
+        record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
         if record["tall"]:
             outline = _footprint(_widened(kept, wall_m + NODE_MARGIN_M))
             corners.append(outline.points[outline.vertices])

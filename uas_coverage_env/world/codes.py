@@ -28,6 +28,8 @@ class ContactKind(IntEnum):
     GEOFENCE = outcome.FENCE
     BATTERY = outcome.BATTERY
     """It was discharged beyond `dod_max`."""
+    FAULT = outcome.FAULT
+    """An event of the scenario, `uas_lost`: no violation."""
 
 
 class CommandKind(IntEnum):

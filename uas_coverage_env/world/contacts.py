@@ -124,6 +124,25 @@ def obstacle_clearance(arena, x0, y0, z0, x1, y1, z1):
 
 
 @kernel
+def _solid_clearance(arena, x0, y0, z0, x1, y1, z1):
+    """`obstacle_clearance` without the no-fly zones: what can be touched; rarely asked for."""
+    smallest = math.inf
+    nearest = -1
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        if obstacle.no_fly_zone:
+            continue
+        clearance = segment_clearance(
+            arena.normals, arena.offsets_m, obstacle.first_face, obstacle.last_face,
+            x0, y0, z0, x1, y1, z1,
+        )  # fmt: skip
+        if clearance < smallest:
+            smallest = clearance
+            nearest = o
+    return smallest, nearest
+
+
+@kernel
 def moving_clearance(moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1):
     """Smallest clearance from moving obstacle m, going straight from now_m to next_m (M, 3)."""
     return cylinder_clearance(
@@ -184,7 +203,12 @@ def check_obstacles(arena, state, outcome):
         smallest, nearest = obstacle_clearance(arena, x0, y0, z0, x1, y1, z1)
         radius_m = arena.uas[i].radius_m
         if smallest < radius_m:
-            _record_contact(event, OBSTACLE, nearest)
+            if arena.obstacles[nearest].no_fly_zone:
+                near_m, nearest = _solid_clearance(arena, x0, y0, z0, x1, y1, z1)
+            else:
+                near_m = smallest
+            if near_m < radius_m:
+                _record_contact(event, OBSTACLE, nearest)
         for m in range(arena.moving.shape[0]):
             moving = arena.moving[m]
             gap_m = cylinder_gap(
@@ -325,5 +349,5 @@ def check_limits(arena, state, nonlinear, outcome):
         if event.flew:
             event.limits_exceeded = limits_exceeded(
                 arena.vehicles[i], state.x[i], event.voltage_V, event.current_A, nonlinear,
-                arena.rules[0].disturbed,
+                arena.rules[0].disturbed or arena.rules[0].eventful,
             )  # fmt: skip

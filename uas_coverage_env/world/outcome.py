@@ -5,10 +5,10 @@ import numpy as np
 from uas_coverage_env.vehicle import N_DEVIATIONS, N_INPUTS
 from uas_coverage_env.world.commands import COMMAND_DTYPE
 
-NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY = range(6)
-"""What a lost UAS was lost to."""
+NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY, FAULT = range(7)
+"""What a lost UAS was lost to; a FAULT is an event of the scenario, and no violation."""
 
-CONTACT_NAMES = ("none", "obstacle", "moving_obstacle", "uas", "geofence", "battery")
+CONTACT_NAMES = ("none", "obstacle", "moving_obstacle", "uas", "geofence", "battery", "fault")
 
 BREACH_TOLERANCE_M = 1e-9
 """Only what is nearer than a safe distance, or lower than the least height, by more than this is a
@@ -64,6 +64,8 @@ OUTCOME_DTYPE = np.dtype(
                 # the player returns, or return mode took over
                 ("returning", "?"),
                 ("landed", "?"),
+                # it waits at its start with its motors off
+                ("grounded", "?"),
             ],
             align=True,
         ),

@@ -6,9 +6,11 @@ from typing import Annotated, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
+from uas_coverage_env.world.events import EVERY, N_DELAYED, N_HEARD, NEVER
 
 FLYING, LANDED, LOST = range(3)
 """Status of a UAS. Landed and lost are final."""
@@ -40,13 +42,73 @@ class WorldState(NamedTuple):
     """What each of the D disturbances keeps for each UAS."""
     disturbance_random: Annotated[NDArray[np.uint64], "U", "D", 1]
     """The states of the generators that they draw from."""
+    event_step: Annotated[NDArray[np.int64], "E", Values(0, NEVER)]
+    """The sample at which each of the E events happens."""
+    event_uas: Annotated[NDArray[np.int64], "E", Values(EVERY, 2**31)]
+    """Whom it happens to: the index of a UAS, or EVERY."""
+    event_random: Annotated[NDArray[np.uint64], "E", 1]
+    """The states of the generators that they draw from."""
+    felt: Annotated[NDArray[np.float64], "S", N_STATES]
+    """What the inner loop flies by instead of `x`: for all UAS, or for none where they are known as
+    they are; likewise the next four."""
+    sensed: Annotated[NDArray[np.float64], "S", N_STATES]
+    """What the other parts of the autopilot fly by: the same with noise."""
+    told: Annotated[NDArray[np.float64], "S", N_STATES]
+    """What planners and learners are told of it: the same, later."""
+    delayed: Annotated[NDArray[np.float64], "S", N_DELAYED, N_STATES]
+    """The latest of `sensed`; that of sample k at k modulo their number."""
+    bias: Annotated[NDArray[np.float64], "S", 8]
+    """Errors that a mission draws: position [m], velocity [m/s], depth of discharge [-], and the
+    direction in which dead reckoning drifts [rad]."""
+    sensing_random: Annotated[NDArray[np.uint64], "S", 1]
+    """The states of the generators that sensors draw from."""
+    heard: Annotated[NDArray[np.float64], "S", N_HEARD]
+    """The latest command that reached each UAS."""
 
     def copy(self) -> Self:
         """The same state in arrays of its own."""
         return self._make(array.copy() for array in self)
 
+    def as_told(self) -> Self:
+        """The same arrays, `x` being what planners and learners are told."""
+        return self._replace(x=self.told) if len(self.told) else self
+
 
 STATE = Memory(WorldState)
+
+
+@inlined_kernel
+def as_felt(arena, state):
+    """The state as the inner loop knows it: `x` is what it flies by."""
+    if arena.sensing.shape[0] > 0:
+        return _with_x(state, state.felt)
+    return _with_x(state, state.x)
+
+
+@inlined_kernel
+def as_sensed(arena, state):
+    """The state as return mode, guidance and safety filter know it: `x` is what is sensed."""
+    if arena.sensing.shape[0] > 0:
+        return _with_x(state, state.sensed)
+    return _with_x(state, state.x)
+
+
+@inlined_kernel
+def as_told(arena, state):
+    """The state as learners know it: `x` is what they are told."""
+    if arena.sensing.shape[0] > 0:
+        return _with_x(state, state.told)
+    return _with_x(state, state.x)
+
+
+@inlined_kernel
+def _with_x(state, x):
+    return WorldState(
+        x, state.reference, state.status, state.departed, state.returning, state.uncovered,
+        state.step, state.disturbance_memory, state.disturbance_random, state.event_step,
+        state.event_uas, state.event_random, state.felt, state.sensed, state.told, state.delayed, state.bias,
+        state.sensing_random, state.heard,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +119,7 @@ class SwarmState:
         time_s: [s] since the start.
         step: Number of the sample.
         names: (U,) names of the UAS.
-        x: (U, 14) states, in the order of `vehicle.layout`.
+        x: (U, 14) states as they are sensed, in the order of `vehicle.layout`.
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST.
         departed: (U,) has been farther from its start than the landing distance.
@@ -66,6 +128,7 @@ class SwarmState:
         home_m: (U, 3) [m] the starts.
         moving_position_m: (M, 3) [m] centres of moving obstacles, now.
         moving_velocity_mps: (M, 3) [m/s] their velocities, now.
+        responds: (U,) takes commands now; not without its radio, nor before a late start.
     """
 
     time_s: float
@@ -80,6 +143,7 @@ class SwarmState:
     home_m: NDArray[np.float64]
     moving_position_m: NDArray[np.float64]
     moving_velocity_mps: NDArray[np.float64]
+    responds: NDArray[np.bool_]
 
     @property
     def active(self) -> tuple[str, ...]:

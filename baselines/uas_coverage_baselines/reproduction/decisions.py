@@ -35,6 +35,7 @@ def seen_at(flight: Flight, step: int) -> SwarmState:
         home_m=np.array([uas.start_m for uas in scenario.uas]),
         moving_position_m=scenario.moving_positions(time_s),
         moving_velocity_mps=scenario.moving_velocities(time_s),
+        responds=np.ones(len(x), bool),
     )
 
 

@@ -6,7 +6,7 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
 from uas_coverage_env.vehicle import X, Y
-from uas_coverage_env.world.arena import ALL_SHARES
+from uas_coverage_env.world.waypoints import ALL_SHARES
 
 _N_SECTORS = 8
 _NORTH, _EAST, _N_SUMS = _N_SECTORS, _N_SECTORS + 1, _N_SECTORS + 2
