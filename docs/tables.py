@@ -28,6 +28,7 @@ from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.registry import GROUP, KINDS, describe_planners
+from uas_coverage_env.scenario.events import EVENT_KINDS, EventTable
 from uas_coverage_env.scenario.schema import scenario_schema
 
 DOCS = Path(__file__).resolve().parent
@@ -195,6 +196,7 @@ def scenario_fields() -> str:
         "`[wind.random_gusts]`": "RandomGusts",
     }
     tables += [(title, schema["$defs"][model]) for title, model in nested.items()]
+    tables += _events(schema["$defs"])
     parts = []
     for title, part in tables:
         rows = [
@@ -206,8 +208,24 @@ def scenario_fields() -> str:
             )
             for name, entry in part["properties"].items()
         ]
-        parts += [f"### {title}", part["description"], table(("key", "value", "", "meaning"), rows)]
+        parts += [f"### {title}", part["description"]]
+        if rows:
+            parts += [table(("key", "value", "", "meaning"), rows)]
     return "\n\n".join(parts)
+
+
+def _events(parts: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """What all kinds of events have, then a table for each kind."""
+    first = parts[EVENT_KINDS[0].__name__]
+    shared = {name: first["properties"][name] for name in EventTable.model_fields}
+    description = inspect.getdoc(EventTable) or ""
+    tables = [("`[[events]]`", {"properties": shared, "description": description.splitlines()[0]})]
+    for kind in EVENT_KINDS:
+        part = parts[kind.__name__]
+        own = {name: entry for name, entry in part["properties"].items() if name not in shared}
+        name = own.pop("kind")["const"]
+        tables.append((f'`[[events]]` of `kind = "{name}"`', {**part, "properties": own}))
+    return tables
 
 
 def _type(entry: dict[str, Any]) -> str:
@@ -216,13 +234,16 @@ def _type(entry: dict[str, Any]) -> str:
         return _type(entry["anyOf"][0])
     if "$ref" in entry:
         return "a table"
+    if "const" in entry:
+        return f'`"{entry["const"]}"`'
     if "enum" in entry:
         return " or ".join(f'`"{value}"`' for value in entry["enum"])
     if entry["type"] == "array":
         if "prefixItems" in entry:
             return f"{len(entry['prefixItems'])} numbers"
         least = f", at least {entry['minItems']}" if "minItems" in entry else ""
-        of = "tables" if "$ref" in entry["items"] else f"entries of {_type(entry['items'])}"
+        tables = {"$ref", "oneOf"} & set(entry["items"])
+        of = "tables" if tables else f"entries of {_type(entry['items'])}"
         return f"{of}{least}"
     if entry["type"] == "object":
         return "tables by name"

@@ -103,6 +103,11 @@ def _disturbances(scenario: Scenario) -> list[str]:
     if scenario.uncertainty is not None:
         bounds = [f"{name} {bound:.0%}" for name, bound in scenario.uncertainty if bound]
         lines.append(f"vehicles other than believed: {', '.join(bounds) or 'by nothing'}")
+    if scenario.sensing is not None:
+        lines.append("[sensing]: UAS are known with errors")
+    for event in scenario.events:
+        when = f"at {event.at_s:g} s" if event.rate_per_h is None else f"{event.rate_per_h:g} per h"
+        lines.append(f"{event.kind} {when}")
     return lines
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 
 from uas_coverage_env.disturbances.gusts import discrete_gusts, random_gusts
+from uas_coverage_env.disturbances.motor import motor_degraded
 from uas_coverage_env.disturbances.turbulence import turbulence
 from uas_coverage_env.disturbances.uncertainty import uncertainty
 from uas_coverage_env.disturbances.wind import mean_wind
 from uas_coverage_env.scenario import Scenario, Uncertainty, Wind
+from uas_coverage_env.scenario.events import MotorDegraded
 from uas_coverage_env.world.disturbance import Disturbance, checked_disturbances
 
 
@@ -22,6 +24,11 @@ def disturbances_of(scenario: Scenario) -> tuple[Disturbance, ...]:
     if scenario.uncertainty is not None and scenario.uncertainty != Uncertainty():
         found.append(uncertainty(scenario.uncertainty))
     found += [table.disturbance() for _, table in scenario.disturbances]
+    found += [
+        motor_degraded(e, event)
+        for e, event in enumerate(scenario.events)
+        if isinstance(event, MotorDegraded)
+    ]
     return checked_disturbances(found)
 
 

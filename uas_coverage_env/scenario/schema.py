@@ -2,11 +2,14 @@
 
 import inspect
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
 
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
+from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
@@ -18,11 +21,13 @@ from uas_coverage_env.scenario.fields import (
     Waypoint,
 )
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 _TABLES = (
     *(Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
-    *(Place, Wind, Gust, RandomGusts, Uncertainty),
+    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing),
+    *EVENT_KINDS,
 )
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
@@ -42,12 +47,19 @@ def scenario_schema() -> dict[str, Any]:
 
 def _describe(table: dict[str, Any], model: type[BaseModel]) -> None:
     """Put the docstring's sentences where editors show them."""
-    summary, _, attributes = (inspect.getdoc(model) or "").partition("\nAttributes:")
+    summary = (inspect.getdoc(model) or "").partition("\nAttributes:")[0]
     table["description"] = " ".join(summary.split())
-    meanings = {name: " ".join(text.split()) for name, text in _ENTRY.findall(attributes)}
+    meanings = {name: " ".join(text.split()) for name, text in _meanings(model)}
     for name, field in model.model_fields.items():
         entry = table["properties"][field.alias or name]
         entry["description"] = meanings.get(name, "")
         if entry.get("type") == "array" and "minLength" in entry:
             # where a validator stands before a tuple pydantic takes it for text
             entry["minItems"] = entry.pop("minLength")
+
+
+def _meanings(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
+    """Name and meaning of each field, as its own class says it, or that it is derived from."""
+    for each in reversed(model.__mro__):
+        if issubclass(each, StrictModel):
+            yield from _ENTRY.findall((inspect.getdoc(each) or "").partition("\nAttributes:")[2])

@@ -265,8 +265,8 @@ def sense(arena, state):
         random = state.sensing_random[i]
         felt = state.felt[i]
         sensed = state.sensed[i]
-        north_m = felt[X]
-        east_m = felt[Y]
+        north_m, north_mps = felt[X], felt[VX]
+        east_m, east_mps = felt[Y], felt[VY]
         for k in range(N_STATES):
             felt[k] = state.x[i, k]
         drift_mps = -1.0
@@ -282,8 +282,8 @@ def sense(arena, state):
             dt_s = arena.rules[0].dt_s
             felt[VX] += drift_mps * math.cos(state.bias[i, 7])
             felt[VY] += drift_mps * math.sin(state.bias[i, 7])
-            felt[X] = north_m + dt_s * felt[VX]
-            felt[Y] = east_m + dt_s * felt[VY]
+            felt[X] = north_m + 0.5 * dt_s * (north_mps + felt[VX])
+            felt[Y] = east_m + 0.5 * dt_s * (east_mps + felt[VY])
         for k in range(N_STATES):
             sensed[k] = felt[k]
         for axis in range(3):

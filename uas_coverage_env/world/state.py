@@ -106,8 +106,8 @@ def _with_x(state, x):
     return WorldState(
         x, state.reference, state.status, state.departed, state.returning, state.uncovered,
         state.step, state.disturbance_memory, state.disturbance_random, state.event_step,
-        state.event_uas, state.event_random, state.felt, state.sensed, state.told, state.delayed, state.bias,
-        state.sensing_random, state.heard,
+        state.event_uas, state.event_random, state.felt, state.sensed, state.told, state.delayed,
+        state.bias, state.sensing_random, state.heard,
     )  # fmt: skip
 
 

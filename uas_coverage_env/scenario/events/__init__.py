@@ -1,6 +1,6 @@
 """What may happen during a mission: the tables `[[events]]` of a scenario, a class per kind."""
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import Field, Strict
 
@@ -8,6 +8,7 @@ from uas_coverage_env.scenario.events.of_uas import (
     ChargeLost,
     GnssLost,
     LateStart,
+    MotorDegraded,
     PlannerLost,
     RadioLost,
     Then,
@@ -30,6 +31,7 @@ Event = Annotated[
     | PlannerLost
     | GnssLost
     | LateStart
+    | MotorDegraded
     | ChargeLost
     | WaypointDropped
     | WaypointAdded
@@ -42,10 +44,14 @@ Event = Annotated[
 ]
 """A table of any kind: `kind` says which."""
 
+EVENT_KINDS: tuple[type[EventTable], ...] = get_args(get_args(Event)[0])
+"""The classes of all kinds."""
+
 Events = Annotated[tuple[Event, ...], Strict(False), Field(max_length=1000)]
 
 __all__ = [
     "EFFECTS",
+    "EVENT_KINDS",
     "ChargeLost",
     "Effect",
     "Event",
@@ -54,6 +60,7 @@ __all__ = [
     "GnssLost",
     "HomeClosed",
     "LateStart",
+    "MotorDegraded",
     "MovingObstacleAdded",
     "MovingObstacleTurns",
     "NoFlyZoneAdded",

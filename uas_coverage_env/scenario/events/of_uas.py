@@ -22,8 +22,6 @@ class UasLost(OfUas):
 
     Attributes:
         kind: `"uas_lost"`.
-        at_s: See `EventTable`; likewise `rate_per_h`.
-        uas: Name of the UAS; without it, one is drawn with the mission's seed.
     """
 
     kind: Literal["uas_lost"]
@@ -38,7 +36,6 @@ class RadioLost(OfUas):
 
     Attributes:
         kind: `"radio_lost"`.
-        uas: Name of the UAS; without it, one is drawn with the mission's seed.
         for_s: How long [s].
         then: What it flies meanwhile: `"go_on"` (its last command), `"hover"` or `"return"`.
     """
@@ -77,7 +74,6 @@ class GnssLost(OfUas):
 
     Attributes:
         kind: `"gnss_lost"`.
-        uas: Name of the UAS; without it, one is drawn with the mission's seed.
         for_s: How long [s].
         drift_mps: How wrong its velocity is meanwhile [m/s].
     """
@@ -96,7 +92,6 @@ class LateStart(OfUas):
 
     Attributes:
         kind: `"late_start"`.
-        uas: Name of the UAS; without it, one is drawn with the mission's seed.
     """
 
     kind: Literal["late_start"]
@@ -112,12 +107,28 @@ class LateStart(OfUas):
         return Effect("ground")
 
 
+class MotorDegraded(OfUas):
+    """A motor of a UAS is damaged from now on: it has less thrust and draws more power.
+
+    It acts as a disturbance does (`disturbances.motor_degraded`), and is taken away with these.
+
+    Attributes:
+        kind: `"motor_degraded"`.
+        thrust_share: Share of the greatest thrust that is left; below what hovering takes, the UAS
+            sinks [-].
+        power_factor: How many times as much power it draws for the same thrust [-].
+    """
+
+    kind: Literal["motor_degraded"]
+    thrust_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    power_factor: Annotated[float, Field(ge=1.0, le=5.0)] = 1.0
+
+
 class ChargeLost(OfUas):
     """The battery of a UAS loses charge at once: a cell fails, or what it holds was overrated.
 
     Attributes:
         kind: `"charge_lost"`.
-        uas: Name of the UAS; without it, one is drawn with the mission's seed.
         share: How much of its capacity [-].
     """
 

@@ -200,7 +200,6 @@ class HomeClosed(OfUas):
 
     Attributes:
         kind: `"home_closed"`.
-        uas: Name of the UAS; without it, one is drawn with the mission's seed.
         alternative_m: Where it lands instead, at the height of a start [m].
     """
 

@@ -39,10 +39,11 @@ class Effect:
 
 
 class EventTable(StrictModel):
-    """When an event happens; to be derived from, a class for each kind.
+    """Something that happens during the mission: either at a time or at a rate.
 
-    A kind acts on the state of the world (`effect`), in every environment, or it changes the scene
-    (`revised`): what planners are briefed of is then another from that time on.
+    To be derived from, a class for each kind. A kind acts on the state of the world (`effect`), in
+    every environment, or it changes the scene (`revised`): what planners are briefed of is then
+    another from that time on.
 
     Attributes:
         at_s: Time at which it happens: at the first sample from then on [s].

@@ -1,0 +1,27 @@
+"""A motor that is damaged in flight: an event that acts on what the vehicle can do."""
+
+from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.scenario.events import MotorDegraded
+from uas_coverage_env.vehicle import LIFT, POWER
+from uas_coverage_env.world.disturbance import Disturbance
+from uas_coverage_env.world.events import concerns
+
+
+@kernel
+def degrade(arena, state, outcome, i, parameters, memory, random):
+    """Fly with what is left; parameters: number of the event, share of the thrust, power factor.
+
+    The autopilot makes up for the motor as far as the thrust goes, and pays with power.
+    """
+    e = int(parameters[0])
+    if concerns(state, e, i) and state.step[0] >= state.event_step[e]:
+        event, vehicle = outcome[i], arena.vehicles[i]
+        thrust_N = parameters[1] * (vehicle.weight_N + vehicle.lift_max_N)
+        event.u[LIFT] = min(event.u[LIFT], thrust_N - vehicle.weight_N)
+        event.deviation[POWER] += parameters[2] - 1.0
+
+
+def motor_degraded(e: int, event: MotorDegraded) -> Disturbance:
+    """What event number e of a scenario does."""
+    name = f"events[{e}] motor_degraded"
+    return Disturbance(name, degrade, (float(e), event.thrust_share, event.power_factor))
