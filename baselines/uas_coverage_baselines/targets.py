@@ -37,17 +37,20 @@ class Targets:
         self._view.update(swarm)
         blocked = self._view.blocked()
         free = wanted & ~blocked
+        # one that no command reaches gets no waypoint: the others cover it
+        reached = [name for name in swarm.active if swarm.responds[swarm.names.index(name)]]
         self._target = {
             name: target
             for name, target in self._target.items()
-            if name in swarm.active and free[target]
+            if name in reached and free[target]
         }
-        for name in swarm.active:
+        for name in reached:
             if name not in self._target:
                 candidates = self._candidates(wanted, free)
                 self._target[name] = choose(swarm, swarm.names.index(name), candidates)
         self._attempts.update(swarm, self._target, blocked)
-        return {name: self._command(swarm, name) for name in swarm.active}
+        commands = {name: GoTo(None) for name in swarm.active}
+        return commands | {name: self._command(swarm, name) for name in reached}
 
     def nearest(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         """The candidate nearest to a UAS."""

@@ -56,9 +56,8 @@ def test_a_uas_without_a_radio_flies_what_the_scenario_says(then, north_mps):
 
 
 def test_a_uas_without_a_radio_may_return():
-    world = after(hovering(event("radio_lost", 20.0, uas="uas_1", for_s=99.0, then="return")), 20)
-    away_m = world.state.x[0, 0] - 40.0
-    assert away_m > 25.0
+    world = after(hovering(event("radio_lost", 10.0, uas="uas_1", for_s=99.0, then="return")), 10)
+    assert world.state.x[0, 0] - 40.0 > 12.0
     assert after(world, 25, Velocity(0.0, 0.0, 20.0)).state.status.tolist() == [LANDED, FLYING]
 
 

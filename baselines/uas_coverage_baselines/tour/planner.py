@@ -185,7 +185,7 @@ class Tour:
             self._returns[i] = has_to_return(self._arena, self._world.state, i)
         return View(
             x=swarm.x,
-            may_work=flies & ~self._returns,
+            may_work=flies & ~self._returns & swarm.responds,
             flies=flies,
             uncovered=swarm.uncovered,
             blocked=self._world.blocked(_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M),
