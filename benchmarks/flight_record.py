@@ -125,7 +125,8 @@ def read_record(directory: Path) -> FlightRecord:
         summary = json.loads((directory / name).read_text(encoding="utf-8"))
         name = "run.json"
         run = json.loads((directory / name).read_text(encoding="utf-8"))
-        dynamics, disturbed = run["dynamics"], bool(run.get("disturbances"))
+        dynamics = run["dynamics"]
+        disturbed = bool(run.get("disturbances")) or "sensing" in scenario
         vehicles = []
         for uas in scenario["uas"]:
             # shipped ones by their names, a user's own by the file beside the scenario
@@ -145,6 +146,8 @@ def read_record(directory: Path) -> FlightRecord:
         reason = " ".join(str(error).split())
         kind = type(error).__name__
         raise BadFlightError(f"{directory / name}: was damaged ({kind}: {reason})") from error
+    if scenario.get("events"):
+        raise BadFlightError(f"{directory}: events happen in it, which are not judged here")
     return FlightRecord(scenario, summary, tracks, moving_m, plan, dynamics, disturbed)
 
 

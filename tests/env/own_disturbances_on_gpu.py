@@ -33,12 +33,23 @@ OWN = (
 )
 
 
-def compare(**settings):
+EVENTS = (
+    {"kind": "uas_lost", "rate_per_h": 600.0},
+    {"kind": "radio_lost", "rate_per_h": 1200.0, "for_s": 2.0, "then": "go_on"},
+    {"kind": "gnss_lost", "at_s": 2.0, "for_s": 2.0, "drift_mps": 1.0},
+    {"kind": "late_start", "at_s": 2.0, "uas": "uas_2"},
+    {"kind": "motor_degraded", "at_s": 3.0, "thrust_share": 0.9, "power_factor": 1.3},
+)
+EVENTFUL = GROUND.model_copy(
+    update={"events": EVENTS, "sensing": {"position_noise_m": 0.5, "delay_steps": 1}}
+)
+
+
+def compare(ground=GROUND, disturbances=OWN, **settings):
     """Fly both ways past the end of missions; lanes have seeds of their own."""
-    missions = CudaMissions(N_LANES, GROUND, seed=SEED, disturbances=OWN, **settings)
-    episodes = [
-        Episode(GROUND, MissionSettings(disturbances=OWN, **settings)) for _ in range(N_LANES)
-    ]
+    settings = {"disturbances": disturbances, **settings}
+    missions = CudaMissions(N_LANES, ground, seed=SEED, **settings)
+    episodes = [Episode(ground, MissionSettings(**settings)) for _ in range(N_LANES)]
     flown = [0] * N_LANES
     for lane, episode in enumerate(episodes):
         episode.reset(SEED + lane)
@@ -67,4 +78,5 @@ def compare(**settings):
 
 
 if __name__ == "__main__":
-    print(json.dumps([compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]))
+    own = [compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]
+    print(json.dumps([*own, compare(EVENTFUL, None)]))

@@ -6,6 +6,7 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import ContactKind, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import CoverageBatch
+from uas_coverage_env.env.cuda import CudaMissions
 
 GROUND = practice_ground(n_uas=2, max_steps=16)
 SENSING = {"position_noise_m": 0.5, "velocity_bias_mps": 0.1, "delay_steps": 2}
@@ -87,6 +88,12 @@ def test_an_event_that_changes_the_scene_is_refused_in_one_line():
         with pytest.raises(ValueError, match="'home_closed', which changes the scene") as caught:
             make(scenario)
         assert "\n" not in str(caught.value)
+
+
+def test_what_takes_guidance_is_refused_on_a_gpu():
+    scenario = GROUND.model_copy(update={"events": ({"kind": "planner_lost", "at_s": 5.0},)})
+    with pytest.raises(ValueError, match=r"sends UAS home.*\(then = \"hover\"\)"):
+        CudaMissions(1, scenario)
 
 
 def test_a_batch_that_is_put_aside_goes_on_with_its_events():
