@@ -49,7 +49,7 @@ def moment_of(
     return Moment(
         tuple(uas.name for uas in pool.scenarios[s].uas),
         arena,
-        STATE.lane(worlds, lane, sizes),
+        STATE.lane(worlds, lane, sizes).as_told(),
         TABLES.mission(pool.arrays.tables, s),
         LEARNERS.lane(learners, lane, sizes),
         pool.settings.dynamics == "nonlinear",

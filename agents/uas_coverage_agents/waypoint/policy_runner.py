@@ -35,7 +35,6 @@ from uas_coverage_env.world import (
     SwarmState,
     WorldState,
 )
-from uas_coverage_env.world.state import STATE
 
 
 def network(hidden: int, prior: float) -> Pointer:
@@ -104,7 +103,7 @@ class WaypointRunner:
         self._returning = np.zeros(n_uas, dtype=np.bool_)
         self._blocked = np.zeros(n_waypoints, dtype=np.bool_)
         self._workspace = Workspace(
-            state=STATE.zeros({"U": n_uas, "W": n_waypoints, "D": 0}),
+            state=self._view.state.copy(),
             commands=np.zeros(n_uas, dtype=COMMAND_DTYPE),
             outcome=np.zeros(n_uas, dtype=OUTCOME_DTYPE),
             choices=Choices(
