@@ -83,6 +83,7 @@ QUICK = {
     "replay/test_figures.py": "but test_every_kind_is_a_vector_file_that_repeats_to_the_byte",
     "replay/test_replay_page.py": "",
     "replay/test_viewer_bundle.py": "",
+    "scenario/test_event_tables.py": "",
     "scenario/test_flood_village.py": "",
     "scenario/test_scenario_checks.py": "",
     "scenario/test_scenario_load.py": "",

@@ -19,9 +19,9 @@ from uas_coverage_env.vehicle import DOD, U_TH
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.disturbance import checked_disturbances
-from uas_coverage_env.world.events import begin_events, is_eventful, responding
+from uas_coverage_env.world.events import begin_events, is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState
+from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState, responding
 
 Dynamics = Literal["lpv", "nonlinear"]
 

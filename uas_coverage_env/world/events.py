@@ -6,7 +6,6 @@ that change the scene are left to whoever holds the arena, see `simulation.World
 """
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,6 @@ from uas_coverage_env.scenario.events import EFFECTS, OfUas
 from uas_coverage_env.vehicle import DOD, N_STATES, U_TH, VX, VY, X, Y, open_circuit_V
 from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME
 from uas_coverage_env.world.outcome import FAULT, NONE
-
-if TYPE_CHECKING:
-    from uas_coverage_env.world.state import WorldState
 
 NO_EFFECT, LOSE, DEAFEN, BLIND, GROUND, DISCHARGE, DROP = range(len(EFFECTS))
 
@@ -309,11 +305,3 @@ def write_responds(arena, state, responds):
                     responds[i] = False
                 if effect == DEAFEN and lasts(arena, state, e, step):
                     responds[i] = False
-
-
-def responding(arena, state: "WorldState") -> NDArray[np.bool_]:
-    """(U,) which UAS take commands in the coming step."""
-    responds = np.ones(len(arena.uas), dtype=np.bool_)
-    if len(arena.events):
-        write_responds(arena, state, responds)
-    return responds

@@ -1,7 +1,7 @@
 """The state of the world, and the part of it that a player sees."""
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
-from uas_coverage_env.world.events import EVERY, N_DELAYED, N_HEARD, NEVER
+from uas_coverage_env.world.events import EVERY, N_DELAYED, N_HEARD, NEVER, write_responds
 
 FLYING, LANDED, LOST = range(3)
 """Status of a UAS. Landed and lost are final."""
@@ -109,6 +109,14 @@ def _with_x(state, x):
         state.event_uas, state.event_random, state.felt, state.sensed, state.told, state.delayed,
         state.bias, state.sensing_random, state.heard,
     )  # fmt: skip
+
+
+def responding(arena: Any, state: WorldState) -> NDArray[np.bool_]:
+    """(U,) which UAS take commands in the coming step."""
+    responds = np.ones(len(arena.uas), dtype=np.bool_)
+    if len(arena.events):
+        write_responds(arena, state, responds)
+    return responds
 
 
 @dataclass(frozen=True, slots=True)
