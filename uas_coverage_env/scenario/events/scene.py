@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import Field
 
-from uas_coverage_env.scenario.events.table import Effect, EventTable, OfUas
+from uas_coverage_env.scenario.events.table import Effect, EventTable, OfUas, Scene
 from uas_coverage_env.scenario.fields import (
     Distance_m,
     Length_m,
@@ -22,9 +22,6 @@ from uas_coverage_env.scenario.fields import (
     Velocity_mps,
     Waypoint,
 )
-
-if TYPE_CHECKING:
-    from uas_coverage_env.scenario.unchecked import UncheckedScenario
 
 T = TypeVar("T", MovingObstacle, Uas)
 
@@ -44,7 +41,7 @@ class WaypointDropped(EventTable):
         """It is open no more."""
         return Effect("drop", values=(float(self.waypoint),))
 
-    def mistakes(self, scenario: UncheckedScenario) -> Iterator[str]:
+    def mistakes(self, scenario: Scene) -> Iterator[str]:
         """A waypoint that there is not."""
         n = len(scenario.waypoints)
         if self.waypoint >= n:
@@ -68,7 +65,7 @@ class WaypointAdded(EventTable):
     radius_m: Length_m
     weight: Annotated[float, Field(gt=0.0, le=1e6)] = 1.0
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """The waypoint comes last."""
         new = Waypoint(position_m=self.position_m, radius_m=self.radius_m, weight=self.weight)
         return {"waypoints": (*scenario.waypoints, new)}
@@ -91,7 +88,7 @@ class ObstacleAdded(EventTable):
     safe_distance_m: Distance_m
     vertices_m: Points_m
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """The obstacle comes last."""
         return {"obstacles": (*scenario.obstacles, self._body(Obstacle))}
 
@@ -116,7 +113,7 @@ class NoFlyZoneAdded(ObstacleAdded):
 
     kind: Literal["no_fly_zone"]  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """The zone comes last among the obstacles."""
         return {"obstacles": (*scenario.obstacles, self._body(NoFlyZone))}
 
@@ -144,7 +141,7 @@ class MovingObstacleAdded(EventTable):
     position_m: Position_m
     velocity_mps: Velocity_mps
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """The obstacle comes last; until now it has stood where it appears."""
         new = MovingObstacle(
             name=self.name,
@@ -175,7 +172,7 @@ class MovingObstacleTurns(EventTable):
     moving_obstacle: Name
     velocity_mps: Velocity_mps
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """Its schedule ends with this velocity."""
         turn = ScheduledVelocity(from_s=time_s, velocity_mps=self.velocity_mps)
         return {
@@ -187,7 +184,7 @@ class MovingObstacleTurns(EventTable):
             )
         }
 
-    def mistakes(self, scenario: UncheckedScenario) -> Iterator[str]:
+    def mistakes(self, scenario: Scene) -> Iterator[str]:
         """A moving obstacle that there is not."""
         known = [obstacle.name for obstacle in scenario.moving_obstacles]
         if self.moving_obstacle not in known:
@@ -208,7 +205,7 @@ class HomeClosed(OfUas):
     kind: Literal["home_closed"]
     alternative_m: Position_m
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """Its start is the other place."""
         fleet = list(scenario.uas)
         fleet[uas] = _with(fleet[uas], start_m=self.alternative_m)

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 from pydantic import Field, model_validator
 
 from uas_coverage_env.files.strict_toml import StrictModel
-from uas_coverage_env.scenario.fields import Name
-
-if TYPE_CHECKING:
-    from uas_coverage_env.scenario.unchecked import UncheckedScenario
+from uas_coverage_env.scenario.fields import MovingObstacle, Name, Obstacle, Uas, Waypoint
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
 
@@ -36,6 +33,30 @@ class Effect:
     for_s: float = math.inf
     values: tuple[float, ...] = ()
     on_all: bool = False
+
+
+class Scene(Protocol):
+    """What events know of a scenario."""
+
+    @property
+    def uas(self) -> tuple[Uas, ...]:
+        """The fleet."""
+        ...
+
+    @property
+    def waypoints(self) -> tuple[Waypoint, ...]:
+        """What is to be covered."""
+        ...
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Fixed obstacles."""
+        ...
+
+    @property
+    def moving_obstacles(self) -> tuple[MovingObstacle, ...]:
+        """Moving obstacles."""
+        ...
 
 
 class EventTable(StrictModel):
@@ -66,7 +87,7 @@ class EventTable(StrictModel):
         """What it does to the state of the world."""
         return Effect()
 
-    def revised(self, scenario: UncheckedScenario, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """The fields of the scenario that are others from time_s on.
 
         Indices stay what they were: what is new comes last.
@@ -78,7 +99,7 @@ class EventTable(StrictModel):
         """
         return {}
 
-    def mistakes(self, scenario: UncheckedScenario) -> Iterator[str]:
+    def mistakes(self, scenario: Scene) -> Iterator[str]:
         """What it names although the scenario has no such thing: field, value and fix."""
         yield from ()
 
@@ -92,7 +113,7 @@ class OfUas(EventTable):
 
     uas: Name | None = None
 
-    def mistakes(self, scenario: UncheckedScenario) -> Iterator[str]:
+    def mistakes(self, scenario: Scene) -> Iterator[str]:
         """A UAS that there is not."""
         known = [uas.name for uas in scenario.uas]
         if self.uas is not None and self.uas not in known:
