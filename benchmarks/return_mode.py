@@ -34,6 +34,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import beta
 
+from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, generate_scenario
 from uas_coverage_env.simulation import World
@@ -257,9 +258,15 @@ def _away(rng: Rng, dt_s: float, away_m: Vector) -> Iterator[Wish]:
 PLAYERS = {"jitter": _jitter, "hold": _hold, "fast": _fast, "away": _away}
 
 
-def fly(family: str, player: str, seed: int) -> Counter[str]:
-    """One mission: what there is to count."""
-    world = World(mission(family, seed), return_mode=True, safety_filter=True)
+def fly(family: str, player: str, seed: int, wind_mps: float = 0.0) -> Counter[str]:
+    """One mission, the wind from a drawn direction: what there is to count."""
+    from_deg = float(np.random.default_rng([seed, 2]).uniform(0.0, 360.0))
+    world = World(
+        mission(family, seed),
+        return_mode=True,
+        safety_filter=True,
+        disturbances=(constant_wind(wind_mps, from_deg),) if wind_mps else None,
+    )
     n_uas = len(world.names)
     commands = np.zeros(n_uas, COMMAND_DTYPE)
     status, x = world.state.status, world.state.x
@@ -331,6 +338,7 @@ def main(
     families: Annotated[str, typer.Option(help="Which families.")] = ",".join(FAMILIES),
     players: Annotated[str, typer.Option(help="Which players.")] = ",".join(PLAYERS),
     first_seed: Annotated[int, typer.Option(min=0, help="Of the missions.")] = FIRST_SEED,
+    wind_mps: Annotated[float, typer.Option(min=0.0, help="Constant, unknown to all.")] = 0.0,
     verbose: Annotated[bool, typer.Option(help="Name the missions with losses.")] = False,
 ) -> None:
     """Fly random players until all UAS are down, and print a table."""
@@ -339,7 +347,7 @@ def main(
         for player in _chosen(players, PLAYERS, "player"):
             tallies[family, player] = Counter()
             for seed in range(first_seed, first_seed + missions):
-                tally = fly(family, player, seed)
+                tally = fly(family, player, seed, wind_mps)
                 tallies[family, player].update(tally)
                 if verbose and _lost(tally):
                     sys.stderr.write(f"{family} {player} {seed}: {dict(tally)}\n")

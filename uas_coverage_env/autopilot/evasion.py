@@ -70,7 +70,7 @@ def _room_m(arena, step, i, path_m):
 def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
     """Whether braking after one step of a command is clear of all that stands still or brakes."""
     n_flown, slack_m = fly_and_brake(
-        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m
+        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m, state.belief[i]
     )
     enough_m = -TOLERANCE_M
     slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
@@ -82,7 +82,10 @@ def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
 @kernel
 def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
     """Whether an evasive flight meets nothing that stands still and no path of another UAS."""
-    fly_hold_and_brake(arena, i, state.x[i], state.reference[i], command, n_held, nonlinear, path_m)
+    fly_hold_and_brake(
+        arena, i, state.x[i], state.reference[i], command, n_held, nonlinear, path_m,
+        state.belief[i],
+    )  # fmt: skip
     slack_m = fixed_slack(arena, i, path_m, path_m.shape[0] - 1, 0.0, PLENTY_M)
     if slack_m >= 0.0:
         slack_m = peer_slack(arena, state.status, i, path_m, committed_m, 0.0, slack_m)

@@ -122,14 +122,14 @@ def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
 
 
 @kernel
-def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
     """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
-    n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m)
+    n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m, belief)
     return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
 
 
 @allocating_kernel
-def guide(arena, i, x, reference, target, stop, nonlinear, command):
+def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None):
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
     The wish (fly along the route, in time over low roofs) is flown as far as it leaves room to
@@ -144,6 +144,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
         stop: Come to rest at the target instead of flying by.
         nonlinear: Whether the world flies the 6-DOF plant.
         command: A record of COMMAND_DTYPE; kind and values are written.
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
     """
     row, x1, y1, z1 = target_position(arena, i, target)
     end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
@@ -179,18 +180,18 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
     for share in _SHARES_OF_SPEED:
         for wanted_m in (altitude_m, level_m):
             write_command(command, VELOCITY, share * north_mps, share * east_mps, wanted_m)
-            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
                 return
     if abs(altitude_m + x[Z]) > HEADROOM_M:
         write_command(command, VELOCITY, 0.0, 0.0, altitude_m)
-        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
             return
     if leg == CLEAR and arena.rules[0].overhangs:
         # what is in the way of a climb is not in the way of the straight line
         held_m = -x[Z] - x[VZ]
         for share in _SHARES_OF_SPEED:
             write_command(command, VELOCITY, share * north_mps, share * east_mps, held_m)
-            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
                 return
     for turn in _TURNS:
         cos = _SHARE_WHEN_TURNED * math.cos(turn)
@@ -198,7 +199,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command):
         turned_north_mps = cos * north_mps - sin * east_mps
         turned_east_mps = sin * north_mps + cos * east_mps
         write_command(command, VELOCITY, turned_north_mps, turned_east_mps, level_m)
-        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m):
+        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
             return
     write_brake(command)
 
@@ -225,4 +226,7 @@ def steer(arena, state, nonlinear, outcome):
         if command.kind == GO_TO:
             target = int(command.values[0])
             stop = target < 0 or not state.uncovered[target]
-            guide(arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command)
+            guide(
+                arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command,
+                state.belief[i],
+            )  # fmt: skip

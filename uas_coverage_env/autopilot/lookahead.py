@@ -2,6 +2,7 @@
 
 import math
 
+from uas_coverage_env.autopilot.belief import believed_kinematics, believed_wrench
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
@@ -26,7 +27,7 @@ from uas_coverage_env.world.commands import WRENCH
 from uas_coverage_env.world.contacts import face_between, moving_clearance
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart
-from uas_coverage_env.world.state import FLYING
+from uas_coverage_env.world.state import FLYING, WIND
 
 TOLERANCE_M = 1e-3
 """Clearances of a braking flight may be missed by this: rounding must not forbid braking on."""
@@ -41,11 +42,11 @@ _STILL = 0.02
 
 
 @kernel
-def _is_still(x):
-    """Slow and level enough that what is left of the motion is centimetres."""
+def _is_still(x, roll_rad, pitch_rad):
+    """Slow and as level as in a hover, so that what is left of the motion is centimetres."""
     return (
         abs(x[VX]) + abs(x[VY]) + abs(x[VZ]) < _STILL
-        and abs(x[PHI]) + abs(x[THETA]) < 0.2 * _STILL
+        and abs(x[PHI] - roll_rad) + abs(x[THETA] - pitch_rad) < 0.2 * _STILL
         and abs(x[WX]) + abs(x[WY]) < 0.2 * _STILL
     )
 
@@ -59,8 +60,15 @@ def _kept_m(required_m, now_m):
     return min(required_m, now_m - TOLERANCE_M)
 
 
+@kernel
+def _fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
+    """Fly a command for a step in the disturbances believed in."""
+    believed_wrench(vehicle, belief, x, governed, command, u)
+    believed_kinematics(vehicle, belief, nonlinear, x, u)
+
+
 @inlined_kernel
-def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
+def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m, belief=None):
     """Simulate a command for one step, then braking until the UAS stands.
 
     The simulation is the inner loop and the dynamics that the world flies. So where a command was
@@ -75,16 +83,17 @@ def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m):
         command: A record of COMMAND_DTYPE, of any kind but GO_TO.
         nonlinear: Whether the world flies the 6-DOF plant, and this too.
         path_m: (N+1, 3) [m] positions, written; after a stop the position stays.
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
 
     Returns:
         (steps until it stands, slack [m]): the slack is PLENTY_M, but negative where the UAS has
         not come to rest at the end of the path.
     """
-    return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m)
+    return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m, belief)
 
 
 @inlined_kernel
-def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m):
+def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m, belief=None):
     """Like `fly_and_brake`, with the command flown for n_held steps."""
     n_steps = path_m.shape[0] - 1
     vehicle = arena.vehicles[i]
@@ -100,20 +109,28 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
     path_m[0, 0] = x[X]
     path_m[0, 1] = x[Y]
     path_m[0, 2] = x[Z]
+    roll_rad, pitch_rad = 0.0, 0.0
+    if belief is not None and arena.rules[0].disturbed:
+        # a hover leans into the wind
+        roll_rad = -vehicle.trim_rad_per_mps * belief[WIND + 1]
+        pitch_rad = vehicle.trim_rad_per_mps * belief[WIND]
     for k in range(n_steps):
         # one call: what is flown becomes part of this function
         flown = command if k < n_held else arena.rules[0].brake
-        command_wrench(vehicle, x, governed, flown, u)
-        if nonlinear:
-            plant_step(vehicle, x, u, x)
+        if belief is not None and arena.rules[0].disturbed:
+            _fly_as_believed(vehicle, belief, x, governed, flown, nonlinear, u)
         else:
-            fly_kinematics(vehicle, x, u)
+            command_wrench(vehicle, x, governed, flown, u)
+            if nonlinear:
+                plant_step(vehicle, x, u, x)
+            else:
+                fly_kinematics(vehicle, x, u)
         if k < n_held and command.kind == WRENCH:
             reseed_reference(vehicle, x, governed)
         path_m[k + 1, 0] = x[X]
         path_m[k + 1, 1] = x[Y]
         path_m[k + 1, 2] = x[Z]
-        if k + 1 >= n_held and _is_still(x):
+        if k + 1 >= n_held and _is_still(x, roll_rad, pitch_rad):
             for later in range(k + 2, n_steps + 1):
                 path_m[later, 0] = x[X]
                 path_m[later, 1] = x[Y]

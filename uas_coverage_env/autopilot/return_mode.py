@@ -5,7 +5,7 @@ from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.vehicle.range import RETURN_MODE, Speeds, flight_seconds
-from uas_coverage_env.world.state import FLYING
+from uas_coverage_env.world.state import CONSUMPTION, FLYING
 
 _CLOCK_RESERVE_S = 30.0
 
@@ -28,7 +28,7 @@ def seconds_home(arena, i, x):
 
 
 @kernel
-def seconds_to_keep(arena, i, x, left_s):
+def seconds_to_keep(arena, i, x, left_s, belief=None):
     """Time [s] that battery and clock must leave UAS i now, so that it still comes home.
 
     The larger of two: the calibrated flight with its margin (`flight_home`), which knows of
@@ -40,12 +40,13 @@ def seconds_to_keep(arena, i, x, left_s):
         i: Index of the UAS.
         x: (14,) its state.
         left_s: What battery and clock leave [s].
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
     """
-    seconds, margin_s = flight_home(arena, i, x)
+    seconds, margin_s = flight_home(arena, i, x, belief)
     now_s = seconds + margin_s
     keep_s = now_s + _STEPS_LATER * arena.rules[0].dt_s
     if keep_s < left_s < _FAR_FROM_EMPTY * now_s + _FAR_FROM_EMPTY_S:
-        keep_s = max(keep_s, latest_flight_home(arena, i, x))
+        keep_s = max(keep_s, latest_flight_home(arena, i, x, belief))
     return keep_s
 
 
@@ -66,8 +67,11 @@ def has_to_return(arena, state, i):
         return True
     if x[DOD] + home_s * uas.dod_per_s >= uas.dod_max:
         return True
-    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / uas.dod_per_s)
-    return seconds_to_keep(arena, i, x, left_s) >= left_s
+    belief = state.belief[i]
+    # never less than the model says: what is saved now may be needed on the way
+    per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
+    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s)
+    return seconds_to_keep(arena, i, x, left_s, belief) >= left_s
 
 
 @kernel

@@ -51,7 +51,9 @@ def claim_way(arena, state, i, command, nonlinear, claim_m):
     """Write the way (N+1, 3) [m] that UAS i would fly now if no other UAS were there."""
     n_held = max(1, round(CLAIMED_S / arena.rules[0].dt_s))
     x = state.x[i]
-    fly_hold_and_brake(arena, i, x, state.reference[i], command, n_held, nonlinear, claim_m)
+    fly_hold_and_brake(
+        arena, i, x, state.reference[i], command, n_held, nonlinear, claim_m, state.belief[i]
+    )
 
 
 @kernel

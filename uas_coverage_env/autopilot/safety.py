@@ -66,7 +66,7 @@ _DEFLECTIONS = _deflections()
 def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
     """Least distance to spare from everything when a command is flown and then braked [m]."""
     n_flown, slack_m = fly_and_brake(
-        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m
+        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m, state.belief[i]
     )
     if slack_m >= enough_m:
         slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
@@ -220,7 +220,7 @@ def filter_commands(arena, state, nonlinear, outcome):
         i = order[rank]
         x = state.x[i]
         reference = state.reference[i]
-        fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i])
+        fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i], state.belief[i])
     for rank in range(n_flying):
         i = order[rank]
         command = outcome[i].applied_command

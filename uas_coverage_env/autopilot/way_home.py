@@ -2,6 +2,7 @@
 
 import math
 
+from uas_coverage_env.autopilot.belief import speed_along
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.geometry import signed_distance
@@ -17,6 +18,7 @@ from uas_coverage_env.world.routes import (
     leg_from_corner,
     route,
 )
+from uas_coverage_env.world.state import WIND
 
 _MOST_LEGS = 12
 _STOPPING = 1.5
@@ -25,6 +27,14 @@ _STOPPING = 1.5
 _ON_WHILE_STOPPING = 0.6
 _PLACES_AROUND = 8
 _RINGS = 2
+_UNKNOWN_MPS, _UNKNOWN_SHARE = 0.5, 0.05
+"""The wind on the way may be stronger than believed by this, and this share of it."""
+
+_LEAST_MPS = 0.2
+_WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
+"""Where disturbances are declared, the margin is more: this share of the time, and these seconds
+in a wind as fast as the UAS, in which it turns and stops the more slowly."""
+
 _LEAVING_MPS = 0.6
 _LEAVING_S = 15.0
 """From below an overhang a UAS feels its way at about this speed, and turns at both ends."""
@@ -63,13 +73,33 @@ def _out_of_overhangs_s(arena, i, x, y, z):
 
 
 @kernel
-def _flight_from(arena, i, x0, y0, z0, away_mps):
+def _more_in_wind_s(arena, i, belief, north_m, east_m):
+    """By how much longer than in still air a leg takes in the wind believed in [s].
+
+    The leg is flown at full airspeed, against a wind that blows a little more than is believed; no
+    time is saved where it comes from behind.
+    """
+    length_m = math.hypot(north_m, east_m)
+    if length_m <= 0.0:
+        return 0.0
+    north_mps, east_mps = belief[WIND], belief[WIND + 1]
+    most_mps = arena.vehicles[i].reference_max_mps
+    speed_mps = speed_along(
+        most_mps, north_mps, east_mps, north_m / length_m, east_m / length_m
+    ) - (_UNKNOWN_MPS + _UNKNOWN_SHARE * math.hypot(north_mps, east_mps))
+    speed_mps = min(max(speed_mps, _LEAST_MPS), arena.uas[i].speed_mps)
+    return length_m / speed_mps - length_m / arena.uas[i].speed_mps
+
+
+@kernel
+def _flight_from(arena, i, x0, y0, z0, away_mps, belief=None):
     """See `flight_home`: from a place, flying away from home at away_mps."""
     row, x1, y1, z1 = target_position(arena, i, HOME)
     end_x, end_y, way_m, leg = route(arena, row, x0, y0, z0, x1, y1, z1)
     obstructed = leg != CLEAR
     roof_m, before_m, until_m = -math.inf, way_m, 0.0
     flown_m = 0.0
+    more_s = 0.0
     here_x, here_y = x0, y0
     for _ in range(_MOST_LEGS):
         found_m, first_m, last_m = _roofs_on_leg(arena, here_x, here_y, -z0, end_x, end_y, -z1, leg)
@@ -77,6 +107,8 @@ def _flight_from(arena, i, x0, y0, z0, away_mps):
             roof_m = max(roof_m, found_m)
             before_m = min(before_m, flown_m + first_m)
             until_m = max(until_m, flown_m + last_m)
+        if belief is not None and arena.rules[0].disturbed:
+            more_s += _more_in_wind_s(arena, i, belief, end_x - here_x, end_y - here_y)
         if leg != ROUND_CORNER:
             break
         flown_m += math.hypot(end_x - here_x, end_y - here_y)
@@ -89,17 +121,23 @@ def _flight_from(arena, i, x0, y0, z0, away_mps):
     if obstructed:
         seconds += _out_of_overhangs_s(arena, i, x0, y0, z0)
         seconds += _out_of_overhangs_s(arena, i, x1, y1, z1)
-    return seconds, margin_to_land(seconds, obstructed)
+    margin_s = margin_to_land(seconds + more_s, obstructed)
+    if belief is not None and arena.rules[0].disturbed:
+        wind_mps = math.hypot(belief[WIND], belief[WIND + 1])
+        margin_s += _WIND_MARGIN_SHARE * (seconds + more_s)
+        margin_s += _WIND_MARGIN_S * wind_mps / arena.uas[i].speed_mps
+    return seconds + more_s, margin_s
 
 
 @kernel
-def flight_home(arena, i, x):
+def flight_home(arena, i, x, belief=None):
     """Time to fly UAS i home and land it, past the fixed obstacles.
 
     Args:
         arena: The arena.
         i: Index of the UAS.
         x: (14,) its state.
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
 
     Returns:
         The expected time [s], and the margin to add to it [s].
@@ -109,7 +147,7 @@ def flight_home(arena, i, x):
     east_m = home_m[1] - x[Y]
     away_m = max(math.hypot(north_m, east_m), 1e-9)
     away_mps = -(north_m * x[VX] + east_m * x[VY]) / away_m
-    return _flight_from(arena, i, x[X], x[Y], x[Z], away_mps)
+    return _flight_from(arena, i, x[X], x[Y], x[Z], away_mps, belief)
 
 
 @kernel
@@ -131,7 +169,7 @@ def _may_rest_at(arena, i, x, y, z):
 
 
 @kernel
-def latest_flight_home(arena, i, x):
+def latest_flight_home(arena, i, x, belief):
     """Time to fly UAS i home if it flies one more step, whatever its command [s].
 
     The way home may be much longer from behind the next building. So the UAS is taken to come to
@@ -143,6 +181,7 @@ def latest_flight_home(arena, i, x):
         arena: The arena.
         i: Index of the UAS.
         x: (14,) its state.
+        belief: (N_BELIEF,) of its inner loop.
     """
     vehicle = arena.vehicles[i]
     dt_s = vehicle.dt_s
@@ -159,6 +198,6 @@ def latest_flight_home(arena, i, x):
         north_m = x[X] + on_s * x[VX] + aside_m * math.cos(angle)
         east_m = x[Y] + on_s * x[VY] + aside_m * math.sin(angle)
         if _may_rest_at(arena, i, north_m, east_m, z):
-            seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, 0.0)
+            seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, 0.0, belief)
             latest_s = max(latest_s, seconds + margin_s)
     return dt_s + stopping_s + latest_s

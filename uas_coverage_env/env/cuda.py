@@ -200,7 +200,7 @@ def _fly_with(kernels: tuple[Any, ...]) -> Any:
         arena = arena_of(pool.arenas, 0)
         state = state_of(missions.worlds, lane, pool.arenas, 0)
         scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
-        write_all_inputs(arena, state, scratch.outcome)
+        write_all_inputs(arena, state, nonlinear, scratch.outcome)
         disturb(arena, state, scratch.outcome)
         move_all(arena, state, nonlinear, scratch.outcome)
         judge(arena, state, nonlinear, scratch.outcome)

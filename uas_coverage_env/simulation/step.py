@@ -3,6 +3,7 @@
 import math
 
 from uas_coverage_env.autopilot.assist import assist
+from uas_coverage_env.autopilot.belief import believed_wrench, expect, learn
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
@@ -105,13 +106,28 @@ def _write_inputs(arena, state, i, outcome):
     )
 
 
+@kernel
+def _write_believed_inputs(arena, state, felt, nonlinear, i, outcome):
+    """Likewise as the disturbances believed in demand it, and what is expected to come of it.
+
+    The disturbances are found out from the true motion, whatever error the sensors have.
+    """
+    vehicle, belief, u = arena.vehicles[i], state.belief[i], outcome[i].u[:]
+    command = outcome[i].applied_command
+    if state.step[0] == 0 and command.kind != WRENCH:
+        # a first look at the wind: to set off before would take more tilt than there is
+        command = arena.rules[0].brake
+    believed_wrench(vehicle, belief, felt.x[i], felt.reference[i], command, u)
+    expect(vehicle, belief, nonlinear, state.x[i], u)
+
+
 @inlined_kernel
-def write_all_inputs(arena, state, outcome):
+def write_all_inputs(arena, state, nonlinear, outcome):
     """What the motors of all UAS are asked for: a disturbance of one may depend on the others'."""
     felt = as_felt(arena, state)
     for i in range(state.status.shape[0]):
         if state.status[i] == FLYING:
-            _write_inputs(arena, felt, i, outcome)
+            _write_believed_inputs(arena, state, felt, nonlinear, i, outcome)
 
 
 @kernel
@@ -129,6 +145,7 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
     event = outcome[i]
     u = event.u[:]
     vehicle = arena.vehicles[i]
+    dod_before = x[DOD]
     if disturbed:
         enter_air(x, event.wind_mps)
     if disturbed and (event.rotor_power or deviates(event.deviation)):
@@ -144,6 +161,7 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
         else:
             push(vehicle, x, event.force_N)
         x[DOD] += event.dod_lost
+        learn(vehicle, state.belief[i], state.step[0], dod_before, x)
     event.voltage_V = voltage_V
     event.current_A = current_A
     event.energy_Wh = voltage_V * current_A * (arena.rules[0].dt_s / 3600.0)
@@ -172,7 +190,7 @@ def _fly(arena, state, nonlinear, disturbances, outcome):
     """Fly the commands for one step."""
     disturbed = arena.rules[0].disturbed
     if disturbed:
-        write_all_inputs(arena, state, outcome)
+        write_all_inputs(arena, state, nonlinear, outcome)
         disturb(arena, state, disturbances, outcome)
     felt = as_felt(arena, state)
     for i in range(state.status.shape[0]):

@@ -18,6 +18,14 @@ FLYING, LANDED, LOST = range(3)
 ABSENT = -1
 """Status of a UAS that a mission does not have, in arrays with room for more."""
 
+WIND, SINK, CONSUMPTION, EXPECTED = 0, 2, 3, 4
+"""Places in `WorldState.belief`: wind north and east [m/s], of which drag and every other steady
+horizontal force are taken to come; change of the vertical speed in a step that the model does not
+know [m/s]; consumption over that of the model, less 1 [-]; and what is expected at the next sample,
+velocity north, east, down [m/s], and depth of discharge [-]."""
+
+N_BELIEF = 8
+
 STATUS_NAMES = ("flying", "landed", "lost")
 
 
@@ -28,6 +36,9 @@ class WorldState(NamedTuple):
     """The paper's states, in the order of `vehicle.layout`."""
     reference: Annotated[NDArray[np.float64], "U", 2]
     """[m/s] velocity that the inner loop tracks now, north and east."""
+    belief: Annotated[NDArray[np.float64], "U", N_BELIEF]
+    """What the inner loop believes of disturbances, see `WIND` and the names beside it. Zero where
+    none is declared."""
     status: Annotated[NDArray[np.int64], "U", Values(ABSENT, LOST)]
     """FLYING, LANDED or LOST; ABSENT in a batch, where a mission has fewer UAS than others."""
     departed: Annotated[NDArray[np.bool_], "U"]
@@ -104,10 +115,10 @@ def as_told(arena, state):
 @inlined_kernel
 def _with_x(state, x):
     return WorldState(
-        x, state.reference, state.status, state.departed, state.returning, state.uncovered,
-        state.step, state.disturbance_memory, state.disturbance_random, state.event_step,
-        state.event_uas, state.event_random, state.felt, state.sensed, state.told, state.delayed,
-        state.bias, state.sensing_random, state.heard,
+        x, state.reference, state.belief, state.status, state.departed, state.returning,
+        state.uncovered, state.step, state.disturbance_memory, state.disturbance_random,
+        state.event_step, state.event_uas, state.event_random, state.felt, state.sensed,
+        state.told, state.delayed, state.bias, state.sensing_random, state.heard,
     )  # fmt: skip
 
 

@@ -1,0 +1,182 @@
+"""What the inner loop believes of disturbances, and how it flies with that.
+
+In air that moves steadily a UAS flies as it does in still air, seen from the air. So the loop takes
+state, reference and command relative to the wind that it believes in: the governor's bounds on
+tilt, rates, angular acceleration and speed then hold for the flight through the air as they do in
+still air, and what is wrong in the belief is all that is left to disturb it.
+
+The belief is the mean of what the last steps were off by: of each sample the loop expects what its
+model and its belief say. A steady horizontal force is taken for the wind that would cause it, by
+drag. Where no disturbance is declared, nothing here is flown.
+"""
+
+import math
+
+from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.vehicle import (
+    DOD,
+    LIFT,
+    N_INPUTS,
+    N_STATES,
+    VX,
+    VY,
+    VZ,
+    X,
+    Y,
+    Z,
+    fly_kinematics,
+    lpv_step,
+    plant_step,
+)
+from uas_coverage_env.world.commands import CLIMB, VELOCITY, WRENCH
+from uas_coverage_env.world.state import CONSUMPTION, EXPECTED, SINK, WIND
+
+FORGETS_S = 2.0
+"""The belief in wind and sink follows what is seen with this time constant [s]."""
+
+SEES_CONSUMPTION_S = 30.0
+"""Likewise that in the consumption, which takes longer to tell from noise [s]."""
+
+MOST_WIND = 0.95
+"""Of the highest speed: a UAS believes in no wind in which it could not hover."""
+
+MOST_SINK_MPS2 = 3.0
+CONSUMPTION_BOUNDS = (-0.3, 1.0)
+_LEAST_DOD = 1e-7
+
+
+@kernel
+def speed_along(most_mps, wind_north_mps, wind_east_mps, north, east):
+    """The highest ground speed along a direction at an airspeed, held against a crosswind [m/s].
+
+    Args:
+        most_mps: The airspeed.
+        wind_north_mps: The wind, slower than that.
+        wind_east_mps: Likewise.
+        north: The direction, of length 1.
+        east: Likewise.
+    """
+    along = wind_north_mps * north + wind_east_mps * east
+    across2 = wind_north_mps**2 + wind_east_mps**2 - along * along
+    return along + math.sqrt(max(most_mps * most_mps - across2, 0.0))
+
+
+@inlined_kernel
+def believed_wrench(vehicle, belief, x, reference, command, u):
+    """`command_wrench` in the wind believed in; arguments as there, and belief (N_BELIEF,).
+
+    A velocity that this wind does not allow is flown as fast as it does, in its direction.
+    """
+    north_mps, east_mps = x[VX], x[VY]
+    wind_north_mps, wind_east_mps = belief[WIND], belief[WIND + 1]
+    first, second = command.values[0], command.values[1]
+    steers = command.kind == VELOCITY or command.kind == CLIMB
+    if steers:
+        speed_mps = math.sqrt(first * first + second * second)
+        share = 0.0
+        if speed_mps > 0.0:
+            most_mps = speed_along(
+                vehicle.reference_max_mps, wind_north_mps, wind_east_mps,
+                first / speed_mps, second / speed_mps,
+            )  # fmt: skip
+            share = min(speed_mps, vehicle.reference_max_mps, max(most_mps, 0.0)) / speed_mps
+        command.values[0] = share * first - wind_north_mps
+        command.values[1] = share * second - wind_east_mps
+    x[VX] = north_mps - wind_north_mps
+    x[VY] = east_mps - wind_east_mps
+    reference[0] -= wind_north_mps
+    reference[1] -= wind_east_mps
+    command_wrench(vehicle, x, reference, command, u)
+    reference[0] += wind_north_mps
+    reference[1] += wind_east_mps
+    x[VX], x[VY] = north_mps, east_mps
+    if steers:
+        command.values[0], command.values[1] = first, second
+    if command.kind != WRENCH:
+        lift_N = u[LIFT] - belief[SINK] / vehicle.vertical_B[1]
+        u[LIFT] = min(max(lift_N, vehicle.lift_min_N), vehicle.lift_max_N)
+
+
+@inlined_kernel
+def believed_kinematics(vehicle, belief, nonlinear, x, u):
+    """Fly one step in place as the belief says; of the battery, the linear model says nothing."""
+    wind_north_mps, wind_east_mps = belief[WIND], belief[WIND + 1]
+    x[VX] -= wind_north_mps
+    x[VY] -= wind_east_mps
+    if nonlinear:
+        plant_step(vehicle, x, u, x)
+    else:
+        fly_kinematics(vehicle, x, u)
+    _leave_belief(vehicle, belief, x)
+
+
+@inlined_kernel
+def _leave_belief(vehicle, belief, x):
+    dt_s = vehicle.dt_s
+    x[VX] += belief[WIND]
+    x[VY] += belief[WIND + 1]
+    x[X] += dt_s * belief[WIND]
+    x[Y] += dt_s * belief[WIND + 1]
+    x[VZ] += belief[SINK]
+    x[Z] += 0.5 * dt_s * belief[SINK]
+
+
+@inlined_kernel
+def expect(vehicle, belief, nonlinear, x, u):
+    """Note in the belief what it expects of the next sample.
+
+    Args:
+        vehicle: Record of VEHICLE_DTYPE.
+        belief: (N_BELIEF,) written.
+        nonlinear: Whether the world flies the 6-DOF plant.
+        x: (14,) state now.
+        u: (5,) what the motors are asked for.
+    """
+    after = stack_array(N_STATES)
+    asked = stack_array(N_INPUTS)
+    for k in range(N_STATES):
+        after[k] = x[k]
+    for k in range(N_INPUTS):
+        asked[k] = u[k]
+    after[VX] -= belief[WIND]
+    after[VY] -= belief[WIND + 1]
+    if nonlinear:
+        plant_step(vehicle, after, asked, after)
+    else:
+        lpv_step(vehicle, after, asked, after)
+    _leave_belief(vehicle, belief, after)
+    for axis in range(3):
+        belief[EXPECTED + axis] = after[VX + axis]
+    belief[EXPECTED + 3] = after[DOD] - x[DOD]
+
+
+@inlined_kernel
+def learn(vehicle, belief, step, dod_before, x):
+    """Correct the belief by what came instead of what was expected.
+
+    Args:
+        vehicle: Record of VEHICLE_DTYPE.
+        belief: (N_BELIEF,) written.
+        step: Number of the sample before: of the first steps, all count alike.
+        dod_before: Depth of discharge at the sample before [-].
+        x: (14,) state that was reached.
+    """
+    dt_s = vehicle.dt_s
+    gain = max(1.0 - math.exp(-dt_s / FORGETS_S), 1.0 / (1.0 + step))
+    # a wind moves the velocity by what drag takes of it in a step
+    per_wind = 1.0 - vehicle.axis_A[1, 1]
+    for axis in range(2):
+        off_mps = x[VX + axis] - belief[EXPECTED + axis]
+        belief[WIND + axis] += gain * off_mps / per_wind
+    wind_mps = math.sqrt(belief[WIND] ** 2 + belief[WIND + 1] ** 2)
+    most_mps = MOST_WIND * vehicle.reference_max_mps
+    if wind_mps > most_mps:
+        belief[WIND] *= most_mps / wind_mps
+        belief[WIND + 1] *= most_mps / wind_mps
+    sink = belief[SINK] + gain * (x[VZ] - belief[EXPECTED + 2])
+    belief[SINK] = min(max(sink, -MOST_SINK_MPS2 * dt_s), MOST_SINK_MPS2 * dt_s)
+    if belief[EXPECTED + 3] > _LEAST_DOD:
+        off = (x[DOD] - dod_before) / belief[EXPECTED + 3] - 1.0 - belief[CONSUMPTION]
+        seen = belief[CONSUMPTION] + (1.0 - math.exp(-dt_s / SEES_CONSUMPTION_S)) * off
+        belief[CONSUMPTION] = min(max(seen, CONSUMPTION_BOUNDS[0]), CONSUMPTION_BOUNDS[1])
