@@ -1,4 +1,4 @@
-"""Whom return mode loses: random players, with return mode and safety filter, until all are down.
+"""Which UAS return mode loses: random players, return mode and safety filter, until all are down.
 
     python benchmarks/return_mode.py
     python benchmarks/return_mode.py --missions 300 --families overhangs --first-seed 90000

@@ -69,9 +69,11 @@ def test_a_hover_in_steady_wind_comes_to_rest_and_knows_the_wind(wind_mps, from_
 def test_no_limit_is_exceeded_in_ten_metres_per_second(from_deg):
     world = windy(10.0, from_deg, safety_filter=True)
     rng = np.random.default_rng(3)
+    command = Velocity(0.0, 0.0, 20.0)
     for step in range(160):
         if step % 8 == 0:
-            command = Velocity(*rng.uniform(-9.0, 9.0, 2), rng.uniform(10.0, 40.0))
+            north_mps, east_mps = rng.uniform(-9.0, 9.0, 2).tolist()
+            command = Velocity(north_mps, east_mps, float(rng.uniform(10.0, 40.0)))
         outcome = world.step({"uas_1": command})
         assert outcome["limits_exceeded"][0] == 0
         assert outcome["breaches"][0] == 0

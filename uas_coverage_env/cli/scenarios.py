@@ -1,5 +1,6 @@
 """`uas-coverage scenarios`: the missions that are shipped, and a check of one's own."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,8 @@ from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, load_scenario, scenario_names
 from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle.tube import tube_of
+from uas_coverage_env.world.arena import LOOKAHEAD_S
 
 _PICTURE_PX = 1024
 
@@ -72,6 +75,7 @@ def _lines(scenario: Scenario) -> list[str]:
         f"time       at most {scenario.max_steps} steps of {scenario.dt_s:g} s",
         *(f"place      {line}" for line in _place(scenario)),
         *(f"disturbed  {line}" for line in _disturbances(scenario)),
+        *(f"tube       {line}" for line in _tubes(scenario)),
         *(
             f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, "
             f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}"
@@ -87,6 +91,22 @@ def _place(scenario: Scenario) -> list[str]:
     return [
         f"{place.latitude_deg:.7f}, {place.longitude_deg:.7f}, {place.height_m:g} m above sea level"
     ]
+
+
+def _tubes(scenario: Scenario) -> list[str]:
+    """By vehicle: how far a wind other than the one believed in leads while a UAS brakes."""
+    if scenario.wind is None:
+        return []
+    lines, steps = [], math.ceil(LOOKAHEAD_S / scenario.dt_s)
+    for vehicle in dict.fromkeys(scenario.vehicles):
+        tube = tube_of(vehicle, scenario.dt_s, steps)
+        after = ", ".join(f"{tube.position[k]:.2f}" for k in (1, steps // 4, steps))
+        at_s = ", ".join(f"{k * scenario.dt_s:g}" for k in (1, steps // 4, steps))
+        lines.append(
+            f"{vehicle.name}: per m/s of wind that is not believed in, {after} m after {at_s} s, "
+            f"{tube.velocity:.2f} m/s, {math.degrees(tube.tilt):.1f} degrees of tilt"
+        )
+    return lines
 
 
 def _disturbances(scenario: Scenario) -> list[str]:

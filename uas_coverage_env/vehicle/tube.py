@@ -1,0 +1,62 @@
+"""How far a wind that is not the one believed in can move a vehicle: a tube around what it plans.
+
+One horizontal axis of the velocity loop: e = (position, velocity, tilt, rate), e⁺ = C e + B_w d
+with |d| at most D in every step, the wind that blows less the one believed in. The largest
+deviation over all sequences of d is D times the sum of the absolute responses: the box around the
+minimal robust invariant set (Raković et al., IEEE Trans. Autom. Control 50(3), 2005), exact for a
+linear loop.
+Both axes have the same map, so the worst sequence keeps to one line of the plane.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.params import VehicleParams
+
+_STEPS = 400
+
+
+@dataclass(frozen=True)
+class Tube:
+    """Largest deviations from what the believed wind leads to, per m/s of residual wind.
+
+    Attributes:
+        position: (S+1,) [m per m/s] after each of the first S steps; nothing holds the position,
+            so that it grows without end.
+        velocity: Of the velocity, however long it blows [m/s per m/s].
+        tilt: Of the tilt [rad per m/s].
+        rate: Of its rate [rad/s per m/s].
+        alpha: Of the angular acceleration that the loop asks for [rad/s² per m/s].
+    """
+
+    position: NDArray[np.float64]
+    velocity: float
+    tilt: float
+    rate: float
+    alpha: float
+
+
+def tube_of(vehicle: VehicleParams, dt_s: float, steps: int) -> Tube:
+    """The tube of a vehicle's velocity loop with a belief that is held.
+
+    Args:
+        vehicle: Parameters.
+        dt_s: Length of a step [s].
+        steps: For how many steps the position is followed.
+    """
+    A, B = horizontal_axis(vehicle, dt_s)
+    gain = np.concatenate([[0.0], design_velocity_loop(vehicle, dt_s).gain])
+    closed = A - np.outer(B, gain)
+    # a step in wind is a step in still air at the airspeed, moved by what the air moves
+    response = np.array([dt_s - A[0, 1], 1.0 - A[1, 1], -A[2, 1], -A[3, 1]])
+    total, alpha, position_m = np.zeros(4), 0.0, [0.0]
+    for _ in range(max(_STEPS, steps)):
+        total += np.abs(response)
+        alpha += abs(float(gain @ response))
+        position_m.append(float(total[0]))
+        response = closed @ response
+    _, velocity, tilt, rate = total.tolist()
+    return Tube(np.array(position_m[: steps + 1]), velocity, tilt, rate, alpha)
