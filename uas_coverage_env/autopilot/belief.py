@@ -41,6 +41,9 @@ SEES_CONSUMPTION_S = 30.0
 MOST_WIND = 0.95
 """Of the highest speed: a UAS believes in no wind in which it could not hover."""
 
+_GUSTS = 0.1
+"""What is kept of the speed limit for gusts, of the wind believed in."""
+
 MOST_SINK_MPS2 = 3.0
 CONSUMPTION_BOUNDS = (-0.3, 1.0)
 _LEAST_DOD = 1e-7
@@ -80,7 +83,10 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
                 vehicle.reference_max_mps, wind_north_mps, wind_east_mps,
                 first / speed_mps, second / speed_mps,
             )  # fmt: skip
-            share = min(speed_mps, vehicle.reference_max_mps, max(most_mps, 0.0)) / speed_mps
+            # over ground a gust must not lead far beyond the limit either
+            wind_mps = math.sqrt(wind_north_mps**2 + wind_east_mps**2)
+            within_mps = vehicle.reference_max_mps - _GUSTS * wind_mps
+            share = min(speed_mps, within_mps, max(most_mps, 0.0)) / speed_mps
         command.values[0] = share * first - wind_north_mps
         command.values[1] = share * second - wind_east_mps
     x[VX] = north_mps - wind_north_mps

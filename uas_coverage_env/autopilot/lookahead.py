@@ -35,6 +35,10 @@ TOLERANCE_M = 1e-3
 PLENTY_M = 2.0
 """More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
 
+UNKNOWN_M = 0.7
+"""Where disturbances are declared, this much more is kept from fixed obstacles, and twice as much
+from other UAS: less than the metre that routes keep, so that no route is closed [m]."""
+
 SURPRISE_S = 1.0
 """What moves may turn: its keep-out is widened by how far it goes in this time [s]."""
 
@@ -212,13 +216,14 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
         slack_m = _height_slack(arena, i, path_m, n_flown, slack_m)
     normals = arena.normals
     offsets_m = arena.offsets_m
+    unknown_m = UNKNOWN_M if arena.rules[0].disturbed else 0.0
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         if box_apart(obstacle, low[0], low[1], low[2], high[0], high[1], high[2]):
             continue
         first = obstacle.first_kept
         last = obstacle.last_kept
-        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
+        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m + unknown_m
         for k in range(n_flown):
             x0 = path_m[k, 0]
             y0 = path_m[k, 1]
@@ -343,6 +348,7 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
     Returns:
         The smaller of slack_m and the distance to spare [m].
     """
+    unknown_m = 2.0 * UNKNOWN_M if arena.rules[0].disturbed else 0.0
     for j in range(status.shape[0]):
         if j == i or status[j] != FLYING:
             continue
@@ -350,6 +356,7 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
         required_m = (
             arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
         )
+        required_m += unknown_m
         now_m = max(
             math.hypot(path_m[0, 0] - other_m[0, 0], path_m[0, 1] - other_m[0, 1]),
             abs(path_m[0, 2] - other_m[0, 2]),
