@@ -20,7 +20,6 @@ from uas_coverage_env.world.disturbance import (
     Disturbance,
     disturbance_tables,
 )
-from uas_coverage_env.world.overhangs import overhangs
 from uas_coverage_env.world.events import (
     EVENT_DTYPE,
     SENSING_DTYPE,
@@ -28,6 +27,7 @@ from uas_coverage_env.world.events import (
     is_eventful,
     sensing_records,
 )
+from uas_coverage_env.world.overhangs import overhangs
 from uas_coverage_env.world.routes import node_distances
 from uas_coverage_env.world.waypoints import (
     N_WAYPOINT_COLUMNS,
