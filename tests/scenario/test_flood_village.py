@@ -74,10 +74,12 @@ def test_helicopters_gain_no_more_than_3_mps_in_a_second():
         assert scenario.moving_positions(260.0)[0, 1] > 600.0, "it has left the area"
 
 
-def test_the_map_that_stands_for_the_papers_is_the_village_but_for_its_helicopter():
+def test_the_map_that_stands_for_the_papers_is_the_village_but_for_helicopter_and_least_height():
     village, mine = load_scenario("village").content(), load_scenario("gasche2025").content()
     (theirs,), (ours,) = village.pop("moving_obstacles"), mine.pop("moving_obstacles")
     assert (village.pop("name"), mine.pop("name")) == ("village", "gasche2025")
+    assert village.pop("min_height_m") == 3.0
+    mine.pop("min_height_m", 0.0)
     assert mine == village
     assert theirs.pop("schedule") != ours.pop("schedule")
     assert theirs == ours

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from uas_coverage_env.scenario import generate_scenario, sample_scenario, warnings
 
 PUBLISHED = [
-    "town-s1000-u4-w55-o8",
-    "town-s2000-u3-w33-o7",
-    "town-s2019-u2-w54-o10",
-    "town-s3000-u1-w45-o13",
+    "town-s1000-u4-w55-o8-h300cm",
+    "town-s2000-u3-w33-o7-h300cm",
+    "town-s2019-u2-w54-o10-h300cm",
+    "town-s3000-u1-w45-o13-h300cm",
 ]
 
 KEPT_M = 0.36 + 3.0
