@@ -202,3 +202,25 @@ def test_a_single_waypoint_far_away_along_the_fence_is_flown_to():
     assert accomplished(flown)
     assert is_harmless(flown)
     assert flown.steps < 140
+
+
+@pytest.mark.parametrize("least_m", [3.0, 8.0])
+def test_outside_of_landing_zones_the_least_height_is_kept_above_ground_and_roofs(least_m):
+    # waypoints near the ground, and a roof whose safe distance is less than the height
+    house = box("house", (120.0, 80.0, -6.0), (150.0, 120.0, 0.0), 1.0)
+    points = [(190.0, 100.0, -2.0), (190.0, 180.0, -2.0), (100.0, 180.0, -2.0)]
+    mission = meadow(
+        obstacles=[house],
+        waypoints=[waypoint(point) for point in points],
+        min_height_m=least_m,
+    )
+    flight = rollout(mission, planner())
+    assert accomplished(flight)
+    assert is_harmless(flight)
+    free = rollout(mission.model_copy(update={"min_height_m": 0.0}), planner())
+    zone_m = MissionBrief.of(mission).landing_zone_m
+    lowest_m = []
+    for one in (free, flight):
+        outside = np.linalg.norm(one.x[:, 0, :2] - one.x[0, 0, :2], axis=1) > zone_m
+        lowest_m.append(-one.x[outside, 0, 2].max())
+    assert lowest_m[0] < least_m <= lowest_m[1], "without the rule it flies lower"

@@ -194,6 +194,9 @@ def _way_s(corners: FloatArray, space: Space, speeds: Speeds) -> float:
 def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
     """(N+1,) altitudes at which a path passes over what it meets, where it can."""
     top_m = -path_m[:, 2].copy()
+    if space.least_height_m > 0.0:
+        outside = ~space.is_in_zone(path_m)
+        top_m[outside] = np.maximum(top_m[outside], space.planned_height_m + _OVER_M)
     outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
     up = -space.fence_normals[:, 2]
     room_m = np.where(up > 0.1, -outside_m / np.maximum(up, 0.1), np.inf).min(axis=1)

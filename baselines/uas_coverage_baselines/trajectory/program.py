@@ -14,9 +14,11 @@ from uas_coverage_baselines.trajectory.rows import SoftRows
 from uas_coverage_baselines.trajectory.space import (
     Body,
     Space,
+    height_rows,
     separating_rows,
     spare_fixed_m,
     spare_from_body_m,
+    spare_height_m,
 )
 
 FloatArray = NDArray[np.float64]
@@ -170,6 +172,7 @@ class FlightProgram:
         spare = min(
             float(spare_fixed_m(self.space, path_m)), -float(outside_m.max(initial=-np.inf))
         )
+        spare = min(spare, spare_height_m(self.space, path_m))
         return min(spare, self.spare_from_bodies_m(path_m))
 
     def spare_from_bodies_m(self, path_m: FloatArray) -> float:
@@ -206,6 +209,8 @@ class FlightProgram:
         if len(self.space.keep_m):
             stage, normal, bound = separating_rows(self.space, path_m, _NEAR_M)
             made.append(_planes(stage, normal, bound))
+        if self.space.least_height_m > 0.0:
+            made.append(_planes(*height_rows(self.space, path_m)))
         made += self._fence_rows(path_m)
         made += [rows for body in self.bodies if (rows := _apart(body, path_m)) is not None]
         return SoftRows(*(np.concatenate(parts) for parts in zip(*made, strict=True)))

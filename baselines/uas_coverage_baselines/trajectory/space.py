@@ -21,6 +21,10 @@ IntArray = NDArray[np.int64]
 
 _BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
 _FENCE_MARGIN_M = 0.1
+_HEIGHT_MARGIN_M = 0.1
+_ZONE_SIDES = 8
+_ZONE_MARGIN_M = 0.1
+_MAY_SINK_M = 0.5  # above the least height, within its landing zone, a UAS may go on sinking
 
 
 class Space(NamedTuple):
@@ -46,6 +50,22 @@ class Space(NamedTuple):
     """(H,) a place is inside, with margin, where `normal . p + offset <= 0`."""
     fence_margin_m: float
     """Of the plan, in addition to that of the rules."""
+    least_height_m: float
+    """Above the ground, outside of the landing zone; 0: no such rule."""
+    zone_middle_m: FloatArray
+    """(2,) of the landing zone, an upright cylinder."""
+    zone_m: float
+    """Its radius."""
+
+    @property
+    def planned_height_m(self) -> float:
+        """The least height that is planned outside of the landing zone."""
+        return self.least_height_m + _HEIGHT_MARGIN_M if self.least_height_m > 0.0 else 0.0
+
+    def is_in_zone(self, path_m: FloatArray) -> NDArray[np.bool_]:
+        """(N,) whether places (N, 3) lie in the landing zone."""
+        away_m = path_m[:, :2] - self.zone_middle_m
+        return np.hypot(away_m[:, 0], away_m[:, 1]) <= self.zone_m
 
 
 class Body(NamedTuple):
@@ -75,18 +95,63 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
     faces = np.concatenate([np.zeros(0, np.int64), *rows])
     least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
     fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
+    height_m = float(rules["min_height_m"])
+    # over roofs, what the distance to keep leaves of the least height raises the upper faces
+    upward = np.maximum(-arena.normals[faces, 2], 0.0)
+    of_obstacle = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
+    raised_m = np.maximum(height_m * upward - least_m[of_obstacle], 0.0)
+    low_m = obstacles["hull_middle_m"] - obstacles["hull_half_m"]
+    np.minimum.at(low_m[:, 2], of_obstacle, low_m[of_obstacle, 2] - raised_m)
     return Space(
         normals=np.ascontiguousarray(arena.normals[faces]),
-        offsets_m=arena.offsets_m[faces].copy(),
+        offsets_m=arena.offsets_m[faces] - raised_m,
         first=np.cumsum([0, *(len(row) for row in rows)]),
-        low_m=obstacles["hull_middle_m"] - obstacles["hull_half_m"],
+        low_m=low_m,
         high_m=obstacles["hull_middle_m"] + obstacles["hull_half_m"],
         keep_m=least_m + margin_m,
         least_m=least_m,
         fence_normals=np.ascontiguousarray(arena.normals[fence]),
         fence_offsets_m=arena.offsets_m[fence] + float(rules["fence_margin_m"]),
         fence_margin_m=_FENCE_MARGIN_M,
+        least_height_m=height_m,
+        zone_middle_m=np.array(arena.uas[uas]["home_m"][:2], float),
+        zone_m=float(rules["landing_zone_m"]),
     )
+
+
+def height_rows(space: Space, path_m: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Planes for the least height: above it, or within the landing zone where a UAS is low there.
+
+    Args:
+        space: Of the UAS.
+        path_m: (N+1, 3) flight so far.
+
+    Returns:
+        Stages (m,), normals (m, 3) and bounds (m,) of rows `normal . p <= bound`.
+    """
+    stages = np.arange(1, max(len(path_m) - 1, 1))
+    low = space.is_in_zone(path_m[stages])
+    low &= -path_m[stages, 2] < space.planned_height_m + _MAY_SINK_M
+    high = stages[~low]
+    angle = 2.0 * np.pi / _ZONE_SIDES * np.arange(_ZONE_SIDES)
+    sides = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_ZONE_SIDES)])
+    within_m = (space.zone_m - _ZONE_MARGIN_M) * np.cos(np.pi / _ZONE_SIDES)
+    side_bounds = within_m + sides[:, :2] @ space.zone_middle_m
+    return (
+        np.concatenate([high, np.repeat(stages[low], _ZONE_SIDES)]),
+        np.vstack([np.tile([0.0, 0.0, 1.0], (len(high), 1)), np.tile(sides, (int(low.sum()), 1))]),
+        np.concatenate(
+            [np.full(len(high), -space.planned_height_m), np.tile(side_bounds, int(low.sum()))]
+        ),
+    )
+
+
+def spare_height_m(space: Space, path_m: FloatArray) -> float:
+    """Least height beyond what is planned, outside of the landing zone; start and end are free."""
+    if space.least_height_m <= 0.0:
+        return np.inf
+    outside = path_m[1:-1][~space.is_in_zone(path_m[1:-1])]
+    return float((-outside[:, 2] - space.planned_height_m).min(initial=np.inf))
 
 
 @allocating_kernel
@@ -171,7 +236,7 @@ def spare_fixed_m(space, path_m):
 
 @allocating_kernel
 def spare_of_rules_m(space, path_m, lands):
-    """Least distance beyond those of the rules, from fixed obstacles and the fence: exact.
+    """Least distance beyond those of the rules, from obstacles, fence and least height: exact.
 
     Distances that are smaller at the start already are not to become smaller; where the flight
     ends in landing, the last sample is no sample of a flying UAS.
@@ -191,6 +256,13 @@ def spare_of_rules_m(space, path_m, lands):
             p = path_m[n]
             inside_m = -(normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2]) - offset
             spare_m = min(spare_m, inside_m - least_m)
+    if space.least_height_m > 0.0:
+        least_m = min(space.least_height_m, -path_m[0, 2])
+        for n in range(1, n_steps + 1 - (1 if lands else 0)):
+            north_m = path_m[n, 0] - space.zone_middle_m[0]
+            east_m = path_m[n, 1] - space.zone_middle_m[1]
+            if north_m * north_m + east_m * east_m > space.zone_m * space.zone_m:
+                spare_m = min(spare_m, -path_m[n, 2] - least_m)
     for o in range(len(space.least_m)):
         first, last = space.first[o], space.first[o + 1]
         start_m = -np.inf
