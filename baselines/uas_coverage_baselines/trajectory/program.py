@@ -30,6 +30,7 @@ TOLERANCE_M = 0.02
 _NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
 _FENCE_NEAR_M = 25.0
 _INSIDE_M = 0.05  # of a waypoint's radius, or a fiftieth of it
+_FORGIVEN = 0.8  # share of that by which a visit may miss: it is inside the radius still
 _LANDING_SHARE = 0.9, 0.85  # of landing distance and speed
 _LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
 _CLEAR_WEIGHT = 2.0  # of 1 m too near
@@ -54,7 +55,8 @@ class Flight:
         x: (N+1, 10) states of the program.
         u: (N, 3) inputs.
         costate: (N, 10) what a change of the states 1..N costs.
-        violation: Of the soft rows, summed; inf where the program was not solved.
+        violation: Of the soft rows, summed, but for visits that are inside their spheres still;
+            inf where the program was not solved.
         missed_m: (K,) how far each visit is outside of its sphere.
     """
 
@@ -150,8 +152,9 @@ class FlightProgram:
             if not found.converged or not np.isfinite(found.x).all():
                 return flight if np.isfinite(flight.violation) else _unsolved(visits, guess)
             x, u = found.x, found.u
-            violation = float(found.violation.sum())
             missed_m = found.violation[: len(route)]
+            forgiven = missed_m < _FORGIVEN * self._inside_m(route)
+            violation = float(found.violation.sum() - missed_m[forgiven].sum())
             flight = Flight(visits, x, u, found.costate, violation, missed_m)
             if violation > _HOPELESS:
                 break
@@ -184,6 +187,10 @@ class FlightProgram:
             spare = min(spare, float(gap))
         return spare
 
+    def _inside_m(self, route: IntArray) -> FloatArray:
+        """(K,) how far inside their spheres visits are planned."""
+        return np.minimum(_INSIDE_M, 0.02 * self.radius_m[route])
+
     def _at_path_speed(self, path_m: FloatArray) -> FloatArray:
         """(N+1, 10) states along positions, with the velocities of their differences."""
         x = np.zeros((len(path_m), 10))
@@ -194,7 +201,7 @@ class FlightProgram:
 
     def _rows(self, route: IntArray, visits: IntArray, path_m: FloatArray) -> SoftRows:
         n_steps = len(path_m) - 1
-        inside_m = self.radius_m[route] - np.minimum(_INSIDE_M, 0.02 * self.radius_m[route])
+        inside_m = self.radius_m[route] - self._inside_m(route)
         made = [_balls(visits, POSITION, self.waypoints_m[route], inside_m, 1.0)]
         distance, speed = _LANDING_SHARE
         end = np.array([n_steps])
