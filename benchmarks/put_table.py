@@ -45,7 +45,7 @@ def short_table(data: dict[str, Any]) -> str:
     """Who, how often it worked, what it took, against whom."""
     reference = data["reference"]
     headings = ["planner", "accomplished", "violations", "decision p50, ms"]
-    headings += [f"Δ energy to {reference}, %", "Δ steps, %"]
+    headings += [f"Δ energy to {reference}, %", "Δ steps, %", "above the bound, %"]
     lines = ["| " + " | ".join(headings) + " |", "|---|" + "---:|" * (len(headings) - 1)]
     for one in data["scores"]:
         is_reference = one["player"] == reference
@@ -58,6 +58,10 @@ def short_table(data: dict[str, Any]) -> str:
                 "" if is_reference else _estimate(one[f"{name}_difference_percent"])
                 for name in ("energy", "steps")
             ),
+            _estimate(one["above_bound_percent"])
+            .lstrip("+")
+            .replace("[+", "[")
+            .replace(", +", ", "),
         ]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join([f"`{data['command']}`", "", *lines])

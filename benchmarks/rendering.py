@@ -37,7 +37,7 @@ TURNS = 10
 MATPLOTLIB_STEPS = 60
 _FLYING = {"action": "waypoint", "return_mode": True, "safety_filter": True}
 
-console = Console(width=120)
+console = Console(width=160)
 
 
 @dataclass

@@ -15,6 +15,10 @@ QUICK = {
     "baselines/test_tour.py": (
         "but test_who_flies_slower_than_thought_hands_over_what_its_battery_does_not_last_for"
     ),
+    "bound/test_prices_and_turns.py": (
+        "only test_the_program_is_a_close_bound_of_the_cheapest_routes "
+        "test_a_cut_forces_further_routes test_steps_cost_a_step"
+    ),
     "cli/test_mistakes.py": (
         "but test_the_installed_command_answers_like_this_process "
         "test_a_path_that_no_file_can_have_is_named"

@@ -51,7 +51,8 @@ def test_the_judge_charges_for_what_is_left_out_and_keeps_it_out(task):
     judged = tour.judged(task, routes)
     np.testing.assert_array_equal(judged.left_out, [6])
     seconds = by_hand(task, routes)
-    left_out = 120.0 * task.weight[6]
+    there_s = float((task.first_s[:, 6] + task.home_s[:, 6] - task.idle_s).min())
+    left_out = 120.0 * task.weight[6] + 1.4 * max(there_s, 0.0)
     assert judged.cost_s == pytest.approx(seconds.max() + 0.4 * seconds.sum() + left_out, abs=0.1)
 
 

@@ -185,5 +185,7 @@ def test_the_installed_command_answers_like_this_process(elsewhere):
         text=True,
         timeout=300,
     )
-    assert (result.returncode, result.stderr) == (0, "")
+    # nothing is wrong, but that kernels are compiled may be said
+    said = [line for line in result.stderr.splitlines() if "compiling the simulation" not in line]
+    assert (result.returncode, said) == (0, [])
     assert (elsewhere / "mine" / "flight.csv").exists()

@@ -14,7 +14,7 @@ from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.separation import from_obstacles
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
-from uas_coverage_baselines.milp_mpc.model.problem import Target, TourSegment, Weights
+from uas_coverage_baselines.milp_mpc.model.problem import Target, TourSegment, WayHome, Weights
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, solve_lazily
 from uas_coverage_baselines.milp_mpc.model.reductions.bounds import rows_as_bounds
@@ -264,6 +264,7 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         waypoint_sides=12,
         targets=[Target(np.array([80.0, 50.0, -5.0]), 0.2, 1), None],
         tours=(None, TourSegment(np.array([1]), np.eye(3)[:2], np.ones(2), 0.5, np.array([6.0]))),
+        ways_home=(WayHome(np.array([60.0, 70.0, -9.0]), 12.0), None),
         weights=Weights(lift=0.3, return_home=1.0),
         dt_s=0.5,
         min_height_m=2.0,

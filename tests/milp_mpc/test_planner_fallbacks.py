@@ -120,7 +120,7 @@ def test_a_fallback_flies_what_it_says(monkeypatch):
 def test_when_plans_stop_coming_the_nonlinear_plant_comes_to_a_hover_too(monkeypatch):
     decide = RoughDecisions(PATTERNS["all_after_ten"], seed=0)
     positions, _, outcomes = flown_with(
-        monkeypatch, load_scenario("open_field"), decide, 45, dynamics="nonlinear"
+        monkeypatch, load_scenario("open_field"), decide, 36, dynamics="nonlinear"
     )
     assert (outcomes["contact"] == 0).all()
     assert np.abs(np.diff(positions[-5:], axis=0)).max() < 0.1

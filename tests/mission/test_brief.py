@@ -55,7 +55,10 @@ PUBLIC = {
     Decoration: {"name", "kind", "polygon_m"},
     Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
-HIDDEN = {Scenario: {"wind", "uncertainty", "disturbances"}, MovingObstacle: {"schedule"}}
+HIDDEN = {
+    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing"},
+    MovingObstacle: {"schedule"},
+}
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from uas_coverage_env.vehicle import (
     X,
     plant_step,
 )
+from uas_coverage_env.vehicle.deviation import N_DEVIATIONS
 from uas_coverage_env.vehicle.plant import _rigid_body
 
 numbers = st.lists(st.floats(-1.0, 1.0), min_size=15, max_size=15)
@@ -39,7 +40,7 @@ def test_the_rigid_body_obeys_newton_and_euler(name, drawn, thrust_N):
     x[:DOD] = drawn[:12] * np.repeat([100.0, 15.0, 1.2, 3.0], 3)
     torque = 2.0 * drawn[12:]
     dx = np.full(N_STATES, np.nan)
-    _rigid_body(record_of(name), x, thrust_N, torque, dx)
+    _rigid_body(record_of(name), np.zeros(N_DEVIATIONS), x, thrust_N, torque, dx)
     R, omega, inertia = rotation(x[PHI:WX]), x[WX:DOD], np.diag(body.inertia_kgm2)
     np.testing.assert_array_equal(dx[X:VX], x[VX:PHI])
     drag = np.array([body.drag_kgps, body.drag_kgps, body.drag_vertical_kgps]) * x[VX:PHI]
