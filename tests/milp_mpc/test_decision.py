@@ -21,6 +21,7 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import sphere_faces
+from uas_coverage_env.vehicle import PHI, THETA, VX, WY
 
 BY_NODES = Effort(deterministic=True, teams=4)
 BY_TEAM = dataclasses.replace(BY_NODES, joint=None)
@@ -230,6 +231,22 @@ def test_where_no_team_holds_a_uas_may_leave_its_fallback_plan(problem, by_nodes
         search.collect(uas, [alone])
     search.combine([fallback_plans(problem, uas, None, 1.0) for uas in range(2)])
     assert planned(search.outcome).x == pytest.approx(by_nodes.x)
+
+
+def test_braking_beyond_the_tilt_limit_is_left_out_where_there_is_something_else(problem):
+    # in the middle of a planned change of attitude (town 3009 at 7 s, planned for by guided)
+    x0 = problem.x0.copy()
+    x0[0, VX : WY + 1] = 5.295, 6.958, 0.0, 0.317, -0.297, 0.0, 0.209, -0.259
+    turning = dataclasses.replace(problem, x0=x0, limit_sides=64)
+    (braking,) = fallback_plans(turning, 0, None, 1.0)
+    tilt = np.hypot(braking.x[..., PHI], braking.x[..., THETA])
+    assert tilt.max() > 1.1 * problem.vehicles[0].limits.tilt_max_rad
+    x = braking.x.copy()
+    x[..., PHI : THETA + 1] *= 0.8
+    other = dataclasses.replace(braking, x=x)
+    search = team_search.TeamSearch(turning, BY_NODES, time.perf_counter())
+    assert search.safe(0, [other, braking]) == [other]
+    assert search.safe(0, [braking]) == [braking]
 
 
 @pytest.mark.parametrize("uas", [0, 1])

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import short_s
-from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
@@ -42,7 +42,6 @@ from uas_coverage_env.vehicle import (
 FloatArray = NDArray[np.float64]
 BRAKING_S = 14.0
 """Braking from any speed has ended after this time."""
-_TOLERATED = 1.005  # times a limit; the world tolerates 1 %
 
 
 def backup_trajectory(
@@ -128,20 +127,13 @@ class _Candidates:
             *(self._alone[uas].names, x[None, : end + 1], u[None, :end]),
             *(np.zeros((1, end, self._problem.n_scenario_waypoints), bool), 0.0, -np.inf),
         )
+        # a plan's end may leave braking no way to keep the limits
+        problem, braking = self._problem, x[followed + 1 : end + 1]
         comes_home = self._comes_home(uas, x[end])
         return (
             not comes_home
-            or self._exceeds_limits(uas, x[followed + 1 : end + 1])
+            or exceeds_limits(problem.vehicles[uas], problem.norm_bounds[uas], braking)
             or trouble(self._alone[uas], alone, self._blocks) is not None
-        )
-
-    def _exceeds_limits(self, uas: int, braking: FloatArray) -> bool:
-        """Whether braking leads beyond the limits of the norms, which a plan's end may foredoom."""
-        beyond = self._problem.norm_bounds[uas].beyond
-        return any(
-            np.hypot(braking[:, first], braking[:, second]).max(initial=0.0)
-            > _TOLERATED * grown * getattr(self._problem.vehicles[uas].limits, name)
-            for (_, first, second, name), grown in zip(NORMS, beyond, strict=True)
         )
 
     def _comes_home(self, uas: int, x: FloatArray) -> bool:

@@ -31,6 +31,7 @@ NORMS = (
 """Name, two states, and the limit of their norm."""
 
 _ROUNDING = 1e-9
+_TOLERATED = 1.005  # times a limit; the world tolerates 1 %
 
 
 @dataclass(frozen=True)
@@ -82,3 +83,21 @@ def norm_bounds(
         upper = np.maximum(upper, reached * (1.0 + _ROUNDING))
     grown = upper.max(axis=(1, 2)) / limits / inner_factor(sides, 2)
     return NormBounds(upper, np.maximum(grown, 1.0))
+
+
+def exceeds_limits(vehicle: VehicleParams, bounds: NormBounds, states: FloatArray) -> bool:
+    """Whether states lead beyond the limits of the norms, as far as these do not give way.
+
+    Plans satisfy the bounds row by row; this is for flights of the inner loop, which in the middle
+    of a planned manoeuvre takes over with a tilt and a rate that it would not have combined.
+
+    Args:
+        vehicle: parameters.
+        bounds: of the UAS.
+        states: (n, 14).
+    """
+    return any(
+        np.hypot(states[:, first], states[:, second]).max(initial=0.0)
+        > _TOLERATED * beyond * getattr(vehicle.limits, name)
+        for (_, first, second, name), beyond in zip(NORMS, bounds.beyond, strict=True)
+    )

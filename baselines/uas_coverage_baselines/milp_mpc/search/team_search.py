@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal, visits
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
@@ -108,8 +109,15 @@ class TeamSearch:
         return self._formulating_s
 
     def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
-        """Those of a UAS's plans that are clear of everything but the other UAS."""
-        return [plan for plan in plans if self._appraisals[uas].trouble(plan) is None]
+        """Those of a UAS's plans that are clear of everything but the other UAS.
+
+        Plans beyond the vehicle's limits, as braking in the middle of a manoeuvre may be, are
+        among them only where all are.
+        """
+        clear = [plan for plan in plans if self._appraisals[uas].trouble(plan) is None]
+        vehicle, bounds = self.problem.vehicles[uas], self.problem.norm_bounds[uas]
+        within = [p for p in clear if not exceeds_limits(vehicle, bounds, p.x[0, 1:])]
+        return within or clear
 
     def planned(self, round_robin: RoundRobin, urgent: Collection[int]) -> list[int]:
         """The UAS that are planned for: all of them where the time suffices."""
