@@ -4,11 +4,12 @@ from small_fleets import TOWER, every_waypoint, field, fleet_of, start_of
 from small_worlds import box, meadow, waypoint
 from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.first_guess import first_flight
-from uas_coverage_baselines.trajectory.fleet import make_way
+from uas_coverage_baselines.trajectory.fleet import Moment, make_way
 from uas_coverage_baselines.trajectory.retiming import quickest, retimed, stretches, worth
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 
 from uas_coverage_env.geometry import segment_clearance
+from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.vehicle import VX, VZ
 
 
@@ -127,3 +128,26 @@ def test_with_nothing_to_visit_a_flight_goes_home():
     flight = quickest(fleet.programs[0], fleet.terrain, 0, start, nothing, 60)
     assert flight.is_clear
     assert np.linalg.norm(flight.path_m[-1] - fleet.programs[0].landing.home_m) < 2.0
+
+
+def test_a_far_waypoint_is_flown_to_at_nearly_full_speed():
+    # programs of long legs take the solver up to 100 iterations, others some 16
+    fleet, swarm = fleet_of(generate_scenario(1, 8, 100, 16, min_height_m=3.0))
+    start_m = swarm.x[0, :2]
+    away_m = np.linalg.norm(fleet.waypoints_m[:, :2] - start_m, axis=1)
+    route = np.array([15])
+    assert 400.0 < away_m[15] < 500.0
+    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 100)
+    full_speed_s = 2.0 * away_m[15] / fleet.terrain.legs.speed_mps[0]
+    assert flight.is_clear
+    assert fleet.brief.dt_s * flight.steps < full_speed_s + 8.0
+
+
+def test_flights_planned_side_by_side_are_those_planned_one_by_one():
+    fleet, swarm = fleet_of(generate_scenario(3, 3, 12, 2))
+    moment = Moment(swarm.x, np.ones(3, bool), swarm.uncovered, np.zeros(12, np.int64), 0.0)
+    routes = {uas: np.arange(4 * uas, 4 * uas + 4) for uas in range(3)}
+    nothing = {uas: () for uas in range(3)}
+    one, three = (fleet.flights(moment, routes, nothing, 20, {}, threads) for threads in (1, 3))
+    for uas in range(3):
+        np.testing.assert_array_equal(one[uas].x, three[uas].x)

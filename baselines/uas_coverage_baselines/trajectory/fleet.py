@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -155,6 +156,7 @@ class Fleet:
         movers: Mapping[int, Sequence[Body]],
         budget: int,
         known: Mapping[int, Flight],
+        threads: int = 1,
     ) -> dict[int, Flight]:
         """Each UAS's quickest flight; a shorter one makes way for those that fly longer.
 
@@ -164,16 +166,19 @@ class Fleet:
             movers: What moves, as each sees it.
             budget: Programs to solve for each, about.
             known: Flights along these routes that need no search where they still may be flown.
+            threads: UAS planned side by side; the flights are the same.
         """
         earliest = moment.earliest if moment.earliest.any() else None
-        alone = {}
-        for u, route in routes.items():
-            program = self.program(u, {}, movers[u], earliest)
-            start = reduced_state(moment.x[u])
+
+        def flight_alone(u: int) -> Flight:
+            route, program = routes[u], self.program(u, {}, movers[u], earliest)
             if u in known and program.allows(route, known[u]):
-                alone[u] = known[u]
-            else:
-                alone[u] = quickest(program, self.terrain, u, start, route, budget)
+                return known[u]
+            start = reduced_state(moment.x[u])
+            return quickest(program, self.terrain, u, start, route, budget)
+
+        with ThreadPoolExecutor(threads) as side_by_side:  # the solver frees the GIL
+            alone = dict(zip(routes, side_by_side.map(flight_alone, routes), strict=True))
         flights: dict[int, Flight] = {}
         for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
             paths_m = {k: flight.path_m for k, flight in flights.items()}

@@ -283,7 +283,7 @@ def _move(at, change, primal, dual):
         value += step * dv
 
 
-@allocating_kernel
+@allocating_kernel(nogil=True)
 def _solve(model, loose, rows, x, u, iterations, complementarity):
     n_stages, n_soft = len(u), len(rows.stage)
     at, change, aside = (
@@ -347,7 +347,7 @@ def solve(
     u: FloatArray,
     *,
     loose: FloatArray | None = None,
-    iterations: int = 60,
+    iterations: int = 240,
     complementarity: float = 3e-6,
 ) -> Solution:
     """Solve one program.
@@ -358,7 +358,7 @@ def solve(
         x: (N+1, 10) guess; its first row is the state at the start, and stays.
         u: (N, 3) guess.
         loose: (N+1,) factors on the limits of the states at each stage; 1 where none is given.
-        iterations: At most so many.
+        iterations: At most so many; most programs take some 16, long legs beside a fence 100.
         complementarity: Mean product of slacks and multipliers at which it is done.
 
     Returns:

@@ -43,12 +43,14 @@ class Effort:
         moves: Of each search.
         programs: Solved for each flight, about.
         total_weight: Worth of a second of each UAS's flight against one of the mission.
+        threads: UAS planned side by side.
     """
 
     orders: int
     moves: int
     programs: int
     total_weight: float
+    threads: int = 1
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ def _flown(
         for u, route in routes.items()
         if u in flown and np.array_equal(flown[u][0], route)
     }
-    flights = fleet.flights(moment, routes, movers, effort.programs, known)
+    flights = fleet.flights(moment, routes, movers, effort.programs, known, effort.threads)
     planned: dict[int, Planned] = {}
     troubles: dict[int, str] = {}
     for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):

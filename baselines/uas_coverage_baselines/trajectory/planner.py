@@ -37,14 +37,25 @@ _PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is f
 _OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first
 _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
+_ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
+_SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _SOON_S = 22.0  # a visit to what is still blocked so soon is put off
 
 
 class TrajectoryOptions(PlannerOptions):
     """Options of `trajectory`."""
 
-    orders: int = Field(default=3, ge=1, le=100, description="orders searched before take-off")
-    moves: int = Field(default=300_000, ge=0, description="changes tried in each search")
+    orders: int = Field(
+        default=3,
+        ge=1,
+        le=100,
+        description="orders searched before take-off; one where more than 8 UAS fly",
+    )
+    moves: int = Field(
+        default=300_000,
+        ge=0,
+        description="changes tried in each search; up to six times as many for large fleets",
+    )
     programs: int = Field(
         default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
     )
@@ -65,6 +76,9 @@ class TrajectoryOptions(PlannerOptions):
         ge=0.0,
         le=50.0,
         description="added for a moving obstacle's next change of velocity",
+    )
+    threads: int = Field(
+        default=2, ge=1, le=64, description="UAS planned side by side; the plans are the same"
     )
 
 
@@ -99,7 +113,7 @@ class Trajectory:
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
-        self._plan: MissionPlan | None = None
+        self.mission_plan: MissionPlan | None = None
         self._is_disturbed = False
         self._without_plan_since = np.full(len(brief.uas), -1)
         swarm = first_sight(brief)
@@ -176,7 +190,7 @@ class Trajectory:
     def _has_work(self, uas: int, swarm: SwarmState) -> bool:
         planned = self._planned.get(uas)
         if planned is None:
-            return self._plan is not None and uas in self._plan.troubles
+            return self.mission_plan is not None and uas in self.mission_plan.troubles
         return bool(planned.open_visits(swarm.step, swarm.uncovered).any())
 
     def _follow(self, swarm: SwarmState, movers: Movers) -> None:
@@ -214,7 +228,7 @@ class Trajectory:
 
     def _why_plan_anew(self, swarm: SwarmState, movers: Movers) -> str | None:
         flying = swarm.status == FLYING
-        assert self._plan is not None
+        assert self.mission_plan is not None
         missing = [
             u for u in np.flatnonzero(flying & self._may_fly).tolist() if u not in self._planned
         ]
@@ -250,15 +264,15 @@ class Trajectory:
 
     def _thought_of(self, swarm: SwarmState) -> BoolArray:
         """(W,) waypoints that a plan visits, or that no battery reaches."""
-        assert self._plan is not None
+        assert self.mission_plan is not None
         known = np.zeros(len(swarm.uncovered), np.bool_)
-        known[self._plan.order.left_out] = True
+        known[self.mission_plan.order.left_out] = True
         for planned in self._planned.values():
             known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
         return known
 
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
-        first, self._step = self._plan is None, swarm.step
+        first, self._step = self.mission_plan is None, swarm.step
         flying = swarm.status == FLYING
         opens = self._opens(movers)
         earliest = np.where(opens > 0, opens, 0)
@@ -269,21 +283,26 @@ class Trajectory:
         moment = Moment(swarm.x, flying, swarm.uncovered, earliest, swarm.time_s)
         bodies = {u: self._bodies(movers, u) for u in range(len(swarm.x))}
         unknown = (opens >= NEVER) & swarm.uncovered
-        options = self.options
+        options, n_uas = self.options, len(flying)
+        orders = min(options.orders, 2)
+        if first:
+            orders = options.orders if n_uas <= _ONE_SEARCH else 1
+        larger = min(max(n_uas * len(unknown) / _SMALL, 1.0), _LARGER)
         effort = Effort(
-            options.orders if first else 2,
-            options.moves,
+            orders,
+            round(larger * options.moves),
             options.programs,
             options.weight_energy,
+            options.threads,
         )
         if unknown.any():
             moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
         kept = None
-        if self._plan is not None:
-            kept = self._plan.order
+        if self.mission_plan is not None:
+            kept = self.mission_plan.order
         seed = self._seed + swarm.step
         plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)
-        self._plan, self._planned = plan, dict(plan.planned)
+        self.mission_plan, self._planned = plan, dict(plan.planned)
         self._planned_at, self._seen_velocity_mps = swarm.step, movers.velocity_mps.copy()
         self._blocked = opens > 0
         self._may_fly = flying.copy()
@@ -296,7 +315,7 @@ class Trajectory:
     def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort) -> int:
         """Steps after which a visit to what is blocked is planned, until more is known."""
         dt_s = self._brief.dt_s
-        if self._plan is not None:
+        if self.mission_plan is not None:
             rest_s = [dt_s * len(p.course.rest(self._step).u) for p in self._planned.values()]
             later_s = _OPENS_AGAIN_SHARE * float(np.mean(rest_s or [0.0]))
             return round(max(_OPENS_AGAIN_S, later_s) / dt_s)

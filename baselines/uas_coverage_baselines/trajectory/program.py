@@ -96,7 +96,6 @@ class FlightProgram:
         bodies: On known paths from step 0.
         earliest: (W,) steps before which a waypoint is not to be visited.
         loose: Factors on the limits of the first stages, for a start beyond them.
-        iterations: Of the solver, at most.
         solved: How many programs were solved: the effort.
     """
 
@@ -108,7 +107,6 @@ class FlightProgram:
     bodies: Sequence[Body] = ()
     earliest: IntArray | None = None
     loose: FloatArray | None = None
-    iterations: int = 60
     solved: int = field(default=0)
 
     def solve(
@@ -148,7 +146,7 @@ class FlightProgram:
             x[0] = start
             rows = self._rows(route, visits, np.ascontiguousarray(x[:, POSITION]))
             self.solved += 1
-            found = solve(self.model, rows, x, u, loose=loose, iterations=self.iterations)
+            found = solve(self.model, rows, x, u, loose=loose)
             if not found.converged or not np.isfinite(found.x).all():
                 return flight if np.isfinite(flight.violation) else _unsolved(visits, guess)
             x, u = found.x, found.u

@@ -8,7 +8,6 @@ one by one. The effort is counted in programs solved.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ IntArray = NDArray[np.int64]
 _FIRST_SHARE, _LAST_SHARE = 0.12, 0.03
 _MENDABLE = 4.0
 _REPAIRS = 12
-_PATIENT = 240  # iterations: long legs beside a fence need more than usual
+_LONG_STEPS = 400
 
 
 class Worth(NamedTuple):
@@ -107,15 +106,13 @@ def quickest(
         uas: Index of the UAS.
         start: (10,) state.
         route: (K,) waypoints.
-        budget: Programs to solve, about; the first flight is not counted.
+        budget: Programs to solve, about, fewer for long flights; the first flight is not counted.
     """
     flight = first_flight(program, terrain, uas, start, route)
-    if not np.isfinite(flight.violation):
-        program = replace(program, iterations=_PATIENT)
-        flight = first_flight(program, terrain, uas, start, route)
     if not flight.is_clear:
         return flight
-    until = program.solved + budget
+    # one program of a long flight takes as long as several of a short one
+    until = program.solved + round(budget * min(1.0, _LONG_STEPS / flight.steps))
     return shorten(program, start, route, _coarse(program, start, route, flight, until), until)
 
 
