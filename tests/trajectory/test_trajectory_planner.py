@@ -192,6 +192,19 @@ def test_energy_can_be_weighed_more_than_time():
     assert energy_Wh(thrifty).sum() <= energy_Wh(quick).sum()
 
 
+def test_a_uas_that_stays_at_home_is_in_nobodys_way():
+    """It lands in the first step; the other passes over it later, nearer than flying UAS may."""
+    starts = ((20.0, 100.0, -1.0), (60.0, 102.0, -1.0))
+    both = meadow(starts, waypoints=(waypoint((110.0, 100.0, -3.0), 3.0),))
+    known = both.model_dump(mode="json", by_alias=True)
+    known["uas"][1]["soc_0"] = 0.26
+    watched = Watched(TrajectoryOptions(**QUICK))
+    flown = rollout(Scenario.model_validate(known), watched)
+    assert is_harmless(flown)
+    assert flown.covered[-1] == 1
+    assert not any(decision.fallback for decision in watched.decisions)
+
+
 def test_a_single_waypoint_far_away_along_the_fence_is_flown_to():
     alone = meadow(((4.0, 4.0, -1.0),), waypoints=(waypoint((196.0, 4.0, -10.0)),))
     far = {"vertices_m": box("fence", (0.0, 0.0, -50.0), (700.0, 200.0, 0.0))["vertices_m"]}

@@ -131,7 +131,9 @@ class Trajectory:
         if reason is not None:
             self._make_plan(swarm, movers)
         courses = {u: p.course.rest(swarm.step) for u, p in self._planned.items()}
-        chosen = self._safeguard.chosen(swarm, courses, movers)
+        idle = [u for u in np.flatnonzero(flying).tolist() if u not in self._planned]
+        staying = [u for u in idle if self._stays(u, swarm)]
+        chosen = self._safeguard.chosen(swarm, courses, movers, staying)
         return self._commands(swarm, flying, chosen, reason)
 
     def _commands(

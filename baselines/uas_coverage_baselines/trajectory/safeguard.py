@@ -16,7 +16,12 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.course import Course, are_apart, braked
+from uas_coverage_baselines.trajectory.course import (
+    Course,
+    are_apart,
+    braked,
+    hover_inputs,
+)
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.space import spare_of_rules_m
@@ -50,7 +55,11 @@ class Safeguard:
         self.backups: dict[int, Course] = {}
 
     def chosen(
-        self, swarm: SwarmState, wanted: Mapping[int, Course], movers: Movers
+        self,
+        swarm: SwarmState,
+        wanted: Mapping[int, Course],
+        movers: Movers,
+        staying: Collection[int] = (),
     ) -> dict[int, tuple[Course, bool]]:
         """What each UAS flies from now on: its course, or what is left of its backup trajectory.
 
@@ -58,6 +67,7 @@ class Safeguard:
             swarm: Where the UAS are.
             wanted: Courses of UAS that have one, from this sample on and verified.
             movers: What moves, as it is seen.
+            staying: UAS that land where they are, and are gone after this step.
 
         Returns:
             For each UAS for which there is something verified: that, and whether it follows its
@@ -66,6 +76,9 @@ class Safeguard:
         step, x = swarm.step, swarm.x
         held = {}
         for u in np.flatnonzero(swarm.status == FLYING).tolist():
+            if u in staying:
+                held[u] = _landing_here(self._fleet, u, step, x[u])
+                continue
             backup = self.backups[u].rest(step) if u in self.backups else None
             if backup is not None and self._holds(u, backup, x[u], movers):
                 held[u] = backup
@@ -180,3 +193,8 @@ def _assisted(codes, arena, state, outcome, wrenches):
             reference = state.reference[i].copy()
             command = outcome[i].applied_command
             command_wrench(arena.vehicles[i], state.x[i], reference, command, wrenches[i])
+
+
+def _landing_here(fleet: Fleet, uas: int, step: int, x: FloatArray) -> Course:
+    """One step of hovering, after which the UAS is gone."""
+    return Course(step, np.stack([x, x]), hover_inputs(fleet, uas, x)[None], True)
