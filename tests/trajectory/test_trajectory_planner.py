@@ -192,7 +192,7 @@ def test_energy_can_be_weighed_more_than_time():
     assert energy_Wh(thrifty).sum() <= energy_Wh(quick).sum()
 
 
-def test_a_uas_that_stays_at_home_is_in_nobodys_way():
+def test_a_uas_that_stays_at_home_is_in_no_ones_way():
     """It lands in the first step; the other passes over it later, nearer than flying UAS may."""
     starts = ((20.0, 100.0, -1.0), (60.0, 102.0, -1.0))
     both = meadow(starts, waypoints=(waypoint((110.0, 100.0, -3.0), 3.0),))
