@@ -110,8 +110,8 @@ def export(
     min_slack: Annotated[
         float,
         typer.Option(
-            help="Seconds that any UAS may be late before two come too close; files that allow "
-            "less are refused."
+            help="Seconds that any UAS may be late before two come too close; files wait for "
+            "each other until they allow it."
         ),
     ] = 20.0,
     tolerance: Annotated[float, typer.Option(help="How far legs may be from the flight, m.")] = 2.0,

@@ -3,19 +3,21 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.record import LANDED, LIMIT
-from uas_coverage_env.operations.exported import Exported, exported
+from uas_coverage_env.operations.exported import Exported, exported, followed, waiting
 from uas_coverage_env.operations.formats import FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.lateness import Pair, pairs_of
 from uas_coverage_env.operations.report import report
 from uas_coverage_env.operations.report_page import report_page
-from uas_coverage_env.operations.tracks import Tolerances, make_track
+from uas_coverage_env.operations.separation import separate
+from uas_coverage_env.operations.tracks import Tolerances, Track, make_track
 from uas_coverage_env.scenario import Place
 
 MOST_TOLERANCE_M = 50.0
@@ -27,7 +29,7 @@ class ExportOptions:
 
     Attributes:
         kind: Key of `FORMATS`.
-        min_slack_s: How late any UAS has to be able to be [s].
+        min_slack_s: How late any UAS has to be able to be; waits are put in until it is [s].
         tolerances: How far an autopilot may be from the flight.
         autopilot: Whose plans `qgc` writes, key of `FIRMWARE`.
         place: Where on the Earth it is, for a scenario that does not say.
@@ -66,22 +68,21 @@ def make_export(flight: Flight, options: ExportOptions) -> Export:
 
     Raises:
         InputError: The flight cannot be exported, or two UAS would come too close if one of them
-            were late by less than asked.
+            were late by less than asked, wherever they wait for each other.
     """
     _check(options)
     frame = LocalFrame(_place(flight, options))
     _check_flight(flight)
-    exports, grounded = [], []
+    tracks, grounded = [], []
     for i, uas in enumerate(flight.scenario.uas):
         track = make_track(flight, i, options.tolerances)
         if track is None:
             grounded.append(uas.name)
         else:
-            exports.append(exported(flight, track, frame, options.tolerances))
-    if not exports:
+            tracks.append(track)
+    if not tracks:
         raise InputError("no UAS flies in this flight; there is nothing to export")
-    pairs = pairs_of(flight.scenario, [(one.track.uas, one.followed) for one in exports])
-    _check_slack(pairs, frame, options.min_slack_s)
+    exports, pairs = _kept_apart(flight, tracks, frame, options)
     data = report(flight, exports, pairs, frame, options.tolerances)
     files = {
         f"{one.track.name}{ending}": text
@@ -138,8 +139,37 @@ def _check_flight(flight: Flight) -> None:
         raise InputError(f"the flight has a contact ({contacts[0]}); export one without")
 
 
+def _kept_apart(
+    flight: Flight, tracks: Sequence[Track], frame: LocalFrame, options: ExportOptions
+) -> tuple[list[Exported], list[Pair]]:
+    """The UAS with the waits that they need, and how late they may be then."""
+    scenario, tolerances = flight.scenario, options.tolerances
+    exports = [exported(flight, track, frame, tolerances) for track in tracks]
+    pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
+    if not _short(pairs, options.min_slack_s):
+        return exports, pairs
+    fleet = [
+        (track.uas, partial(followed, track, scenario.vehicles[track.uas], tolerances))
+        for track in tracks
+    ]
+    waits = separate(scenario, fleet, options.min_slack_s)
+    if waits is not None:
+        exports = [
+            exported(flight, track, frame, tolerances, one)
+            for track, one in zip(tracks, waits, strict=True)
+        ]
+        pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
+    _check_slack(pairs, frame, options.min_slack_s)
+    return exports, pairs
+
+
+def _short(pairs: Sequence[Pair], min_slack_s: float) -> list[Pair]:
+    """The pairs in which one may be late by less than is asked."""
+    return [p for p in pairs if p.slack_s is not None and p.slack_s < min_slack_s]
+
+
 def _check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) -> None:
-    short = [p for p in pairs if p.slack_s is not None and p.slack_s < min_slack_s]
+    short = _short(pairs, min_slack_s)
     if not short:
         return
     worst = min(short, key=lambda pair: pair.slack_s or 0.0)
@@ -149,8 +179,8 @@ def _check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) -
     raise InputError(
         f"{worst.names[0]} and {worst.names[1]} come closer than {worst.kept_m:.1f} m at "
         f"{latitude:.6f}, {longitude:.6f}, {height:.0f} m high, if one is {worst.slack_s:.1f} s "
-        f"late, less than --min-slack {min_slack_s:g}{more}; plan them further apart, or accept "
-        f"it with a smaller --min-slack"
+        f"late, less than --min-slack {min_slack_s:g}{more}, and no wait on the ground or at a "
+        f"corner changes that; plan them further apart, or accept it with a smaller --min-slack"
     )
 
 
@@ -162,6 +192,7 @@ def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
     if scenario.wind is not None or scenario.uncertainty is not None or scenario.disturbances:
         notes.append("the report holds for still air, and for the vehicles as their files say")
     for one in exports:
+        notes += [f"{one.track.name} {line}" for line in waiting(one)]
         lost = one.point_of_no_return
         if lost is not None:
             notes.append(

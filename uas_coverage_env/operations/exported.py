@@ -12,6 +12,7 @@ from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.operations.room import Surroundings
+from uas_coverage_env.operations.separation import Waits
 from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VehicleParams
@@ -22,6 +23,8 @@ _SAME_SPEED_MPS = 0.5
 _LEAST_RETURN_M = 15.0
 _ABOVE_ROOFS_M = 1.0
 _EVERY = 5
+_IDLE_SHARE = 0.1
+"""Of what level flight takes, what motors take that idle while a UAS waits to take off."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class LegCharge:
     """What the battery holds at the end of a leg, as an autopilot flies it.
 
     Attributes:
-        time_s: Since the command to take off [s].
+        time_s: Since the command to start [s].
         planned_s: The same in the flight that was planned [s].
         soc: State of charge [-].
         planned_soc: The same in the planned flight [-].
@@ -54,6 +57,8 @@ class Exported:
     Attributes:
         track: Its legs.
         speeds_mps: (legs,) as the file sets them [m/s].
+        holds_s: (legs,) how long it stops at the end of each; 0: it flies on [s].
+        waits: Where it waits for others.
         followed: How an autopilot flies them.
         charges: One entry per leg.
         soc_landed: State of charge after landing [-].
@@ -65,6 +70,8 @@ class Exported:
 
     track: Track
     speeds_mps: tuple[float, ...]
+    holds_s: tuple[float, ...]
+    waits: Waits
     followed: Followed
     charges: tuple[LegCharge, ...]
     soc_landed: float
@@ -93,17 +100,43 @@ def autopilot_of(vehicle: VehicleParams, tolerances: Tolerances) -> Autopilot:
     )
 
 
-def exported(flight: Flight, track: Track, frame: LocalFrame, tolerances: Tolerances) -> Exported:
+def followed(
+    track: Track, vehicle: VehicleParams, tolerances: Tolerances, waits: Waits
+) -> Followed:
+    """How an autopilot flies the file of a track.
+
+    Args:
+        track: The track.
+        vehicle: Whose limits the autopilot has.
+        tolerances: How far from a corner it may pass.
+        waits: Where it waits for others.
+    """
+    return follow(
+        track.corners_m,
+        file_speeds(track),
+        file_holds(track, waits),
+        autopilot_of(vehicle, tolerances),
+        waits.start_s,
+    )
+
+
+def exported(
+    flight: Flight,
+    track: Track,
+    frame: LocalFrame,
+    tolerances: Tolerances,
+    waits: Waits = Waits(),  # noqa: B008 (immutable)
+) -> Exported:
     """What there is to say about a track."""
     scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
-    speeds = file_speeds(track)
-    holds = [STOP_S * leg.stop for leg in track.legs]
-    followed = follow(track.corners_m, speeds, holds, autopilot_of(vehicle, tolerances))
-    charges, soc_landed = _charges(flight, track, followed)
+    flown = followed(track, vehicle, tolerances, waits)
+    charges, soc_landed = _charges(flight, track, flown, waits)
     return Exported(
         track=track,
-        speeds_mps=speeds,
-        followed=followed,
+        speeds_mps=file_speeds(track),
+        holds_s=file_holds(track, waits),
+        waits=waits,
+        followed=flown,
         charges=charges,
         soc_landed=soc_landed,
         return_m=return_height_m(scenario, track),
@@ -120,6 +153,14 @@ def file_speeds(track: Track) -> tuple[float, ...]:
         changed = not speeds or abs(wanted - speeds[-1]) > _SAME_SPEED_MPS
         speeds.append(wanted if changed else speeds[-1])
     return tuple(speeds)
+
+
+def file_holds(track: Track, waits: Waits) -> tuple[float, ...]:
+    """How long the UAS stops at the end of each leg [s]."""
+    holds_s = [STOP_S * leg.stop for leg in track.legs]
+    if waits.leg is not None:
+        holds_s[waits.leg] = STOP_S + waits.hold_s
+    return tuple(holds_s)
 
 
 def return_height_m(scenario: Scenario, track: Track) -> float | None:
@@ -156,15 +197,17 @@ def _returns(
 
 
 def _charges(
-    flight: Flight, track: Track, followed: Followed
+    flight: Flight, track: Track, followed: Followed, waits: Waits
 ) -> tuple[tuple[LegCharge, ...], float]:
     """Charge after each leg, of level flight at full speed all the time: a careful estimate."""
     scenario, i = flight.scenario, track.uas
     uas, vehicle = scenario.uas[i], scenario.vehicles[i]
     ways_home = Range(MissionBrief.of(scenario))
     ends = followed.corner_s
-    dod, charges = 1.0 - uas.soc_0 + dod_per_s(vehicle, 1.0 - uas.soc_0) * ends[0], []
+    began_s = ends[0] - (1.0 - _IDLE_SHARE) * waits.start_s
+    dod, charges = 1.0 - uas.soc_0 + dod_per_s(vehicle, 1.0 - uas.soc_0) * began_s, []
     for leg, start_s, end_s in zip(track.legs, ends, ends[1:], strict=False):
+        # a hold at the end of a leg is counted with the next one
         dod += dod_per_s(vehicle, min(dod, 1.0)) * (end_s - start_s)
         x = flight.x[leg.sample, i].copy()
         x[:] = 0.0
@@ -185,6 +228,16 @@ def _charges(
         )
     landing_s = followed.duration_s - float(ends[-1])
     return tuple(charges), 1.0 - dod - dod_per_s(vehicle, min(dod, 1.0)) * landing_s
+
+
+def waiting(one: Exported) -> list[str]:
+    """What a UAS does for others to be out of its way, as phrases that follow its name."""
+    lines, waits = [], one.waits
+    if waits.start_s:
+        lines.append(f"takes off {waits.start_s} s after the start of its mission")
+    if waits.leg is not None:
+        lines.append(f"waits {waits.hold_s} s longer at the end of leg {waits.leg + 1}")
+    return lines
 
 
 def waypoint_margins(scenario: Scenario, one: Exported) -> Sequence[float]:

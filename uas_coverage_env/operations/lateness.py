@@ -42,15 +42,15 @@ def pairs_of(scenario: Scenario, flown: Sequence[tuple[int, Followed]]) -> list[
 
     Args:
         scenario: The mission.
-        flown: Index of a UAS, and how its file is flown; all take off at the same time.
+        flown: Index of a UAS, and how its file is flown; all are started at the same time.
     """
     return [_pair(scenario, one, other) for one, other in itertools.combinations(flown, 2)]
 
 
 def _pair(scenario: Scenario, one: tuple[int, Followed], other: tuple[int, Followed]) -> Pair:
     (i, a), (j, b) = one, other
-    kept_m = scenario.uas[i].radius_m + scenario.uas[j].radius_m + scenario.uas_safe_distance_m
-    found = _encounters(a, b, kept_m)
+    distance_m = kept_m(scenario, i, j)
+    found = encounters(a, b, distance_m)
     slack_s, place_m = None, None
     if len(found):
         t, s = a.times_s[found[:, 0]], b.times_s[found[:, 1]]
@@ -63,22 +63,33 @@ def _pair(scenario: Scenario, one: tuple[int, Followed], other: tuple[int, Follo
         ends = a.places_m[found[worst, 0]], b.places_m[found[worst, 1]]
         place_m = 0.5 * (ends[0] + ends[1])
     names = scenario.uas[i].name, scenario.uas[j].name
-    return Pair(names, kept_m, _least_m(a, b), slack_s, place_m)
+    return Pair(names, distance_m, _least_m(a, b), slack_s, place_m)
 
 
-def _encounters(a: Followed, b: Followed, kept_m: float) -> NDArray[np.intp]:
-    """(N, 2) samples of the two, one of them flying, that may be closer than must be kept."""
+def kept_m(scenario: Scenario, i: int, j: int) -> float:
+    """Distance that two UAS have to keep, horizontally or vertically [m]."""
+    return scenario.uas[i].radius_m + scenario.uas[j].radius_m + scenario.uas_safe_distance_m
+
+
+def encounters(a: Followed, b: Followed, distance_m: float) -> NDArray[np.intp]:
+    """(N, 2) samples of the two, one of them flying, that may be closer than must be kept.
+
+    Args:
+        a: One of them.
+        b: The other.
+        distance_m: To be kept, horizontally or vertically [m].
+    """
     # between two samples each may have been half a step nearer
     half_a, half_b = _half_steps(a), _half_steps(b)
-    reach_m = kept_m + half_a.max() + half_b.max()
+    reach_m = distance_m + half_a.max() + half_b.max()
     near = KDTree(a.places_m[:, :2]).query_ball_tree(KDTree(b.places_m[:, :2]), reach_m)
     found = []
     for n, others in enumerate(near):
         if others:
             m = np.array(others)
             away = a.places_m[n] - b.places_m[m]
-            distance_m = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
-            close = distance_m < kept_m + half_a[n] + half_b[m]
+            apart_m = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
+            close = apart_m < distance_m + half_a[n] + half_b[m]
             flying = (-b.places_m[m, 2] > _FLYING_M) | (-a.places_m[n, 2] > _FLYING_M)
             m = m[close & flying]
             found.append(np.column_stack([np.full(len(m), n), m]))

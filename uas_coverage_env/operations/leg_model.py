@@ -119,7 +119,7 @@ class _Leg:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A file as it is flown, from the command to take off until it has landed.
+    """A file as it is flown, from the command to start until it has landed.
 
     Attributes:
         times_s: (T,) every `DT_S` [s].
@@ -133,12 +133,16 @@ class Followed:
 
     @property
     def duration_s(self) -> float:
-        """From the command to take off until it has landed [s]."""
+        """From the command to start until it has landed [s]."""
         return float(self.times_s[-1])
 
 
 def follow(
-    corners_m: ArrayLike, speeds_mps: Sequence[float], holds_s: Sequence[float], by: Autopilot
+    corners_m: ArrayLike,
+    speeds_mps: Sequence[float],
+    holds_s: Sequence[float],
+    by: Autopilot,
+    wait_s: float = 0.0,
 ) -> Followed:
     """Take off to the first corner, fly the others one after the other, land under the last one.
 
@@ -147,10 +151,11 @@ def follow(
         speeds_mps: (C - 1,) of each leg.
         holds_s: (C - 1,) how long it stops at the end of each leg; 0: it flies on.
         by: The autopilot.
+        wait_s: How long it waits on the ground before it takes off [s].
     """
     corners = np.asarray(corners_m, np.float64)
     ground = corners[0] * (1.0, 1.0, 0.0)
-    places = [ground] * round(_SPOOL_UP_S / DT_S)
+    places = [ground] * round((wait_s + _SPOOL_UP_S) / DT_S)
     _fly(_legs([ground, corners[0]], [by.up_mps], by), by, places)
     corner_s = [(len(places) - 1) * DT_S]
     first = 0

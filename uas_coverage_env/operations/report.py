@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.operations.exported import Exported, waypoint_margins
+from uas_coverage_env.operations.exported import Exported, waiting, waypoint_margins
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.lateness import Pair
 from uas_coverage_env.operations.tracks import Tolerances
@@ -56,7 +56,9 @@ def _uas(flight: Flight, one: Exported) -> dict[str, Any]:
         "off_path_m": round(track.off_m, 3),
         "spare_room_m": round(room.spare_m, 3),
         "room_to_contact_m": round(room.contact_m, 3),
-        "stops": sum(leg.stop for leg in track.legs),
+        "stops": sum(hold_s > 0.0 for hold_s in one.holds_s),
+        "start_delay_s": one.waits.start_s,
+        "waits": waiting(one),
         "waypoints_passed": len(track.waypoints),
         "waypoint_margin_m": round(min(margins), 3) if margins else None,
         "return_height_m": one.return_m,
@@ -82,7 +84,8 @@ def _leg(one: Exported, n: int) -> dict[str, Any]:
     return {
         **_place(one.frame, leg.end_m),
         "speed_mps": one.speeds_mps[n],
-        "stop": leg.stop,
+        "stop": one.holds_s[n] > 0.0,
+        "hold_s": one.holds_s[n],
         "time_s": round(charge.time_s, 1),
         "planned_s": charge.planned_s,
         "soc": round(charge.soc, 4),

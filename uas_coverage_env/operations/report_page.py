@@ -41,6 +41,7 @@ def report_page(scenario: Scenario, exports: Sequence[Exported], data: dict[str,
         f"within {data['path_tolerance_m']:g} m of the flight. {_NOTE}</p>",
         _map(scenario, exports),
         _fleet(data["uas"]),
+        _waits(data["uas"]),
         _pairs(data["pairs"]),
         *(_legs(uas) for uas in data["uas"]),
     ]
@@ -84,6 +85,14 @@ def _fleet(fleet: Sequence[dict[str, Any]]) -> str:
     return "<h2>Fleet</h2>" + _table(head, rows)
 
 
+def _waits(fleet: Sequence[dict[str, Any]]) -> str:
+    """What was put in for the UAS to keep apart."""
+    lines = [
+        f"<li>{escape(uas['name'])} {escape(line)}</li>" for uas in fleet for line in uas["waits"]
+    ]
+    return f"<p>To keep apart:</p><ul>{''.join(lines)}</ul>" if lines else ""
+
+
 def _pairs(pairs: Sequence[dict[str, Any]]) -> str:
     if not pairs:
         return ""
@@ -98,13 +107,14 @@ def _pairs(pairs: Sequence[dict[str, Any]]) -> str:
         for pair in pairs
     ]
     head = ["pair", "least distance, m", "to be kept, m", "either may be late by", "else close at"]
-    return "<h2>Delays</h2>" + _table(head, rows)
+    text = "<p>All missions are started at the same time.</p>"
+    return f"<h2>Delays</h2>{text}" + _table(head, rows)
 
 
 def _legs(uas: dict[str, Any]) -> str:
     rows = [
         [
-            f"{n} (stop)" if leg["stop"] else str(n),
+            f"{n} (stop of {leg['hold_s']:g} s)" if leg["stop"] else str(n),
             _degrees(leg),
             f"{leg['height_m']:.1f}",
             f"{leg['speed_mps']:g}",

@@ -50,6 +50,8 @@ def parameters_text(scenario: Scenario, one: Exported, tolerances: Tolerances) -
         "FENCE_ALT_MAX": -float(scenario.fence.vertices_m[:, 2].min()),
         "BATT_FS_LOW_ACT": _SMART_RTL,  # back the way it came, where it remembers that
     }
+    if one.waits.start_s:
+        values["DISARM_DELAY"] = 0  # it would disarm while it waits on the ground
     if one.return_m is None:
         values["FENCE_ACTION"] = _SMART_RTL_OR_LAND  # flying straight home is not clear
     else:

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass
 
 from uas_coverage_env.operations.exported import Exported
-from uas_coverage_env.operations.tracks import STOP_S
 
-WAYPOINT, LAND, TAKE_OFF, CHANGE_SPEED = 16, 21, 22, 178
+WAYPOINT, LAND, TAKE_OFF, DELAY, CHANGE_SPEED = 16, 21, 22, 93, 178
 """MAV_CMD."""
 
 MISSION_FRAME, RELATIVE_FRAME = 2, 3
@@ -32,7 +31,7 @@ class Item:
 
 
 def items_of(one: Exported, corner_m: float) -> list[Item]:
-    """Take-off, legs with their speeds, and landing.
+    """What is waited for, take-off, legs with their speeds, and landing.
 
     Args:
         one: The UAS.
@@ -41,14 +40,17 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
     latitude, longitude, height = one.geodetic(one.track.take_off_m)
     ground = float(latitude), float(longitude)
     anyhow = (0.0, 0.0, 0.0, math.nan)
-    items = [Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height)))]
+    items = []
+    if one.waits.start_s:  # the time of day is not what it waits for
+        items.append(Item(DELAY, MISSION_FRAME, (one.waits.start_s, -1.0, -1.0, -1.0, 0, 0, 0)))
+    items.append(Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height))))
     set_mps = None
-    for leg, speed_mps in zip(one.track.legs, one.speeds_mps, strict=True):
+    for leg, speed_mps, hold_s in zip(one.track.legs, one.speeds_mps, one.holds_s, strict=True):
         if speed_mps != set_mps:
             items.append(Item(CHANGE_SPEED, MISSION_FRAME, (1.0, speed_mps, -1.0, 0, 0, 0, 0)))
             set_mps = speed_mps
         place = (float(number) for number in one.geodetic(leg.end_m))
-        first = (STOP_S * leg.stop, corner_m, 0.0, _NORTH_DEG)
+        first = (hold_s, corner_m, 0.0, _NORTH_DEG)
         items.append(Item(WAYPOINT, RELATIVE_FRAME, (*first, *place)))
     items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, *ground, 0.0)))
     return items
