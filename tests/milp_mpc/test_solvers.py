@@ -26,7 +26,7 @@ from uas_coverage_baselines.milp_mpc.solvers import (
 
 from uas_coverage_env import InputError
 from uas_coverage_env.cli import main
-from uas_coverage_env.flight.rollout import _versions
+from uas_coverage_env.flight.rollout import recorded_versions
 
 PACKAGES = {"highs": "highspy", "scip": "pyscipopt", "gurobi": "gurobipy"}
 
@@ -306,4 +306,4 @@ def test_a_program_that_highs_refuses_is_the_solver_s_error():
 
 def test_the_flight_record_names_the_version_of_every_solver_installed():
     installed = {name for name in ("highspy", "pyscipopt", "gurobipy") if find_spec(name)}
-    assert installed <= set(_versions())
+    assert installed <= set(recorded_versions())

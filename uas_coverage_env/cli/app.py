@@ -59,6 +59,11 @@ COMMANDS = (
         "Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`).",
     ),
     CommandEntry(
+        "import-log",
+        at(f"{_CLI}.logs:import_log"),
+        "Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`).",
+    ),
+    CommandEntry(
         "scenarios", at(f"{_CLI}.scenarios:app"), "List the shipped scenarios, or check one."
     ),
     CommandEntry(

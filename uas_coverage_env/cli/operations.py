@@ -17,11 +17,11 @@ from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import Place, warnings
 
-_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml"}
+_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink"}
 
 
 @contextmanager
-def _extra() -> Iterator[None]:
+def extra() -> Iterator[None]:
     """Say which extra is missing, where it is."""
     try:
         yield
@@ -30,7 +30,7 @@ def _extra() -> Iterator[None]:
         if name not in _LIBRARIES:
             raise
         raise InputError(
-            f'places on the Earth need {name}: pip install "uas-coverage-env[ops]"'
+            f'places on the Earth and logs need {name}: pip install "uas-coverage-env[ops]"'
         ) from error
 
 
@@ -73,7 +73,7 @@ def import_area(
     ] = False,
 ) -> None:
     """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
-    with _extra():
+    with extra():
         from uas_coverage_env.operations import ImportOptions, make_scenario, read_drawings
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: should end in .toml")
@@ -86,7 +86,7 @@ def import_area(
         radius_m=radius,
         overlap=overlap,
         ceiling_m=height + 30.0 if ceiling is None else ceiling,
-        homes=tuple(_place("--home", text) for text in home or ()),
+        homes=tuple(place_of("--home", text) for text in home or ()),
         town=town,
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
@@ -133,11 +133,11 @@ def export(
     ] = False,
 ) -> None:
     """Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`)."""
-    with _extra():
+    with extra():
         from uas_coverage_env.operations import ENDINGS, ExportOptions, Tolerances, make_export
     if out.is_dir() and any(out.iterdir()) and not overwrite:
         raise InputError(f"--out {out}: is not empty; give another or add --overwrite")
-    latitude, longitude = _place("--place", place) if place else (0.0, 0.0)
+    latitude, longitude = place_of("--place", place) if place else (0.0, 0.0)
     options = ExportOptions(
         kind=kind,
         min_slack_s=min_slack,
@@ -169,7 +169,7 @@ def export(
         sys.stderr.write(f"warning: {one_line(note)}\n")
 
 
-def _place(option: str, text: str) -> tuple[float, float]:
+def place_of(option: str, text: str) -> tuple[float, float]:
     """Latitude and longitude as an option gives them."""
     try:
         latitude, longitude = (float(part) for part in text.split(","))

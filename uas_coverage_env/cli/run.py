@@ -97,7 +97,7 @@ def run(
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()
-    _report(screen, flight, directory)
+    report_flight(screen, flight, directory)
     raise typer.Exit(_exit_code(flight, steps))
 
 
@@ -125,7 +125,8 @@ def _exit_code(flight: Flight, steps: int | None) -> int:
     return DONE if accomplished(flight) or ended_by_person else FAILED
 
 
-def _report(screen: Console, flight: Flight, directory: Path) -> None:
+def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
+    """Print what came of a flight, and where it is."""
     result = summary(flight)
     table = Table("UAS", "end", "steps", "energy, Wh", "charge left", box=None)
     for i, name in enumerate(flight.names):
@@ -149,7 +150,7 @@ def _report(screen: Console, flight: Flight, directory: Path) -> None:
         f"{flight.breaches} breaches{low}",
         markup=False,
     )
-    if flight.decisions:
+    if any(decision.duration_s for decision in flight.decisions):  # none in a log
         times = ", ".join(
             f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
         )

@@ -110,7 +110,7 @@ def rollout(
         disturbances=tuple(disturbance.name for disturbance in world.disturbances),
         ended=ended,
         wall_time_s=time.perf_counter() - started,
-        versions=_versions(),
+        versions=recorded_versions(),
         **log.series(),
     )
 
@@ -174,7 +174,8 @@ def _decide(
         raise PlannerError(reason) from error
 
 
-def _versions() -> dict[str, str]:
+def recorded_versions() -> dict[str, str]:
+    """Package -> version of what decides how a flight comes out."""
     packages = {name: version(name) for name in _RECORDED_PACKAGES}
     for name in _RECORDED_WHERE_INSTALLED:
         with contextlib.suppress(PackageNotFoundError):

@@ -6,9 +6,11 @@ Needs the extra `ops`.
 from uas_coverage_env.operations.cameras import Camera, camera_names, load_camera
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.export import Export, ExportOptions, make_export
+from uas_coverage_env.operations.flown import Flown, flown_flight
 from uas_coverage_env.operations.formats import ENDINGS, FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.logs import Logged, read_log
 from uas_coverage_env.operations.make import Imported, ImportOptions, make_scenario
 from uas_coverage_env.operations.reading import read_drawings
 from uas_coverage_env.operations.tracks import Tolerances
@@ -22,14 +24,18 @@ __all__ = [
     "DrawnPolygon",
     "Export",
     "ExportOptions",
+    "Flown",
     "ImportOptions",
     "Imported",
     "LocalFrame",
+    "Logged",
     "TakeOff",
     "Tolerances",
     "camera_names",
+    "flown_flight",
     "load_camera",
     "make_export",
     "make_scenario",
     "read_drawings",
+    "read_log",
 ]

@@ -1,0 +1,75 @@
+"""Logs as CSV: t_s, latitude_deg, longitude_deg, height_m, and what else there is."""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.plain_files import read_text
+from uas_coverage_env.operations.logs.logged import Logged
+
+NEEDED = ("t_s", "latitude_deg", "longitude_deg", "height_m")
+OPTIONAL = ("soc", "voltage_V", "current_A")
+NAME = "uas"
+_MOST_BYTES = 200_000_000
+
+
+def read_table(path: Path) -> list[Logged]:
+    """What a table holds; columns may stand in any order, and others are left alone.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: A column is missing, or a value is no number.
+    """
+    try:
+        rows = list(csv.reader(io.StringIO(read_text(path, _MOST_BYTES))))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: is no table of text: {error}") from error
+    header = [name.strip() for name in rows[0]] if rows else []
+    missing = [name for name in NEEDED if name not in header]
+    if missing:
+        raise InputError(
+            f"{path}: has no column {missing[0]}; its first line should name {', '.join(NEEDED)} "
+            f"and may name {', '.join((NAME, *OPTIONAL))}"
+        )
+    doubled = [name for name in (*NEEDED, NAME, *OPTIONAL) if header.count(name) > 1]
+    if doubled:
+        raise InputError(f"{path}: has column {doubled[0]} twice; leave one out")
+    names = [*NEEDED, *(name for name in OPTIONAL if name in header)]
+    columns = [header.index(name) for name in names]
+    by_uas: dict[str, list[list[float]]] = {}
+    for line, row in enumerate(rows[1:], start=2):
+        if not row:
+            continue
+        if len(row) != len(header):
+            raise InputError(f"{path}: line {line}: holds {len(row)} values, not {len(header)}")
+        uas = row[header.index(NAME)].strip() if NAME in header else ""
+        values = [
+            _number(path, line, name, row[column])
+            for name, column in zip(names, columns, strict=True)
+        ]
+        by_uas.setdefault(uas, []).append(values)
+    if not by_uas:
+        raise InputError(f"{path}: holds no sample")
+    return [_logged(uas, names, np.array(values)) for uas, values in by_uas.items()]
+
+
+def _number(path: Path, line: int, name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{path}: line {line}: {name} {text[:40]!r} is no number")
+    return value
+
+
+def _logged(uas: str, names: list[str], values: np.ndarray) -> Logged:
+    by_name = dict(zip(names, values.T, strict=True))
+    t, latitude, longitude, height = (by_name.pop(name) for name in NEEDED)
+    return Logged(uas, t, latitude, longitude, height, **by_name)
