@@ -15,7 +15,7 @@ from test_leg_model import ORIGIN, RECORDED, recorded, rows_of
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at
+from uas_coverage_env.flight import accomplished, covered_at, rest_of
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations import LocalFrame, flown_flight, read_log
 from uas_coverage_env.operations.flown import AT_HOME_M
@@ -124,6 +124,9 @@ def test_a_flight_that_was_broken_off_ends_in_the_air(plan):
     assert made.flight.mode[-1, 0] < LANDED
     assert any("ends away from home" in note for note in made.notes)
     assert made.flight.covered[-1] < len(plan.scenario.waypoints)
+    rest = rest_of(made.flight)
+    assert len(rest.waypoints) == len(plan.scenario.waypoints) - made.flight.covered[-1]
+    assert accomplished(rollout(rest, load_planner("nearest-waypoint"), 0))
 
 
 def test_contacts_and_breaches_are_found_as_in_a_simulated_flight(plan):

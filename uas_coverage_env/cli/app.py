@@ -64,6 +64,11 @@ COMMANDS = (
         "Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`).",
     ),
     CommandEntry(
+        "resume",
+        at(f"{_CLI}.resume:resume"),
+        "Write the scenario of what a flight has left to cover.",
+    ),
+    CommandEntry(
         "scenarios", at(f"{_CLI}.scenarios:app"), "List the shipped scenarios, or check one."
     ),
     CommandEntry(

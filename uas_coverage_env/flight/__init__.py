@@ -29,6 +29,7 @@ from uas_coverage_env.flight.registry import (
     load_planner,
     planner_names,
 )
+from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.flight.rollout import Progress, rollout
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "home",
     "load_planner",
     "planner_names",
+    "rest_of",
     "rollout",
     "summary",
 ]
