@@ -9,11 +9,11 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.operations import extra, place_of
 from uas_coverage_env.cli.output import console, one_line
-from uas_coverage_env.cli.run import report_flight
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import Flight, check_directory, draw_flight
+from uas_coverage_env.flight import Flight, check_directory
 from uas_coverage_env.scenario import Place
 
 if TYPE_CHECKING:
@@ -60,8 +60,7 @@ def import_log(
         )
     with extra():
         made = flown_flight(planned, _by_uas(logs, planned.names), LocalFrame(there))
-    made.flight.save(out, overwrite=overwrite)
-    draw_flight(made.flight, out / "map.png")
+    keep_flight(made.flight, out, overwrite=overwrite)
     screen = console()
     report_flight(screen, made.flight, out)
     table = Table("UAS", "flown, s", "planned, s", "off the path, p95, m", "largest, m", box=None)

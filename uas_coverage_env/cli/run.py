@@ -7,25 +7,21 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
+from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
+from uas_coverage_env.cli.sorties import keep_sorties
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
-    MODES,
     Flight,
     accomplished,
     check_directory,
-    draw_flight,
-    energy_Wh,
-    fallback_reasons,
-    filtered_share,
+    fly_sorties,
     load_planner,
     rollout,
-    summary,
 )
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 
 
@@ -48,6 +44,14 @@ def run(
     dynamics: Annotated[
         Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
     ] = "lpv",
+    sorties: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Fly up to this many sorties, each from home with fresh packs on what is left; "
+            "`[sorties]` of the scenario has packs and swap time. DIR holds a flight for each.",
+        ),
+    ] = None,
     safety_filter: Annotated[
         bool, typer.Option("--filter", help="Switch the safety filter on.")
     ] = False,
@@ -73,6 +77,8 @@ def run(
     covered, all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
     otherwise.
     """
+    if sorties is not None and steps is not None:
+        raise InputError("--steps ends a flight in the air: give either --steps or --sorties")
     mission = loaded(scenario)
     player = load_planner(planner, _options(option or ()))
     # KIND:ARGUMENT may hold a path
@@ -81,10 +87,11 @@ def run(
     check_directory(directory, overwrite=overwrite)
 
     screen = console()
-    try:
-        with shown(screen, mission, watch=player if watch else None) as on_step:
-            flight = rollout(
-                mission,
+
+    def fly(what: Scenario) -> Flight:
+        with shown(screen, what, watch=player if watch else None) as on_step:
+            return rollout(
+                what,
                 player,
                 seed,
                 dynamics=dynamics,
@@ -92,8 +99,13 @@ def run(
                 max_steps=steps,
                 on_step=on_step,
             )
-        flight.save(directory, overwrite=overwrite)
-        draw_flight(flight, directory / "map.png")
+
+    try:
+        if sorties is not None:
+            chain = fly_sorties(mission, fly, sorties)
+            raise typer.Exit(keep_sorties(screen, chain, directory, overwrite=overwrite))
+        flight = fly(mission)
+        keep_flight(flight, directory, overwrite=overwrite)
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()
@@ -123,42 +135,3 @@ def _free_directory(name: str) -> Path:
 def _exit_code(flight: Flight, steps: int | None) -> int:
     ended_by_person = flight.ended == "steps" and flight.steps == steps
     return DONE if accomplished(flight) or ended_by_person else FAILED
-
-
-def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
-    """Print what came of a flight, and where it is."""
-    result = summary(flight)
-    table = Table("UAS", "end", "steps", "energy, Wh", "charge left", box=None)
-    for i, name in enumerate(flight.names):
-        end = MODES[flight.mode[-1, i]]
-        table.add_row(
-            name,
-            end if end in ("landed", "lost") else "in the air",
-            str(flight.last_sample[i]),
-            f"{energy_Wh(flight)[i]:.2f}",
-            f"{flight.soc[-1, i]:.1%}",
-        )
-    screen.print(table)
-    for violation in flight.violations:
-        screen.print(f"violation: {violation}", markup=False)
-    low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
-    ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
-    screen.print(
-        f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "
-        f"{'all home' if result['all_home'] else 'not all home'}; "
-        f"{result['energy_Wh']:.2f} Wh; {len(flight.violations)} violations, "
-        f"{flight.breaches} breaches{low}",
-        markup=False,
-    )
-    if any(decision.duration_s for decision in flight.decisions):  # none in a log
-        times = ", ".join(
-            f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
-        )
-        counts = fallback_reasons(flight).items()
-        why = f" ({', '.join(f'{n} {reason}' for reason, n in counts)})" if counts else ""
-        screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks{why}", markup=False)
-    if flight.safety_filter:
-        share = filtered_share(flight)
-        screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)
-    screen.print(f"flight in {directory}", markup=False)
-    screen.print(f"to watch it: uas-coverage replay {directory}", markup=False)

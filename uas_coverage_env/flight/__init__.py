@@ -31,6 +31,7 @@ from uas_coverage_env.flight.registry import (
 )
 from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.flight.rollout import Progress, rollout
+from uas_coverage_env.flight.sorties import fly_sorties, sorties_summary
 
 __all__ = [
     "MODES",
@@ -58,10 +59,12 @@ __all__ = [
     "filtered_share",
     "flight_picture",
     "flight_pictures",
+    "fly_sorties",
     "home",
     "load_planner",
     "planner_names",
     "rest_of",
     "rollout",
+    "sorties_summary",
     "summary",
 ]

@@ -19,12 +19,13 @@ def coverage(flight: FlightRecord) -> float:
     Of those that events have dropped before they were covered none counts; of those that events
     have added, all that were added in time.
     """
-    left = _open_waypoints(flight)
+    left = open_waypoints(flight)
     covered = int(flight.covered[-1])
     return float(covered / (covered + left)) if covered + left else 1.0
 
 
-def _open_waypoints(flight: FlightRecord) -> int:
+def open_waypoints(flight: FlightRecord) -> int:
+    """How many waypoints were still to be covered at the end."""
     if flight.open_waypoints is not None:
         return flight.open_waypoints
     return len(flight.scenario.waypoints) - int(flight.covered[-1])
@@ -63,7 +64,7 @@ def accomplished(flight: FlightRecord) -> bool:
     all_home = all(
         landed or name in taken for landed, name in zip(home(flight), flight.names, strict=True)
     )
-    return bool(_open_waypoints(flight) == 0 and all_home and not flight.violations)
+    return bool(open_waypoints(flight) == 0 and all_home and not flight.violations)
 
 
 def decision_time_s(flight: FlightRecord) -> dict[str, float | None]:

@@ -25,6 +25,7 @@ from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.levels import LEVELS, Level, with_disturbances
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.source import (
     MissionSource,
@@ -57,6 +58,7 @@ __all__ = [
     "ScenarioLike",
     "ScheduledVelocity",
     "Sensing",
+    "Sorties",
     "Uas",
     "Uncertainty",
     "Waypoint",

@@ -240,7 +240,8 @@ def _is_high_enough(
 
 def _mission_too_long(scenario: UncheckedScenario) -> Iterator[str]:
     plan = back_and_forth(scenario)
-    if not plan.complete:
+    packs = scenario.sorties.packs if scenario.sorties else 1
+    if not plan.complete and (packs == 1 or plan.flight_s.sum() > packs * plan.air_time_s.sum()):
         yield (
             f"uas: the batteries will hardly finish this mission: flown back and forth it takes "
             f"about {plan.flight_s.sum():.0f} s in the air, and they hold "

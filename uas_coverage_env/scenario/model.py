@@ -43,6 +43,7 @@ class Scenario(UncheckedScenario):
             are those of the package that installed NAME.
         sensing: How well UAS are known to planners and autopilots; without it, exactly.
         events: What happens during the mission; a table `[[events]]` for each.
+        sorties: Battery packs of each UAS; without it, one.
     """
 
     def __getstate__(self) -> dict[Any, Any]:

@@ -21,12 +21,13 @@ from uas_coverage_env.scenario.fields import (
     Waypoint,
 )
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 _TABLES = (
     *(Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
-    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing),
+    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties),
     *EVENT_KINDS,
 )
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)

@@ -22,6 +22,7 @@ from uas_coverage_env.scenario.fields import (
     Uas,
     Waypoint,
 )
+from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.uncertainty import Uncertainty
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
@@ -54,6 +55,7 @@ class UncheckedScenario(StrictModel):
     disturbances: DisturbanceTables = ()
     sensing: Sensing | None = None
     events: Events = ()
+    sorties: Sorties | None = None
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -61,7 +63,7 @@ class UncheckedScenario(StrictModel):
         data = serialise(self)
         optional = (
             *("place", "min_height_m", "from_ground", "wind", "uncertainty", "disturbances"),
-            *("sensing", "events"),
+            *("sensing", "events", "sorties"),
         )
         for name in optional:
             if not getattr(self, name):

@@ -1,0 +1,61 @@
+"""What commands that fly do with a flight: keep it, and say what came of it."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from uas_coverage_env.flight import (
+    MODES,
+    Flight,
+    draw_flight,
+    energy_Wh,
+    fallback_reasons,
+    filtered_share,
+    summary,
+)
+
+
+def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> None:
+    """Write a flight directory with its map."""
+    flight.save(directory, overwrite=overwrite)
+    draw_flight(flight, directory / "map.png")
+
+
+def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
+    """Print what came of a flight, and where it is."""
+    result = summary(flight)
+    table = Table("UAS", "end", "steps", "energy, Wh", "charge left", box=None)
+    for i, name in enumerate(flight.names):
+        end = MODES[flight.mode[-1, i]]
+        table.add_row(
+            name,
+            end if end in ("landed", "lost") else "in the air",
+            str(flight.last_sample[i]),
+            f"{energy_Wh(flight)[i]:.2f}",
+            f"{flight.soc[-1, i]:.1%}",
+        )
+    screen.print(table)
+    for violation in flight.violations:
+        screen.print(f"violation: {violation}", markup=False)
+    low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
+    ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
+    screen.print(
+        f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "
+        f"{'all home' if result['all_home'] else 'not all home'}; "
+        f"{result['energy_Wh']:.2f} Wh; {len(flight.violations)} violations, "
+        f"{flight.breaches} breaches{low}",
+        markup=False,
+    )
+    if any(decision.duration_s for decision in flight.decisions):  # none in a log
+        times = ", ".join(
+            f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
+        )
+        counts = fallback_reasons(flight).items()
+        why = f" ({', '.join(f'{n} {reason}' for reason, n in counts)})" if counts else ""
+        screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks{why}", markup=False)
+    if flight.safety_filter:
+        share = filtered_share(flight)
+        screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)
+    screen.print(f"flight in {directory}", markup=False)
+    screen.print(f"to watch it: uas-coverage replay {directory}", markup=False)

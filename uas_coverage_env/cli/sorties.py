@@ -1,0 +1,69 @@
+"""Sorties of `uas-coverage run`: a flight directory for each, and one summary."""
+
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from uas_coverage_env.cli.flights import keep_flight
+from uas_coverage_env.cli.output import DONE, FAILED
+from uas_coverage_env.files.output_dir import write_files
+from uas_coverage_env.flight import Flight, sorties_summary
+
+_SUMMARY = "sorties.json"
+
+
+def keep_sorties(
+    screen: Console, sorties: Iterable[Flight], directory: Path, *, overwrite: bool
+) -> int:
+    """Write each sortie as soon as it has been flown, and print what came of all.
+
+    Returns:
+        The exit code.
+    """
+    (directory / _SUMMARY).unlink(missing_ok=True)
+    flights: list[Flight] = []
+    for number, flight in enumerate(sorties, start=1):
+        keep_flight(flight, directory / f"sortie_{number}", overwrite=overwrite)
+        flights.append(flight)
+    result = sorties_summary(flights)
+    text = json.dumps(result, indent=2, allow_nan=False) + "\n"
+    write_files(directory, {_SUMMARY: text.encode()})
+    _report(screen, result, directory)
+    for path in sorted(directory.glob("sortie_*")):
+        number = path.name.removeprefix("sortie_")
+        if number.isdigit() and int(number) > len(flights):
+            sys.stderr.write(f"warning: {path}: is of an earlier run\n")
+    done = result["left"] == 0 and result["all_home"] and not result["violations"]
+    return DONE if done else FAILED
+
+
+def _report(screen: Console, result: dict[str, Any], directory: Path) -> None:
+    head = ("sortie", "begins, s", "lasts, s", "covered", "left", "energy, Wh", "charge landed")
+    table = Table(*head, box=None)
+    for number, entry in enumerate(result["sorties"], start=1):
+        table.add_row(
+            str(number),
+            f"{entry['begins_s']:.0f}",
+            f"{entry['time_s']:.0f}",
+            str(entry["covered"]),
+            str(entry["left"]),
+            f"{entry['energy_Wh']:.2f}",
+            ", ".join(f"{soc:.0%}" for soc in entry["soc_landed"].values()),
+        )
+    screen.print(table)
+    packs = ", ".join(f"{name} {used}" for name, used in result["packs"].items())
+    ended = "" if result["ended"] == "complete" else f" ({result['ended']})"
+    screen.print(
+        f"covered {result['coverage']:.0%} in {len(result['sorties'])} sorties{ended}; "
+        f"{result['time_s'] / 60.0:.1f} min with swaps of {result['swap_s']:g} s; "
+        f"{result['energy_Wh']:.2f} Wh; packs used: {packs}; {result['violations']} violations, "
+        f"{result['breaches']} breaches",
+        markup=False,
+    )
+    screen.print(f"flights and {_SUMMARY} in {directory}", markup=False)
+    screen.print(f"to watch one: uas-coverage replay {directory / 'sortie_1'}", markup=False)
