@@ -80,6 +80,10 @@ QUICK = {
     "operations/test_lateness.py": "",
     "operations/test_layout.py": "",
     "operations/test_leg_model.py": "",
+    "operations/test_logs.py": (
+        "only test_telemetry_holds_places_attitude_and_charge "
+        "test_a_data_flash_log_holds_places_attitude_and_charge"
+    ),
     "routing/test_order_search.py": "",
     "paper/test_battery_figure.py": "",
     "reproduction/test_comparison.py": "",

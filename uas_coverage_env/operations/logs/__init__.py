@@ -29,6 +29,3 @@ def read_log(path: Path) -> list[Logged]:
     if reader is None:
         raise InputError(f"{path}: unknown kind of log; give {', '.join(READERS)}")
     return [limited(path, logged) for logged in reader(path)]
-
-
-__all__ = ["READERS", "Logged", "read_log"]
