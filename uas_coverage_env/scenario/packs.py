@@ -8,7 +8,7 @@ from uas_coverage_env.files.strict_toml import StrictModel
 
 
 class Sorties(StrictModel):
-    """Battery packs of each UAS: a flight takes one, the option `--sorties` of the command `run` all.
+    """Battery packs of each UAS: one for each flight; `--sorties` of `run` flies with all.
 
     Attributes:
         packs: How many each UAS has, that of its first take-off included.
