@@ -1,5 +1,15 @@
 from .files.strict_toml import InputError
-from .flight import Decision, Flight, Planner, load_planner, planner_names, rollout
+from .flight import (
+    Decision,
+    Evaluation,
+    Flight,
+    Planner,
+    as_planner,
+    evaluate,
+    load_planner,
+    planner_names,
+    rollout,
+)
 from .mission import MissionBrief
 from .scenario import Scenario, generate_scenario, load_scenario, scenario_names
 from .simulation import World
@@ -29,6 +39,7 @@ __all__ = [
     "CommandKind",
     "ContactKind",
     "Decision",
+    "Evaluation",
     "Flight",
     "GoTo",
     "InputError",
@@ -42,6 +53,8 @@ __all__ = [
     "Velocity",
     "World",
     "Wrench",
+    "as_planner",
+    "evaluate",
     "generate_scenario",
     "linear_model",
     "load_planner",

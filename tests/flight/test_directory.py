@@ -20,6 +20,7 @@ FILES = {
     "flight.csv",
     "moving_obstacles.csv",
     "plan.csv",
+    "rewards.csv",
     "summary.json",
     "run.json",
 }
@@ -143,7 +144,8 @@ def test_the_summary_follows_from_the_rows(saved, yard):
 def test_the_summary_has_the_fields_of_the_contract(saved):
     result = json.loads((saved / "summary.json").read_text())
     assert list(result) == [
-        *("coverage", "steps", "energy_Wh", "all_home", "min_separation_m"),
+        *("coverage", "steps", "energy_Wh", "return", "reward_terms", "all_home"),
+        *("min_separation_m",),
         *("min_obstacle_clearance_m", "violations", "breaches", "wall_time_s"),
         *("decision_time_s", "fallbacks", "mip_gap_p50", "versions", "seed", "planner"),
     ]

@@ -2,15 +2,18 @@
 
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.flight.directory import check_directory
+from uas_coverage_env.flight.evaluation import Episode, Evaluation, evaluate
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.metrics import (
     accomplished,
     coverage,
     covered_at,
     energy_Wh,
+    episode_return,
     fallback_reasons,
     filtered_share,
     home,
+    reward_sums,
     summary,
 )
 from uas_coverage_env.flight.picture import draw_flight, flight_picture, flight_pictures
@@ -21,6 +24,7 @@ from uas_coverage_env.flight.planner import (
     Planner,
     PlannerOptions,
 )
+from uas_coverage_env.flight.policy import Policy, as_planner
 from uas_coverage_env.flight.record import MODES, DecisionRecord, FlightRecord, Violation
 from uas_coverage_env.flight.registry import (
     OptionDescription,
@@ -39,6 +43,8 @@ __all__ = [
     "AssistedOptions",
     "Decision",
     "DecisionRecord",
+    "Episode",
+    "Evaluation",
     "Flight",
     "FlightRecord",
     "OptionDescription",
@@ -46,15 +52,19 @@ __all__ = [
     "PlannerDescription",
     "PlannerError",
     "PlannerOptions",
+    "Policy",
     "Progress",
     "Violation",
     "accomplished",
+    "as_planner",
     "check_directory",
     "coverage",
     "covered_at",
     "describe_planners",
     "draw_flight",
     "energy_Wh",
+    "episode_return",
+    "evaluate",
     "fallback_reasons",
     "filtered_share",
     "flight_picture",
@@ -64,6 +74,7 @@ __all__ = [
     "load_planner",
     "planner_names",
     "rest_of",
+    "reward_sums",
     "rollout",
     "sorties_summary",
     "summary",

@@ -30,6 +30,9 @@ FLIGHT_COLUMNS = (
 )
 MOVING_COLUMNS = ("t_s", "name", "x_m", "y_m", "z_m")
 PLAN_COLUMNS = ("t_s", "uas", "n", "x_m", "y_m", "z_m")
+REWARD_FILE = "rewards.csv"
+REWARD_COLUMNS = ("t_s", "uas")
+"""Then one for each term."""
 
 
 def check_directory(directory: Path, *, overwrite: bool) -> None:
@@ -55,10 +58,13 @@ def write_flight(flight: FlightRecord, directory: Path, *, overwrite: bool = Fal
         "flight.csv": _csv(FLIGHT_COLUMNS, _flight_rows(flight, times)),
         "moving_obstacles.csv": _csv(MOVING_COLUMNS, _moving_rows(flight, times)),
         "plan.csv": _csv(PLAN_COLUMNS, _plan_rows(flight, times)),
+        **_reward_file(flight, times),
         "run.json": _json(_run(flight)),
         # the summary last: where it is, the rest is
         "summary.json": _json(summary(flight)),
     }
+    if flight.reward_terms is None:  # those of a former flight are not this one's
+        (directory / REWARD_FILE).unlink(missing_ok=True)
     write_files(directory, {name: text.encode() for name, text in texts.items()})
     return directory
 
@@ -105,6 +111,20 @@ def _moving_rows(flight: FlightRecord, times: Sequence[str]) -> Iterator[list[An
 def _plan_rows(flight: FlightRecord, times: Sequence[str]) -> Iterator[list[Any]]:
     for step, i, n, position_m in flight.plan.tolist():
         yield [times[step], flight.names[i], n, *position_m.tolist()]
+
+
+def _reward_file(flight: FlightRecord, times: Sequence[str]) -> dict[str, str]:
+    """The terms of every UAS and step, at the sample before it; nothing where none were kept."""
+    if flight.reward_terms is None:
+        return {}
+    paid, last = flight.reward_terms.tolist(), flight.last_sample
+    rows = (
+        [times[k], name, *paid[k][i]]
+        for k in range(flight.steps)
+        for i, name in enumerate(flight.names)
+        if k < last[i]
+    )
+    return {REWARD_FILE: _csv((*REWARD_COLUMNS, *flight.reward_names), rows)}
 
 
 def _run(flight: FlightRecord) -> dict[str, Any]:

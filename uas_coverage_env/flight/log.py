@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
+from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (
     COVERING,
@@ -53,15 +54,17 @@ class _Step:
     modes: list[int]
     decision: DecisionRecord
     plan: NDArray[np.void]
+    paid: NDArray[np.float64]
     sample: _Sample
 
 
 class FlightLog:
     """Keeps a flight while it is flown; Ctrl-C at any moment leaves whole steps behind."""
 
-    def __init__(self, world: World, scenario: Scenario) -> None:
+    def __init__(self, world: World, scenario: Scenario, meter: RewardMeter) -> None:
         self._world = world
         self._scenario = scenario
+        self._meter = meter
         self._steps: list[_Step] = []
         self._covered = int((~world.state.uncovered).sum())
         self._start = self._sample()
@@ -79,11 +82,13 @@ class FlightLog:
     def add(
         self,
         commands: Mapping[str, Command],
+        packed: NDArray[np.void],
         duration_s: float,
         decision: Decision | None,
         outcome: NDArray[np.void],
     ) -> None:
         """Keep the step just flown: the commands, how they were found, and what came of them."""
+        paid = self._meter.terms(packed, outcome)
         names = self._world.names
         modes = [
             _mode(commands.get(name), returning)
@@ -94,7 +99,7 @@ class FlightLog:
         plan = _plan_rows(decision, self.steps, names)
         self._covered += int(outcome["newly_covered"].sum())
         # one append, so that there is no half a step
-        self._steps.append(_Step(outcome, modes, record, plan, self._sample()))
+        self._steps.append(_Step(outcome, modes, record, plan, paid, self._sample()))
 
     def series(self) -> dict[str, Any]:
         """The fields of `Flight` that follow from what was kept."""
@@ -123,12 +128,19 @@ class FlightLog:
             "breaches": sum(int(step.outcome["breaches"].sum()) for step in self._steps),
             "height_breaches": sum(int(step.outcome["too_low"].sum()) for step in self._steps),
             "events": self._events(),
+            "reward_terms": self._reward_terms(),
+            "reward_names": self._meter.names,
             "open_waypoints": int(self._world.state.uncovered.sum())
             if self._scenario.events
             else None,
             "min_separation_m": self._smallest("separation_m"),
             "min_obstacle_clearance_m": self._smallest("obstacle_clearance_m"),
         }
+
+    def _reward_terms(self) -> NDArray[np.float64]:
+        """(T - 1, U, R)."""
+        shape = (len(self._steps), len(self._world.names), len(self._meter.names))
+        return np.array([step.paid for step in self._steps]).reshape(shape)
 
     def _moving_path_m(self, n_samples: int) -> NDArray[np.float64]:
         """(T, M, 3) [m] of the obstacles that the scenario began with."""

@@ -50,6 +50,19 @@ def energy_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     return power_W.sum(axis=0) * flight.scenario.dt_s / _J_PER_WH
 
 
+def reward_sums(flight: FlightRecord) -> dict[str, float]:
+    """Term of the reward -> its sum over all steps and UAS; empty where none were kept."""
+    if flight.reward_terms is None:
+        return {}
+    sums = flight.reward_terms.sum(axis=(0, 1)).tolist()
+    return dict(zip(flight.reward_names, sums, strict=True))
+
+
+def episode_return(flight: FlightRecord) -> float | None:
+    """The sum of all rewards, not discounted; None where none were kept."""
+    return None if flight.reward_terms is None else float(sum(reward_sums(flight).values()))
+
+
 def home(flight: FlightRecord) -> NDArray[np.bool_]:
     """(U,) whether each UAS has landed."""
     return flight.mode[-1] == LANDED
@@ -128,6 +141,9 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "steps": flight.steps,
         "energy_Wh": float(energy_Wh(flight).sum()),
         **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
+        # a record from before rewards were kept stays as it was
+        **({"return": episode_return(flight)} if flight.reward_terms is not None else {}),
+        **({"reward_terms": reward_sums(flight)} if flight.reward_terms is not None else {}),
         "all_home": bool(home(flight).all()),
         "min_separation_m": flight.min_separation_m,
         "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,

@@ -19,6 +19,8 @@ from uas_coverage_env.flight.directory import (
     INPUT_COLUMNS,
     MOVING_COLUMNS,
     PLAN_COLUMNS,
+    REWARD_COLUMNS,
+    REWARD_FILE,
     STATE_COLUMNS,
 )
 from uas_coverage_env.flight.record import (
@@ -126,6 +128,7 @@ def read_flight(directory: Path) -> dict[str, Any]:
             directory / "moving_obstacles.csv", lambda text: _moving_array(text, scenario, steps)
         ),
         "plan": _read(directory / "plan.csv", lambda text: _plan_array(text, scenario)),
+        **_reward_fields(directory / REWARD_FILE, scenario, steps),
     }
 
 
@@ -201,6 +204,33 @@ def _plan_array(text: str, scenario: Scenario) -> NDArray[np.void]:
         )
 
     return np.array(_each(_rows(text, PLAN_COLUMNS), point), dtype=PLAN_DTYPE)
+
+
+def _reward_fields(path: Path, scenario: Scenario, steps: int) -> dict[str, Any]:
+    """Nothing where there is no such file: a flight from before rewards were kept."""
+    if not path.exists():
+        return {}
+    return _read(path, lambda text: _reward_arrays(text, scenario, steps))
+
+
+def _reward_arrays(text: str, scenario: Scenario, steps: int) -> dict[str, Any]:
+    header = next(csv.reader(io.StringIO(text)), [])
+    first = len(REWARD_COLUMNS)
+    names = tuple(header[first:])
+    if len(set(names)) < len(names):
+        raise ValueError("it names a term of the reward twice")
+    rows = _rows(text, (*REWARD_COLUMNS, *names))
+    index = {uas.name: i for i, uas in enumerate(scenario.uas)}
+    terms = np.zeros((steps, len(index), len(names)))
+
+    def put(row: list[str]) -> None:
+        k, i = _step(row[0], scenario), _chosen("uas", row[1], index)
+        if k >= steps:
+            raise ValueError(f"{_short(row[0])} s is not before the end of the flight")
+        terms[k, i] = [_number(value) for value in row[first:]]
+
+    _each(rows, put)
+    return {"reward_terms": terms, "reward_names": names}
 
 
 def _run_fields(path: Path, steps: int) -> dict[str, Any]:

@@ -140,6 +140,9 @@ class FlightRecord:
         events: What has happened, in order of time; none where the scenario has no events.
         open_waypoints: How many were still to be covered at the end, where the scenario has events;
             None: all of the scenario's that are not covered.
+        reward_terms: (T - 1, U, R) the weighted terms of the reward that an environment pays for
+            these steps; None: a record from before they were kept.
+        reward_names: (R,) of the terms.
     """
 
     scenario: Scenario
@@ -169,6 +172,8 @@ class FlightRecord:
     height_breaches: int = 0
     events: tuple[EventRecord, ...] = ()
     open_waypoints: int | None = None
+    reward_terms: NDArray[np.float64] | None = None
+    reward_names: tuple[str, ...] = ()
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.disturbances import Disturbance
+from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
@@ -47,6 +49,8 @@ def rollout(
     safety_filter: bool | None = None,
     max_steps: int | None = None,
     disturbances: Sequence[Disturbance] | None = None,
+    reward: Sequence[RewardTerm] = REWARD,
+    reward_weights: Mapping[str, float] | None = None,
     on_step: Callable[[Progress], object] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Flight:
@@ -64,12 +68,14 @@ def rollout(
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
             scenario are named in the record, but no flight directory holds what they do.
+        reward: Terms of the reward that is recorded, see `RewardTerm`.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         on_step: Called with a `Progress` once all is compiled and after every step.
         should_stop: Asked before every decision.
 
     Raises:
         InputError: Unknown scenario or planner, or the planner refuses the scenario.
-        ValueError: Unknown dynamics, or a number of steps below one.
+        ValueError: Unknown dynamics, a number of steps below one, or a wrong reward.
         PlannerError: The planner gave commands that cannot be flown.
     """
     if not isinstance(scenario, Scenario):
@@ -91,10 +97,11 @@ def rollout(
         disturbances=disturbances,
         seed=seed,
     )
-    _make_ready(world, planner, MissionBrief.of(scenario), seed)
+    meter = RewardMeter(world, reward, reward_weights)
+    _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
-    log = FlightLog(world, scenario)
+    log = FlightLog(world, scenario, meter)
     started = time.perf_counter()
     ended = "stopped"
     with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid
@@ -115,10 +122,14 @@ def rollout(
     )
 
 
-def _make_ready(world: World, planner: Planner, brief: MissionBrief, seed: int) -> None:
+def _make_ready(
+    world: World, meter: RewardMeter, planner: Planner, brief: MissionBrief, seed: int
+) -> None:
     """Compile world and planner, then put both at the start: no decision pays for compilation."""
     state = world.swarm_state()
-    world.step({name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)})
+    hover = {name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)}
+    packed = pack(hover, state.names, state.active, len(state.uncovered))
+    meter.terms(packed, world.step(packed))
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:
@@ -150,7 +161,7 @@ def _fly(
             return "stopped"
         commands, packed, decision = _decide(planner, swarm)
         outcome = world.step(packed)
-        log.add(commands, decision, getattr(planner, "last_decision", None), outcome)
+        log.add(commands, packed, decision, getattr(planner, "last_decision", None), outcome)
         swarm = world.swarm_state()
         if world.revisions != revisions:
             revisions = world.revisions
