@@ -3,6 +3,7 @@
 from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.checks import warnings
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
+from uas_coverage_env.scenario.families import Family, Size, installed_families
 from uas_coverage_env.scenario.family import (
     FAMILIES,
     SERIES,
@@ -42,6 +43,7 @@ __all__ = [
     "SERIES",
     "Decoration",
     "DisturbanceTable",
+    "Family",
     "GeneratedScenarios",
     "Geofence",
     "Gust",
@@ -59,12 +61,14 @@ __all__ = [
     "ScheduledVelocity",
     "Sensing",
     "Sorties",
+    "Size",
     "Uas",
     "Uncertainty",
     "Waypoint",
     "Wind",
     "flood_village",
     "generate_scenario",
+    "installed_families",
     "load_scenario",
     "loaded_scenario",
     "sample_scenario",

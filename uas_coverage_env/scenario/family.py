@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from uas_coverage_env.scenario.families import BUILT_IN
 from uas_coverage_env.scenario.flood_village import FLOOD_VILLAGE, flood_village
 from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.levels import LEVELS, check_level
@@ -108,5 +109,6 @@ SERIES: Mapping[str, Callable[[int], Scenario]] = {
     "generated": sample_scenario,
     **{f"generated-{level}": partial(sample_scenario, disturbances=level) for level in LEVELS},
     FLOOD_VILLAGE: flood_village,
+    **{name: family.of_seed for name, family in BUILT_IN.items()},
 }
 """Scenarios that are known by a name and a seed: name -> the scenario of a seed."""

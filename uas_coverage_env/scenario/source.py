@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uas_coverage_env.files.strict_toml import InputError, parse
+from uas_coverage_env.scenario.families import Family, installed_families
 from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios
 from uas_coverage_env.scenario.load import is_path, load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
@@ -115,12 +116,16 @@ class MissionSource:
             ValueError: It is none of what is allowed.
         """
         if isinstance(missions, str):
-            missions = FAMILIES.get(missions, missions)
+            missions = FAMILIES.get(missions) or installed_families().get(missions, missions)
         if isinstance(missions, MissionSource):
             return missions
         if isinstance(missions, GeneratedScenarios):
             (_, n_uas), (_, n_waypoints) = missions.n_uas, missions.n_waypoints
             return cls(missions, n_uas=n_uas, n_waypoints=_SPARE * n_waypoints, n_moving=_MOVING)
+        if isinstance(missions, Family):
+            (_, n_uas), (_, n_waypoints) = missions.size.n_uas, missions.size.n_waypoints
+            n_moving = max(_MOVING, missions.n_moving)
+            return cls(missions, n_uas=n_uas, n_waypoints=n_waypoints, n_moving=n_moving)
         if callable(missions):
             generator: Any = missions
             return cls(generator)
@@ -193,8 +198,9 @@ def loaded_scenario(scenario: str | Path | Scenario | Mapping[str, Any]) -> Scen
     if isinstance(scenario, Mapping):
         return parse(scenario, Scenario, "scenario")
     if not is_path(scenario) and scenario not in scenario_names():
+        families = ", ".join((*FAMILIES, *installed_families()))
         raise InputError(
-            f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, the "
-            f"family {', '.join(FAMILIES)}, the path of a .toml file, or a function rng -> Scenario"
+            f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, a "
+            f"family ({families}), the path of a .toml file, or a function rng -> Scenario"
         )
     return load_scenario(scenario)
