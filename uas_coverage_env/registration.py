@@ -5,16 +5,20 @@ import pettingzoo
 
 GYMNASIUM_ID = "UASCoverage-v0"
 PETTINGZOO_ID = "uas/coverage-v0"
+LEVEL_NAMES = ("easy", "medium", "hard", "extreme")
+"""Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
 
 _DOOR = "uas_coverage_env.uas_coverage_v0"
+_TASKS = "uas_coverage_env.tasks"
 
 
 def register_environments() -> None:
     """Register the environments; once registered, nothing is done again.
 
     `gymnasium.make("UASCoverage-v0")`, `pettingzoo.make("parallel", "uas/coverage-v0")` and
-    `pettingzoo.make("aec", "uas/coverage-v0")` find them then. PettingZoo has a registry from 1.27
-    on; before that, `uas_coverage_v0` is the only door.
+    `pettingzoo.make("aec", "uas/coverage-v0")` find them then; and the levels as
+    `gymnasium.make("UASCoverage/Easy-v0")`, `pettingzoo.make("parallel", "uas/coverage-easy-v0")`.
+    PettingZoo has a registry from 1.27 on; before that, `uas_coverage_v0` is the only door.
     """
     if GYMNASIUM_ID not in gymnasium.registry:
         gymnasium.register(
@@ -22,8 +26,22 @@ def register_environments() -> None:
             entry_point="uas_coverage_env.env:CoverageSwarmEnv",
             vector_entry_point="uas_coverage_env.env:CoverageVectorEnv",
         )
+    for level in LEVEL_NAMES:
+        name = f"UASCoverage/{level.capitalize()}-v0"
+        if name not in gymnasium.registry:
+            gymnasium.register(
+                name,
+                entry_point=f"{_TASKS}:swarm_env",
+                vector_entry_point=f"{_TASKS}:vector_env",
+                kwargs={"level": level},
+            )
     if hasattr(pettingzoo, "register"):
         if PETTINGZOO_ID not in pettingzoo.parallel_registry:
             pettingzoo.register("parallel", PETTINGZOO_ID, f"{_DOOR}:parallel_env")
         if PETTINGZOO_ID not in pettingzoo.aec_registry:
             pettingzoo.register("aec", PETTINGZOO_ID, f"{_DOOR}:env")
+        for level in LEVEL_NAMES:
+            name = f"uas/coverage-{level}-v0"
+            if name not in pettingzoo.parallel_registry:
+                kwargs = {"level": level}
+                pettingzoo.register("parallel", name, f"{_TASKS}:parallel_env", kwargs=kwargs)

@@ -180,6 +180,24 @@ def test_trainings_are_drawn_side_by_side_in_panels_of_their_own(tmp_path):
     assert len(styles) == 2, "told apart without colour"
 
 
+def test_the_return_has_a_panel_where_all_tables_have_it_and_players_are_level_lines(tmp_path):
+    head, *rows = CURVE.splitlines()
+    paid = "\n".join([f"{head},return", *(f"{row},{k}.5" for k, row in enumerate(rows))]) + "\n"
+    once = "\n".join(paid.splitlines()[:2]) + "\n"
+    runs = {
+        "seed 0": learning_curve(curve_in(tmp_path / "a", paid)),
+        "tour": learning_curve(curve_in(tmp_path / "b", once)),
+    }
+    figure = training_figure(runs)
+    returns = figure.axes[4]
+    assert returns.get_ylabel() == "Return"
+    learned, level = returns.get_lines()
+    assert list(learned.get_ydata()) == [0.5, 1.5]
+    assert list(level.get_ydata()) == [0.5, 0.5]
+    without = training_figure({**runs, "old": learning_curve(curve_in(tmp_path / "c"))})
+    assert "Return" not in [axis.get_ylabel() for axis in without.axes]
+
+
 def test_a_training_alone_needs_no_legend(tmp_path):
     assert not training_figure({"": learning_curve(curve_in(tmp_path))}).legends
 

@@ -29,6 +29,11 @@ COMMANDS = (
         "Fly every planner on every scenario with every seed, and compare them.",
     ),
     CommandEntry(
+        "score",
+        at(f"{_CLI}.score:score_command"),
+        "Fly the missions of a level and print the scores (docs/levels.md).",
+    ),
+    CommandEntry(
         "warm-up",
         at(f"{_CLI}.warm_up:warm_up"),
         "Compile the simulation for this machine, so that the first flight begins at once.",

@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,7 +19,7 @@ CURVE = "learning_curve.csv"
 Curve = Mapping[str, Sequence[float] | NDArray[np.float64]]
 """Column of `learning_curve.csv` -> its values, a row for each time that the policy was tried."""
 
-_STEPS = "steps"
+_STEPS, _RETURN = "steps", "return"
 _PANELS = (
     ("coverage", 100.0, "Covered, %"),
     ("violations", 1.0, "Violations per mission"),
@@ -30,23 +31,30 @@ _PANELS = (
 def training_figure(runs: Mapping[str, Curve]) -> Figure:
     """Coverage, violations, energy and duration over the steps learned from, a line per training.
 
+    The return is shown, too, where all tables have it. A table of one row is that of a player that
+    does not learn: a level line.
+
     Args:
         runs: What a training is called in the legend, "" for nothing -> its curve.
     """
+    returns = all(_RETURN in curve for curve in runs.values()) and bool(runs)
+    panels = (*_PANELS, *([(_RETURN, 1.0, "Return")] if returns else []))
+    rows = 3 if returns else 2
     with printed():
-        figure = Figure(figsize=(WIDTH_IN, 4.2), layout="constrained")
-        grid = figure.subplots(2, 2, sharex=True)
-        for axis, (column, scale, label) in zip(grid.flat, _PANELS, strict=True):
+        figure = Figure(figsize=(WIDTH_IN, 2.1 * rows), layout="constrained")
+        grid = figure.subplots(rows, 2, sharex=True)
+        for axis in grid.flat[len(panels) :]:
+            axis.set_visible(False)
+        for axis, (column, scale, label) in zip(grid.flat, panels, strict=False):
             for i, (name, curve) in enumerate(runs.items()):
-                axis.plot(
-                    np.asarray(curve[_STEPS], float) / 1e6,
-                    scale * np.asarray(curve[column], float),
-                    color=uas_colour(i),
-                    linestyle=line_style(i),
-                    marker=".",
-                    markersize=4,
-                    label=name or None,
-                )
+                values = scale * np.asarray(curve[column], float)
+                style: Any = {"color": uas_colour(i), "linestyle": line_style(i)}
+                style["label"] = name or None
+                if len(values) == 1:
+                    axis.axhline(float(values[0]), **style)
+                else:
+                    steps = np.asarray(curve[_STEPS], float) / 1e6
+                    axis.plot(steps, values, marker=".", markersize=4, **style)
             axis.set_ylabel(label)
             axis.margins(x=0.02)
         grid[0, 0].set_ylim(-3, 103)
@@ -55,7 +63,11 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
         grid[0, 1].set_ylim(-0.03 * highest, highest)
         for axis in grid[1]:
             axis.set_ylim(bottom=0)
+        for axis in (grid[-1, 0], grid[1, 1]):
             axis.set_xlabel("Steps learned from, million")
+            axis.tick_params(labelbottom=True)
+        if rows == 2:
+            grid[1, 0].set_xlabel("Steps learned from, million")
         figure.align_ylabels()
         if any(runs):
             handles, labels = grid[0, 0].get_legend_handles_labels()
@@ -78,6 +90,8 @@ def learning_curve(directory: Path) -> dict[str, NDArray[np.float64]]:
         raise InputError(f"{path}: cannot be read ({error})") from error
     if not rows:
         raise InputError(f"{path}: holds no row; the training has not come so far yet")
+    if _RETURN in rows[0]:
+        wanted.append(_RETURN)
     lacking = [column for column in wanted if column not in rows[0]]
     if lacking:
         raise InputError(f"{path}: has no column {lacking[0]}")

@@ -1,0 +1,74 @@
+"""`uas-coverage score`: planners and policies on the levels, with scores that can be compared."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uas_coverage_env.cli.output import console
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import load_planner
+from uas_coverage_env.tasks.levels import LEVELS
+from uas_coverage_env.tasks.scoring import RANDOM, MissionScore, Score, score
+from uas_coverage_env.tasks.store import ScoreStore
+from uas_coverage_env.tasks.table import markdown
+from uas_coverage_env.tasks.task import SPLITS
+
+_PLAYERS = "random,nearest-waypoint,lawnmower,tour,trajectory"
+_SPLITS = tuple(split for split in SPLITS if split != "training")
+
+
+def score_command(
+    level: Annotated[
+        str, typer.Option(metavar="NAME,...", help=f"Of {', '.join(LEVELS)}.")
+    ] = "easy",
+    players: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME,...", help="`random`, names of planners, `policy:DIR` of a training."
+        ),
+    ] = _PLAYERS,
+    missions: Annotated[int, typer.Option(min=1, help="How many of the split.")] = 20,
+    split: Annotated[str, typer.Option(help=f"{' or '.join(_SPLITS)}.")] = "test",
+    out: Annotated[Path, typer.Option(help="Folder of the scores; resumed if it exists.")] = Path(
+        "scores"
+    ),
+) -> None:
+    """Fly the missions of a level and print the scores (docs/levels.md).
+
+    Ctrl-C or a kill loses no mission that was flown: the same command goes on. Planners fly with
+    the assistants of the level.
+    """
+    levels = _named("--level", level, tuple(LEVELS))
+    _named("--split", split, _SPLITS)
+    names = [name for name in players.split(",") if name]
+    if missions > len(SPLITS[split]):
+        raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
+    for name in names:
+        if name != RANDOM:
+            load_planner(name)  # a name that is wrong is refused before anything is flown
+    store, screen = ScoreStore(out / split), console()
+    for name in levels:
+        scores: dict[str, Score] = {}
+        for player in names:
+            scores[player] = _scored(store, player, name, missions, split)
+        screen.print(f"{LEVELS[name].id}, {split} missions", markup=False)
+        # a table in a file is not to be wrapped
+        sys.stdout.write(f"\n{markdown(scores)}\n\n")
+
+
+def _scored(store: ScoreStore, player: str, level: str, missions: int, split: str) -> Score:
+    def keep(mission: MissionScore) -> None:
+        store.add(level, player, mission)
+
+    known = store.missions(level, player)
+    return score(player, level, missions=missions, split=split, known=known, on_mission=keep)
+
+
+def _named(option: str, text: str, allowed: tuple[str, ...]) -> list[str]:
+    names = [name for name in text.split(",") if name]
+    for name in names:
+        if name not in allowed:
+            raise InputError(f"{option} {name!r}: give some of {', '.join(allowed)}")
+    return names

@@ -1,0 +1,97 @@
+"""The levels, as data."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from uas_coverage_env.scenario import Family, Scenario
+from uas_coverage_env.scenario.events import MotorDegraded, RadioLost
+from uas_coverage_env.scenario.families import BUILT_IN
+from uas_coverage_env.tasks.task import Task
+
+_BOTH = ("s500_v2", "hexacopter")
+_WINDOW = (20.0, 120.0)  # when something fails [s]
+
+
+def faults(rng: np.random.Generator, scenario: Scenario) -> Scenario:
+    """One UAS has a damaged motor from some time on, another hears nothing for a while."""
+    first, second = rng.choice(len(scenario.uas), size=2).tolist()
+    at_s = np.ceil(rng.uniform(*_WINDOW, size=2)).tolist()
+    events = (
+        MotorDegraded(
+            kind="motor_degraded",
+            at_s=at_s[0],
+            uas=scenario.uas[first].name,
+            thrust_share=0.9,
+            power_factor=1.3,
+        ),
+        RadioLost(kind="radio_lost", at_s=at_s[1], uas=scenario.uas[second].name, for_s=15.0),
+    )
+    return scenario.model_copy(update={"events": events})
+
+
+def _families(*names: str, **size: object) -> tuple[Family, ...]:
+    return tuple(BUILT_IN[name].sized(**size) for name in names)
+
+
+LEVELS: Mapping[str, Task] = {
+    task.level: task
+    for task in (
+        Task(
+            level="easy",
+            meaning="one UAS on an open field",
+            families=_families("open-field", n_uas=(1, 1), n_waypoints=(9, 9)),
+            return_mode=True,
+            safety_filter=True,
+            action="waypoint",
+            max_cycles=150,
+        ),
+        Task(
+            level="medium",
+            meaning="two or three UAS in towns, along rivers and in irregular areas",
+            families=_families(
+                "streets", "courtyards", "river", "irregular",
+                n_uas=(2, 3), n_waypoints=(12, 20),
+            ),
+            return_mode=True,
+            safety_filter=True,
+        ),
+        Task(
+            level="hard",
+            meaning="mixed fleets of three to six among walls and moving obstacles, in a light "
+            "wind, with charges that do not always suffice",
+            families=_families(
+                "streets", "walls", "traffic", "low-charge",
+                n_uas=(3, 6), n_waypoints=(20, 32), vehicles=_BOTH,
+            ),
+            return_mode=False,
+            safety_filter=False,
+            disturbances="light",
+        ),
+        Task(
+            level="extreme",
+            meaning="mixed fleets of eight to sixteen in a moderate wind; a motor fails, and a "
+            "radio",
+            families=_families(
+                "streets", "walls", "traffic", "low-charge",
+                n_uas=(8, 16), n_waypoints=(40, 64), vehicles=_BOTH,
+            ),
+            return_mode=False,
+            safety_filter=False,
+            disturbances="moderate",
+            faults=faults,
+        ),
+    )
+}  # fmt: skip
+"""Name -> level, from easy to hard."""
+
+
+def level_named(name: str) -> Task:
+    """The level of a name.
+
+    Raises:
+        ValueError: There is none.
+    """
+    if name not in LEVELS:
+        raise ValueError(f"level is {name!r}; it is one of {', '.join(LEVELS)}")
+    return LEVELS[name]

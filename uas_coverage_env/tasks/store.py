@@ -1,0 +1,88 @@
+"""Scored missions on disk: a line of JSON each, added when it was flown; a kill loses none."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
+from uas_coverage_env.tasks.levels import LEVELS
+from uas_coverage_env.tasks.scoring import MissionScore
+
+FILE = "scores.jsonl"
+
+_HEAD = ("level", "player", "scenario_sha256")
+
+
+class ScoreStore:
+    """The missions of a folder.
+
+    Args:
+        folder: Made where there is none.
+
+    Raises:
+        InputError: The folder cannot be made, or a line of its file is none of ours; names it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / FILE
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            text = self.path.read_text("utf-8") if self.path.exists() else ""
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"{self.path}: cannot be used ({error})") from error
+        whole, newline, _ = text.rpartition("\n")
+        self._missions: dict[tuple[str, str], list[MissionScore]] = {}
+        self._cut = len((whole + newline).encode())  # a line that a kill has cut short goes
+        for number, line in enumerate(whole.split("\n") if whole else (), start=1):
+            level, player, mission = _read(line, f"{self.path}, line {number}")
+            self._missions.setdefault((level, player), []).append(mission)
+
+    def missions(self, level: str, player: str) -> tuple[MissionScore, ...]:
+        """What was flown of a player on a level."""
+        return tuple(self._missions.get((level, player), ()))
+
+    def players(self, level: str) -> tuple[str, ...]:
+        """Who has flown on a level."""
+        return tuple(player for name, player in self._missions if name == level)
+
+    def add(self, level: str, player: str, mission: MissionScore) -> None:
+        """Keep a mission."""
+        self._missions.setdefault((level, player), []).append(mission)
+        sha256 = _sha256(level, mission.seed)
+        row = {**dict(zip(_HEAD, (level, player, sha256), strict=True)), **asdict(mission)}
+        with self.path.open("r+b" if self.path.exists() else "w+b") as file:
+            file.seek(self._cut)
+            file.truncate()
+            file.write(json.dumps(row, allow_nan=False).encode() + b"\n")
+            self._cut = file.tell()
+
+
+def _sha256(level: str, seed: int) -> str:
+    return scenario_hash(LEVELS[level].scenario(seed))
+
+
+def _read(line: str, place: str) -> tuple[str, str, MissionScore]:
+    wanted: Mapping[str, Any] = {
+        **dict.fromkeys(_HEAD, str),
+        **{field.name: field.type for field in fields(MissionScore)},
+    }
+    try:
+        row = json.loads(line)
+    except ValueError:
+        row = None
+    if not isinstance(row, dict) or set(row) != set(wanted):
+        raise InputError(f"{place}: is no scored mission; give another --out")
+    for name, kind in wanted.items():
+        if type(row[name]) is not kind:
+            raise InputError(f"{place}: {name} is {row[name]!r}; give another --out")
+    level, player, sha256 = (row.pop(name) for name in _HEAD)
+    if level not in LEVELS:
+        raise InputError(f"{place}: level is {level[:40]!r}; there are {', '.join(LEVELS)}")
+    if _sha256(level, row["seed"]) != sha256:
+        raise InputError(
+            f"{place}: mission {row['seed']} of {level} is another one now; give another --out"
+        )
+    return level, player, MissionScore(**row)

@@ -1,0 +1,146 @@
+"""A task: missions of a level, how they are flown and paid, and which seeds are for what."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from uas_coverage_env.scenario import Family, MissionSource, Scenario
+from uas_coverage_env.scenario.levels import with_disturbances
+
+Rng = np.random.Generator
+
+SPLITS: Mapping[str, range] = {
+    "training": range(10_000_000, 10_001_000),
+    "validation": range(20_000_000, 20_000_050),
+    "test": range(30_000_000, 30_000_050),
+}
+"""What the seeds of missions are for. Learn on the first, choose on the second; scores that are
+published are of the third, on which nothing is chosen."""
+
+LEARNERS_CHOICE = ("action", "observation", "reward", "reward_weights", "mask_in_observation")
+"""Settings that are a learner's affair: how it acts, what it sees and what it is paid for."""
+
+_LIBRARIES_CHOICE = ("flat_infos", "render_mode")
+_KEPT = 2048
+
+
+@dataclass(frozen=True)
+class Task:
+    """One level. What is on is part of it: none of it can be said otherwise.
+
+    Attributes:
+        level: Its name, lower case.
+        meaning: What it is, in a sentence.
+        families: Each mission is of one of them; all are equally likely.
+        return_mode: Whether the world brings UAS home in time.
+        safety_filter: Whether the world keeps commands clear of harm.
+        action: Kind of action that the environment has unless a learner wants another one.
+        max_cycles: Time limit [steps]; None: that of each scenario.
+        disturbances: Level of wind and wrong models; None: still air.
+        faults: What goes wrong in a mission: (rng, scenario) -> the scenario with its events.
+        reward_weights: Weights that are not the default ones.
+    """
+
+    level: str
+    meaning: str
+    families: tuple[Family, ...]
+    return_mode: bool
+    safety_filter: bool
+    action: str = "velocity"
+    max_cycles: int | None = None
+    disturbances: str | None = None
+    faults: Callable[[Rng, Scenario], Scenario] | None = None
+    reward_weights: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def id(self) -> str:
+        """Under which Gymnasium knows it."""
+        return gymnasium_id(self.level)
+
+    def scenario(self, seed: int) -> Scenario:
+        """The mission of a seed; the same each time."""
+        return _mission(self, seed)
+
+    def missions(self, split: str = "training") -> MissionSource:
+        """What environments draw their missions from.
+
+        Raises:
+            ValueError: There is no such split.
+        """
+        seeds = seeds_of(split)
+
+        def draw(rng: Rng) -> Scenario:
+            return self.scenario(int(rng.integers(seeds.start, seeds.stop)))
+
+        return MissionSource(
+            draw,
+            n_uas=max(family.size.n_uas[1] for family in self.families),
+            n_waypoints=max(family.size.n_waypoints[1] for family in self.families),
+            n_moving=max(family.n_moving for family in self.families),
+        )
+
+    def settings(self, **chosen: Any) -> dict[str, Any]:
+        """Keyword arguments of an environment.
+
+        Args:
+            **chosen: What a learner may choose (`LEARNERS_CHOICE`).
+
+        Raises:
+            ValueError: Something else is given.
+        """
+        allowed = (*LEARNERS_CHOICE, *_LIBRARIES_CHOICE)
+        for name, value in chosen.items():
+            if name not in allowed:
+                raise ValueError(
+                    f"{name}={value!r}: {self.id} says it itself; it takes {', '.join(allowed)}, "
+                    f"and split"
+                )
+        given: dict[str, Any] = {
+            "action": self.action,
+            "return_mode": self.return_mode,
+            "safety_filter": self.safety_filter,
+            "max_cycles": self.max_cycles,
+        }
+        if "reward" not in chosen:
+            given["reward_weights"] = dict(self.reward_weights)
+        return {**given, **chosen}
+
+
+def gymnasium_id(level: str) -> str:
+    """Under which Gymnasium knows a level."""
+    return f"UASCoverage/{level.capitalize()}-v0"
+
+
+def seeds_of(split: str) -> range:
+    """The seeds of a split.
+
+    Raises:
+        ValueError: There is no such split.
+    """
+    if split not in SPLITS:
+        raise ValueError(f"split is {split!r}; it is one of {', '.join(SPLITS)}")
+    return SPLITS[split]
+
+
+@lru_cache(maxsize=_KEPT)
+def _mission_of(level: "_ByIdentity", seed: int) -> Scenario:
+    task = level.task
+    rng = np.random.default_rng(seed)
+    family = task.families[int(rng.integers(len(task.families)))]
+    scenario = with_disturbances(family(rng), task.disturbances, seed)
+    return scenario if task.faults is None else task.faults(rng, scenario)
+
+
+@dataclass(frozen=True)
+class _ByIdentity:
+    """A task as a key: it holds functions and mappings, which have no hash of their own."""
+
+    key: int
+    task: Task = field(compare=False)
+
+
+def _mission(task: Task, seed: int) -> Scenario:
+    return _mission_of(_ByIdentity(id(task), task), seed)
