@@ -91,7 +91,7 @@ def write(folder: Path, rows: list[dict[str, float]]) -> None:
     """Write a learning curve."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "learning_curve.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer: Any = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
 

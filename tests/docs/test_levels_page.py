@@ -1,5 +1,7 @@
 """The page of levels: its lines learn, and its table is that of the code."""
 
+from typing import Any
+
 import pytest
 from markdown_blocks import ROOT, blocks
 
@@ -21,7 +23,7 @@ def test_the_lines_for_newcomers_run():
     ):
         assert usual in text
         text = text.replace(usual, short)
-    names = {"__name__": "page"}
+    names: dict[str, Any] = {"__name__": "page"}
     exec(compile(text, str(PAGE), "exec"), names)
     assert names["model"].num_timesteps == 64
 

@@ -1,6 +1,7 @@
 """Levels: their environments, their seeds, and what nothing can change about them."""
 
 import dataclasses
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -41,8 +42,8 @@ def test_the_missions_of_a_level_fit_its_spaces(level, split):
 def test_a_level_draws_training_missions_unless_it_is_asked_for_others():
     task = level_named("easy")
     names = {split: {task.scenario(seed).name for seed in seeds_of(split)} for split in ("test",)}
-    env = gymnasium.make(task.id)
-    held_out = gymnasium.make(task.id, split="test")
+    env: Any = gymnasium.make(task.id)
+    held_out: Any = gymnasium.make(task.id, split="test")
     for seed in range(3):
         env.reset(seed=seed)
         held_out.reset(seed=seed)
@@ -83,7 +84,7 @@ def test_many_missions_and_the_multi_agent_environment_fly_the_same_level():
     assert np.array_equal(observations["uas_1"], batch[0])
     assert isinstance(one, CoverageParallelEnv)
     if hasattr(pettingzoo, "make"):
-        made = pettingzoo.make("parallel", "uas/coverage-easy-v0")
+        made: Any = pettingzoo.make("parallel", "uas/coverage-easy-v0")
         made.reset(seed=4)
         assert made.unwrapped.scenario == one.scenario
 

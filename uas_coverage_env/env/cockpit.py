@@ -112,11 +112,11 @@ def _command(row: np.void) -> Command:
     kind, values = int(row["kind"]), row["values"].tolist()
     mode: Mode = "return" if row["returning"] else "covering"
     if kind == VELOCITY:
-        return Velocity(*values[:3], mode)
+        return Velocity(*values[:3], mode=mode)
     if kind == ACCELERATION:
-        return Acceleration(*values[:3], mode)
+        return Acceleration(*values[:3], mode=mode)
     if kind == WRENCH:
-        return Wrench(*values, mode)
+        return Wrench(*values, mode=mode)
     if kind == GO_TO:
         return GoTo(None if values[0] == HOME else int(values[0]), mode)
     raise ValueError("the kind of action writes CLIMB, which no planner can command")

@@ -1,6 +1,7 @@
 """Scored missions on disk: a line of JSON each, added when it was flown; a kill loses none."""
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -33,9 +34,10 @@ class ScoreStore:
             text = self.path.read_text("utf-8") if self.path.exists() else ""
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{self.path}: cannot be used ({error})") from error
-        whole, newline, _ = text.rpartition("\n")
+        whole, newline, rest = text.rpartition("\n")
         self._missions: dict[tuple[str, str], list[MissionScore]] = {}
-        self._cut = len((whole + newline).encode())  # a line that a kill has cut short goes
+        # of a line that a kill has cut short
+        self._torn_at = len((whole + newline).encode()) if rest else None
         for number, line in enumerate(whole.split("\n") if whole else (), start=1):
             level, player, mission = _read(line, f"{self.path}, line {number}")
             self._missions.setdefault((level, player), []).append(mission)
@@ -53,11 +55,11 @@ class ScoreStore:
         self._missions.setdefault((level, player), []).append(mission)
         sha256 = _sha256(level, mission.seed)
         row = {**dict(zip(_HEAD, (level, player, sha256), strict=True)), **asdict(mission)}
-        with self.path.open("r+b" if self.path.exists() else "w+b") as file:
-            file.seek(self._cut)
-            file.truncate()
+        if self._torn_at is not None:
+            os.truncate(self.path, self._torn_at)
+            self._torn_at = None
+        with self.path.open("ab") as file:
             file.write(json.dumps(row, allow_nan=False).encode() + b"\n")
-            self._cut = file.tell()
 
 
 def _sha256(level: str, seed: int) -> str:

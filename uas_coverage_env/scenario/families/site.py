@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +193,7 @@ class Site:
         return float((np.maximum.reduceat(faces_m, firsts) - kept_m).min())
 
     @cached_property
-    def _faces(self) -> tuple[NDArray[np.float64], ...]:
+    def _faces(self) -> tuple[NDArray[Any], ...]:
         """Faces of all bodies, the fence turned inside out: normals, offsets, firsts, distances."""
         fence = self._fence.hull
         normals, offsets_m, kept_m = [], [], []
