@@ -1,6 +1,7 @@
 """Levels: their environments, their seeds, and what nothing can change about them."""
 
 import dataclasses
+import pickle
 from typing import Any
 
 import gymnasium
@@ -87,6 +88,19 @@ def test_many_missions_and_the_multi_agent_environment_fly_the_same_level():
         made: Any = pettingzoo.make("parallel", "uas/coverage-easy-v0")
         made.reset(seed=4)
         assert made.unwrapped.scenario == one.scenario
+
+
+def test_an_environment_of_a_level_travels_and_draws_on():
+    env = parallel_env("easy")
+    env.reset(seed=1)
+    again = pickle.loads(pickle.dumps(env))
+    env.reset()
+    again.reset()
+    assert again.scenario == env.scenario
+
+
+def test_the_spec_of_a_level_is_plain_text():
+    assert "easy" in gymnasium.make("UASCoverage/Easy-v0").spec.to_json()
 
 
 def test_assistants_are_on_in_the_easy_ones_and_off_in_the_hard_ones():

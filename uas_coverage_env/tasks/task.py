@@ -70,13 +70,8 @@ class Task:
         Raises:
             ValueError: There is no such split.
         """
-        seeds = seeds_of(split)
-
-        def draw(rng: Rng) -> Scenario:
-            return self.scenario(int(rng.integers(seeds.start, seeds.stop)))
-
         return MissionSource(
-            draw,
+            _Draw(self, seeds_of(split)),
             n_uas=max(family.size.n_uas[1] for family in self.families),
             n_waypoints=max(family.size.n_waypoints[1] for family in self.families),
             n_moving=max(family.n_moving for family in self.families),
@@ -107,6 +102,17 @@ class Task:
         if "reward" not in chosen:
             given["reward_weights"] = dict(self.reward_weights)
         return {**given, **chosen}
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """Draws missions of a split; no inner function, so that environments can be pickled."""
+
+    task: Task
+    seeds: range
+
+    def __call__(self, rng: Rng) -> Scenario:
+        return self.task.scenario(int(rng.integers(self.seeds.start, self.seeds.stop)))
 
 
 def gymnasium_id(level: str) -> str:
