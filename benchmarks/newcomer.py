@@ -1,7 +1,7 @@
 """What the fifteen lines of docs/levels.md learn: plain PPO on the level easy.
 
     python benchmarks/newcomer.py --out newcomer
-    uas-coverage figure newcomer/seed-* --kind training --out docs/pictures/newcomer.png --overwrite
+    uas-coverage figure newcomer/* --kind training --out docs/pictures/newcomer.png --overwrite
 
 Trains PPO of Stable-Baselines3 with its default hyperparameters, one torch thread, a training for
 each seed, and evaluates it on missions of the validation split. Each training leaves a

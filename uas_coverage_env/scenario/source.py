@@ -200,7 +200,7 @@ def loaded_scenario(scenario: str | Path | Scenario | Mapping[str, Any]) -> Scen
     if not is_path(scenario) and scenario not in scenario_names():
         families = ", ".join((*FAMILIES, *installed_families()))
         raise InputError(
-            f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, a "
-            f"family ({families}), the path of a .toml file, or a function rng -> Scenario"
+            f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, the "
+            f"family {families}, the path of a .toml file, or a function rng -> Scenario"
         )
     return load_scenario(scenario)
