@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from rich.console import Console
 
 from uas_coverage_env.cli import main, run
@@ -159,6 +160,18 @@ def test_a_check_replaces_a_picture_only_where_it_was_asked_to(elsewhere, capsys
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main(["scenarios", "check", "village", "--picture", "no/such/folder.png"]) == 2
     assert capsys.readouterr().err.count("\n") == 2
+
+
+def test_a_check_may_be_repeated(elsewhere, capsys):
+    for _ in range(2):
+        assert main(["scenarios", "check", "open_field"]) == 0
+    picture = elsewhere / "open_field.png"
+    drawn = picture.read_bytes()
+    # a picture of somebody else is left alone, also where it is a good one
+    Image.open(picture).copy().save(picture)
+    assert main(["scenarios", "check", "open_field"]) == 2
+    assert "add --overwrite" in capsys.readouterr().err
+    assert picture.read_bytes() != drawn
 
 
 def test_a_mission_that_its_batteries_cannot_finish_is_valid_with_a_warning(elsewhere, capsys):

@@ -80,7 +80,8 @@ def test_options_are_read_from_text():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"horizont": "12"}, ["horizont", "horizon, time_limit_s, deterministic, solver"]),
+        ({"horizont": "12"}, ["horizont", "did you mean horizon?"]),
+        ({"wings": "2"}, ["wings", "horizon, time_limit_s, deterministic, solver"]),
         ({"horizon": "many"}, ["horizon = 'many'", "int", "default 18"]),
         ({"horizon": "1"}, ["horizon = '1'", "greater than or equal to 2"]),
         ({"horizon": "1.5"}, ["horizon = '1.5'"]),

@@ -255,7 +255,7 @@ MISTAKES = {
     "no scenario": (["--scenarios", ","], "names none"),
     "unknown scenario": (["--scenarios", "villagge"], "villagge"),
     "no such file": (["--scenarios", "nowhere.toml"], "nowhere.toml"),
-    "bad range": (["--scenarios", "generated:9"], "FIRST:END"),
+    "bad range": (["--scenarios", "generated:9:9"], "FIRST:END"),
     "too many": (["--scenarios", "generated:0:999999999"], "at most"),
     "unknown planner": (["--planners", "hoover"], "hoover"),
     "planner twice": (["--planners", "hover,hover"], "twice"),

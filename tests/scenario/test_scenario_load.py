@@ -6,7 +6,7 @@ import pytest
 
 from uas_coverage_env import scenario as room
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import load_scenario, scenario_names, warnings
+from uas_coverage_env.scenario import SERIES, load_scenario, scenario_names, warnings
 
 TEXT = (Path(room.__file__).parent / "open_field.toml").read_text(encoding="utf-8")
 WAYPOINTS = TEXT[TEXT.index("[[waypoints]]") : TEXT.index("# Drawn only")]
@@ -41,12 +41,17 @@ def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
 
 
 def test_an_unknown_name_lists_what_there_is():
-    with pytest.raises(InputError, match="unknown scenario 'vilage'; take corridor, gasche2025"):
-        load_scenario("vilage")
+    with pytest.raises(InputError, match="unknown scenario 'moon'; take corridor, gasche2025"):
+        load_scenario("moon")
     with pytest.raises(InputError, match="unknown scenario ''"):
         load_scenario("")
     with pytest.raises(InputError, match="unknown scenario '3'"):
         load_scenario(3)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_generated_scenario_has_a_name_and_a_seed():
+    for series, of_seed in SERIES.items():
+        assert load_scenario(f"{series}:5") == of_seed(5)
 
 
 def test_a_missing_file_is_named(tmp_path):

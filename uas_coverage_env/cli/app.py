@@ -22,6 +22,11 @@ _CTRL_C = 130
 _CLI = "uas_coverage_env.cli"
 
 COMMANDS = (
+    CommandEntry(
+        "demo",
+        at(f"{_CLI}.demo:demo"),
+        "Fly a first mission with a fast planner, and open its replay page in a browser.",
+    ),
     CommandEntry("run", at(f"{_CLI}.run:run"), "Fly one mission and write a flight directory."),
     CommandEntry(
         "compare",
@@ -42,6 +47,11 @@ COMMANDS = (
         "planners",
         at(f"{_CLI}.planners:planners"),
         "List the planners and their options (set them with `run --option key=value`).",
+    ),
+    CommandEntry(
+        "show",
+        at(f"{_CLI}.show:show"),
+        "Show the figures of a flight, or of two side by side.",
     ),
     CommandEntry(
         "replay",
@@ -79,12 +89,12 @@ COMMANDS = (
     CommandEntry(
         "vehicle", at(f"{_CLI}.vehicle:app"), "List the shipped vehicles, check one, or make one."
     ),
+    CommandEntry("vehicles", at(f"{_CLI}.vehicle:list_vehicles"), "List the shipped vehicles."),
 )
 """The commands of the package; each says in its first line what stands here."""
 
 app = typer.Typer(
     cls=LazyGroup,
-    add_completion=False,
     invoke_without_command=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=MARKUP,
@@ -126,7 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with terminated_as_by_hand():
             code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
-        return _refuse(error.format_message(), error.exit_code)
+        return _refuse(_of_the_command_line(error), error.exit_code)
     except InputError as error:
         return _refuse(str(error), 2)
     except PlannerError as error:
@@ -144,6 +154,13 @@ def _never_stop_at_a_letter() -> None:
     r"""Names of files may hold what the terminal cannot show: it is written as `\xfc` then."""
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _of_the_command_line(error: typer.TyperException) -> str:
+    close = getattr(error, "possibilities", None)  # of an option that there is not, closest first
+    if close:
+        return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"
+    return error.format_message()
 
 
 def _of_a_file(error: OSError) -> str:

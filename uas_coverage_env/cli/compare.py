@@ -54,7 +54,7 @@ def compare(
         typer.Option(
             metavar="WHAT,...",
             help="`village` or another shipped scenario, scenario files, the sets `dev` and "
-            "`test` (20 generated scenarios each), `generated:FIRST:END`, "
+            "`test` (20 generated scenarios each), `generated:SEED`, `generated:FIRST:END`, "
             "`flood-village:FIRST:END` (maps drawn from the paper's description).",
         ),
     ],

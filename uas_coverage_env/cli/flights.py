@@ -5,11 +5,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from uas_coverage_env.cli.figures_of_flight import by_uas, verdict
 from uas_coverage_env.flight import (
-    MODES,
     Flight,
+    accomplished,
     draw_flight,
-    energy_Wh,
     fallback_reasons,
     filtered_share,
     summary,
@@ -23,21 +23,14 @@ def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> None:
 
 
 def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
-    """Print what came of a flight, and where it is."""
-    result = summary(flight)
+    """Print what a flight gave, whether it is good, and where to look next."""
     table = Table("UAS", "end", "steps", "energy, Wh", "charge left", box=None)
-    for i, name in enumerate(flight.names):
-        end = MODES[flight.mode[-1, i]]
-        table.add_row(
-            name,
-            end if end in ("landed", "lost") else "in the air",
-            str(flight.last_sample[i]),
-            f"{energy_Wh(flight)[i]:.2f}",
-            f"{flight.soc[-1, i]:.1%}",
-        )
+    for row in by_uas(flight):
+        table.add_row(*row)
     screen.print(table)
     for violation in flight.violations:
-        screen.print(f"violation: {violation}", markup=False)
+        screen.print(f"violation: {violation}", markup=False, style="red")
+    result = summary(flight)
     low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
     ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
     screen.print(
@@ -57,5 +50,8 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
     if flight.safety_filter:
         share = filtered_share(flight)
         screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)
+    screen.print(verdict(flight), markup=False, style="green" if accomplished(flight) else "red")
     screen.print(f"flight in {directory}", markup=False)
     screen.print(f"to watch it: uas-coverage replay {directory}", markup=False)
+    screen.print(f"beside the least energy: uas-coverage show {directory} --bound", markup=False)
+    screen.print(f"its map for print: uas-coverage figure {directory} --kind map", markup=False)

@@ -10,6 +10,14 @@ from typer.core import TyperCommand, TyperGroup
 MARKUP = "markdown"
 
 
+def without_type_of_flags(params: Sequence[Any]) -> list[Any]:
+    """Options as they are, but that a flag, which takes no value, is shown with none."""
+    for param in params:
+        if getattr(param, "is_flag", False):
+            param.metavar = ""
+    return list(params)
+
+
 class CommandEntry(NamedTuple):
     """A command of the command line."""
 
@@ -53,7 +61,22 @@ class LazyGroup(TyperGroup):
         command = super().get_command(ctx, cmd_name)
         if not isinstance(command, _NotImported) or (self._lists and command.entry.summary):
             return command
-        return _command_of(command.entry)
+        command = _command_of(command.entry)
+        for each in (command, *getattr(command, "commands", {}).values()):
+            without_type_of_flags(each.get_params(ctx))
+        return command
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options of the group."""
+        return without_type_of_flags(super().get_params(ctx))
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """What a shell offers to complete a command with: like the help, it imports none."""
+        self._lists = True
+        try:
+            return super().shell_complete(ctx, incomplete)
+        finally:
+            self._lists = False
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""

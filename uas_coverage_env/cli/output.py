@@ -11,9 +11,13 @@ if TYPE_CHECKING:
 DONE, FAILED = 0, 1
 
 
-def console() -> Console:
-    """A console on stdout as it is now; numbers in our lines are not coloured."""
-    return Console(highlight=False, soft_wrap=True)
+def console(*, quiet: bool = False) -> Console:
+    """A console on stdout as it is now; numbers in our lines are not coloured.
+
+    Args:
+        quiet: It prints nothing.
+    """
+    return Console(highlight=False, soft_wrap=True, quiet=quiet)
 
 
 def one_line(text: str) -> str:

@@ -1,5 +1,6 @@
 """`uas-coverage run`: fly one mission and keep it."""
 
+import json
 import re
 from collections.abc import Sequence
 from itertools import count
@@ -8,10 +9,12 @@ from typing import Annotated
 
 import typer
 
+from uas_coverage_env.cli import completion
+from uas_coverage_env.cli.figures_of_flight import data
 from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
-from uas_coverage_env.cli.sorties import keep_sorties
+from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     Flight,
@@ -29,10 +32,18 @@ def run(
     scenario: Annotated[
         str,
         typer.Argument(
-            metavar="SCENARIO", help="Name of a shipped scenario (`scenarios`), or a scenario file."
+            metavar="SCENARIO",
+            help="Name of a shipped scenario (see `scenarios`), `generated:SEED` or another that "
+            "`compare` takes, or a scenario file.",
+            autocompletion=completion.scenarios,
         ),
     ],
-    planner: Annotated[str, typer.Option(help="Name of the planner, see `planners`.")] = "milp-mpc",
+    planner: Annotated[
+        str,
+        typer.Option(
+            help="Name of the planner, see `planners`.", autocompletion=completion.planners
+        ),
+    ] = "milp-mpc",
     option: Annotated[
         list[str] | None,
         typer.Option(metavar="KEY=VALUE", help="Option of the planner; may be repeated."),
@@ -70,6 +81,12 @@ def run(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the flight in --out.")
     ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="Print nothing but warnings and errors.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")
+    ] = False,
 ) -> None:
     """Fly one mission and write a flight directory.
 
@@ -83,10 +100,10 @@ def run(
     player = load_planner(planner, _options(option or ()))
     # KIND:ARGUMENT may hold a path
     player_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")
-    directory = out or _free_directory(f"{mission.name}-{player_name}-{seed}")
+    directory = out or free_directory(f"{mission.name}-{player_name}-{seed}")
     check_directory(directory, overwrite=overwrite)
 
-    screen = console()
+    screen = console(quiet=quiet or as_json)
 
     def fly(what: Scenario) -> Flight:
         with shown(screen, what, watch=player if watch else None) as on_step:
@@ -103,13 +120,18 @@ def run(
     try:
         if sorties is not None:
             chain = fly_sorties(mission, fly, sorties)
-            raise typer.Exit(keep_sorties(screen, chain, directory, overwrite=overwrite))
+            code = keep_sorties(screen, chain, directory, overwrite=overwrite)
+            if as_json:
+                typer.echo((directory / SUMMARY).read_text(), nl=False)
+            raise typer.Exit(code)
         flight = fly(mission)
         keep_flight(flight, directory, overwrite=overwrite)
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()
     report_flight(screen, flight, directory)
+    if as_json:
+        typer.echo(json.dumps(data(flight, str(directory)), indent=2))
     raise typer.Exit(_exit_code(flight, steps))
 
 
@@ -125,7 +147,7 @@ def _options(pairs: Sequence[str]) -> dict[str, str]:
     return options
 
 
-def _free_directory(name: str) -> Path:
+def free_directory(name: str) -> Path:
     """flights/NAME, or NAME-2, NAME-3, ... where that is taken."""
     first = Path("flights") / name
     candidates = (first if n == 1 else first.with_name(f"{name}-{n}") for n in count(1))

@@ -6,19 +6,23 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
+from PIL.PngImagePlugin import PngInfo
 from rich.table import Table
 
+from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.draw import picture
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import Scenario, load_scenario, scenario_names
+from uas_coverage_env.scenario import SERIES, Scenario, load_scenario, scenario_names
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.tube import tube_of
 from uas_coverage_env.world.arena import LOOKAHEAD_S
 
 _PICTURE_PX = 1024
+# what we write into a picture, so that it may be drawn again; other files are left alone
+_MARK = ("Software", "uas-coverage scenarios check")
 
 app = typer.Typer(invoke_without_command=True, help="List the shipped scenarios, or check one.")
 
@@ -26,8 +30,13 @@ app = typer.Typer(invoke_without_command=True, help="List the shipped scenarios,
 @app.callback()
 def scenarios(context: typer.Context) -> None:
     """List the shipped scenarios; `check FILE` validates and draws one."""
-    if context.invoked_subcommand is not None:
-        return
+    if context.invoked_subcommand is None:
+        list_scenarios()
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """List the shipped scenarios, and what generates others."""
     table = Table("name", "UAS", "waypoints", "obstacles", "moving", "size, m", "steps", box=None)
     for name in scenario_names():
         scenario = load_scenario(name)
@@ -35,28 +44,43 @@ def scenarios(context: typer.Context) -> None:
         table.add_row(
             name, *(str(len(items)) for items in counts), _size(scenario), str(scenario.max_steps)
         )
-    console().print(table)
+    out = console()
+    out.print(table)
+    out.print(f"by a seed: {', '.join(f'{series}:SEED' for series in SERIES)}", markup=False)
 
 
 @app.command()
 def check(
     file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Scenario file, or the name of a shipped one.")
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="Scenario file, or the name of a shipped or generated one.",
+            autocompletion=completion.scenarios,
+        ),
     ],
     picture_file: Annotated[
         Path | None, typer.Option("--picture", help="PNG to draw; default: NAME.png, here.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace the PNG where it exists.")] = False,
+    overwrite: Annotated[
+        bool,
+        typer.Option("--overwrite", help="Replace a PNG that another program made, too."),
+    ] = False,
 ) -> None:
-    """Validate, summarise and draw a scenario."""
+    """Validate, summarise and draw a scenario.
+
+    A picture that this command has made is drawn anew.
+    """
     scenario = loaded(file)
     path = picture_file or Path(f"{scenario.name}.png")
-    if path.exists() and not overwrite:
+    if path.exists() and not overwrite and not _drawn_by_us(path):
         raise InputError(f"{path}: exists; give another --picture or add --overwrite")
     pixels = picture(scenario, World(scenario).swarm_state(), size_px=_PICTURE_PX)
     try:
         with written_by(path) as place:
-            Image.fromarray(pixels).save(place, format="PNG")
+            mark = PngInfo()
+            mark.add_text(*_MARK)
+            Image.fromarray(pixels).save(place, format="PNG", pnginfo=mark)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     out = console()
@@ -64,6 +88,14 @@ def check(
     for line in _lines(scenario):
         out.print(line, markup=False)
     out.print(f"drawn in {path}", markup=False)
+
+
+def _drawn_by_us(path: Path) -> bool:
+    try:
+        with Image.open(path) as drawn:
+            return (_MARK[0], _MARK[1]) in drawn.info.items()
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError):
+        return False
 
 
 def _lines(scenario: Scenario) -> list[str]:

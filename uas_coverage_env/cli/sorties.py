@@ -14,7 +14,7 @@ from uas_coverage_env.cli.output import DONE, FAILED
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.flight import Flight, sorties_summary
 
-_SUMMARY = "sorties.json"
+SUMMARY = "sorties.json"
 
 
 def keep_sorties(
@@ -25,14 +25,14 @@ def keep_sorties(
     Returns:
         The exit code.
     """
-    (directory / _SUMMARY).unlink(missing_ok=True)
+    (directory / SUMMARY).unlink(missing_ok=True)
     flights: list[Flight] = []
     for number, flight in enumerate(sorties, start=1):
         keep_flight(flight, directory / f"sortie_{number}", overwrite=overwrite)
         flights.append(flight)
     result = sorties_summary(flights)
     text = json.dumps(result, indent=2, allow_nan=False) + "\n"
-    write_files(directory, {_SUMMARY: text.encode()})
+    write_files(directory, {SUMMARY: text.encode()})
     _report(screen, result, directory)
     for path in sorted(directory.glob("sortie_*")):
         number = path.name.removeprefix("sortie_")
@@ -65,5 +65,5 @@ def _report(screen: Console, result: dict[str, Any], directory: Path) -> None:
         f"{result['breaches']} breaches",
         markup=False,
     )
-    screen.print(f"flights and {_SUMMARY} in {directory}", markup=False)
+    screen.print(f"flights and {SUMMARY} in {directory}", markup=False)
     screen.print(f"to watch one: uas-coverage replay {directory / 'sortie_1'}", markup=False)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from gymnasium.error import ResetNeeded
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.files.suggestions import meant
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 
 
@@ -95,6 +95,6 @@ def check_options(options: Mapping[str, Any], *known: str) -> None:
         ValueError: One is close to a known one; says which.
     """
     for name in options:
-        meant = get_close_matches(str(name).lower(), known, n=1)
-        if meant and name not in known:
-            raise ValueError(f"reset() has no option {name!r}; did you mean {meant[0]!r}?")
+        close = meant(str(name), known)
+        if close and name not in known:
+            raise ValueError(f"reset() has no option {name!r}; did you mean {close!r}?")

@@ -1,7 +1,6 @@
 """Strict reading of TOML files: every mistake is one line with file, field, value and fix."""
 
 import datetime
-import difflib
 import json
 import math
 import re
@@ -16,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_text
+from uas_coverage_env.files.suggestions import did_you_mean
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -234,10 +234,8 @@ def _shown(value: Any) -> str:
 def _instead(location: tuple[str | int, ...], model: type[BaseModel]) -> str:
     """What to write in place of the unknown key at this location."""
     keys = _keys_at(location[:-1], model)
-    close = difflib.get_close_matches(str(location[-1]), keys, n=1)
-    if close:
-        return f"did you mean {close[0]}?"
-    return f"allowed here: {', '.join(keys)}" if keys else "remove it"
+    allowed = f"allowed here: {', '.join(keys)}" if keys else "remove it"
+    return did_you_mean(str(location[-1]), keys, allowed)
 
 
 def _keys_at(location: tuple[str | int, ...], model: type[BaseModel]) -> list[str]:

@@ -6,6 +6,8 @@
     names its argument and on the planner that holds it.
 """
 
+import inspect
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,10 +19,13 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.flight.planner import Planner
 
 GROUP = "uas_coverage.planners"
 KINDS = "uas_coverage.planner_kinds"
+
+_SECTION = re.compile(r"^(?:Args|Attributes|Raises):$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -35,12 +40,21 @@ class OptionDescription:
 
 @dataclass(frozen=True)
 class PlannerDescription:
-    """One planner, as a person reads it; `missing` says why it cannot be used here, if so."""
+    """One planner, as a person reads it.
+
+    Attributes:
+        name: As it is asked for.
+        summary: What it does, in a line.
+        options: How it can be set.
+        missing: Why it cannot be used here, if so.
+        text: What else there is to know about it; may be empty.
+    """
 
     name: str
     summary: str
     options: tuple[OptionDescription, ...] = ()
     missing: str = ""
+    text: str = ""
 
 
 def planner_names() -> tuple[str, ...]:
@@ -62,8 +76,7 @@ def load_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner
     kind, colon, argument = name.partition(":")
     installed = _installed(KINDS if colon else GROUP)
     if kind not in installed or (colon and not argument):
-        allowed = ", ".join((*planner_names(), *_kind_names()))
-        raise InputError(f"unknown planner {name!r}; allowed: {allowed}")
+        raise _unknown(name)
     try:
         planner_class = installed[kind].load()
     except (ImportError, AttributeError) as error:
@@ -79,6 +92,23 @@ def describe_planners() -> tuple[PlannerDescription, ...]:
         for group in (GROUP, KINDS)
         for name, entry in sorted(_installed(group).items())
     )
+
+
+def describe_planner(name: str) -> PlannerDescription:
+    """One planner with its options.
+
+    Args:
+        name: One of `planner_names()`, or a kind with or without its argument.
+
+    Raises:
+        InputError: Unknown name; one line.
+    """
+    kind, _, _ = name.partition(":")
+    for group in (GROUP, KINDS):
+        entry = _installed(group).get(kind)
+        if entry is not None and (group == KINDS or kind == name):
+            return _description(kind, entry)
+    raise _unknown(name)
 
 
 def name_of(planner: Planner) -> str:
@@ -97,19 +127,23 @@ def options_of(planner: Planner) -> dict[str, Any]:
     return options.model_dump(mode="json") if isinstance(options, BaseModel) else {}
 
 
+def _unknown(name: str) -> InputError:
+    argument = name.partition(":")[2][:80] or "..."
+    known = (*planner_names(), *(f"{kind}:{argument}" for kind in sorted(_installed(KINDS))))
+    instead = did_you_mean(name, known, f"allowed: {', '.join(known)}")
+    return InputError(f"unknown planner {name!r}; {instead}")
+
+
 def _installed(group: str) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=group) if entry.group == group}
-
-
-def _kind_names() -> tuple[str, ...]:
-    return tuple(f"{name}:..." for name in sorted(_installed(KINDS)))
 
 
 def _checked_options(name: str, model: type[BaseModel], given: Mapping[str, Any]) -> BaseModel:
     allowed = ", ".join(model.model_fields) or "none"
     for key in given:
         if key not in model.model_fields:
-            raise InputError(f"planner {name!r} has no option {key!r}; allowed: {allowed}")
+            instead = did_you_mean(key, model.model_fields, f"allowed: {allowed}")
+            raise InputError(f"planner {name!r} has no option {key!r}; {instead}")
     try:
         return model.model_validate(dict(given))
     except ValidationError as error:
@@ -132,11 +166,12 @@ def _description(name: str, entry: EntryPoint) -> PlannerDescription:
         return PlannerDescription(name, "", missing=" ".join(str(error).split()))
     if entry.group == KINDS:
         name = f"{name}:{planner_class.argument}"
-    summary = (planner_class.__doc__ or "").strip().partition("\n")[0]
-    fields = planner_class.Options.model_fields
-    return PlannerDescription(
-        name, summary, tuple(_option(key, field) for key, field in fields.items())
+    summary, _, rest = (inspect.getdoc(planner_class) or "").partition("\n")
+    text = _SECTION.split(rest)[0].strip()
+    options = tuple(
+        _option(key, field) for key, field in planner_class.Options.model_fields.items()
     )
+    return PlannerDescription(name, summary, options, text=text)
 
 
 def _option(name: str, field: FieldInfo) -> OptionDescription:

@@ -20,7 +20,8 @@ def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
 
     Args:
         texts: Each one or several (comma or space between them) of: the name of a set, the name of
-            a shipped scenario, the path of a scenario file, SERIES:FIRST:END (see `SERIES`).
+            a shipped scenario, the path of a scenario file, SERIES:SEED, SERIES:FIRST:END (see
+            `SERIES`).
 
     Raises:
         InputError: There are none, one of them cannot be read, or two that differ share a name.
@@ -77,10 +78,10 @@ def _is_file(text: str) -> bool:
 
 
 def _scenarios(item: str) -> Iterator[Scenario]:
-    kind, separator, rest = item.partition(":")
+    kind, _, rest = item.partition(":")
     if item in SETS:
         yield from map(SERIES["generated"], SETS[item])
-    elif separator and kind in SERIES:
+    elif ":" in rest and kind in SERIES:
         yield from map(SERIES[kind], seed_range(f"--scenarios {kind}:", rest))
     else:
         yield load_scenario(item)

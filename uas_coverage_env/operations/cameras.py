@@ -7,6 +7,7 @@ from pydantic import Field, RootModel
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import StrictModel, read_toml
+from uas_coverage_env.files.suggestions import did_you_mean
 
 _SHIPPED = Path(__file__).with_name("cameras.toml")
 
@@ -81,10 +82,9 @@ def load_camera(name_or_path: str) -> Camera:
     if name_or_path in shipped:
         return shipped[name_or_path]
     if not name_or_path.endswith(".toml"):
-        known = ", ".join(shipped)
-        raise InputError(
-            f"unknown camera {name_or_path[:80]!r}; take {known} or the path of a .toml file"
-        )
+        take = f"take {', '.join(shipped)} or the path of a .toml file"
+        instead = did_you_mean(name_or_path, shipped, take)
+        raise InputError(f"unknown camera {name_or_path[:80]!r}; {instead}")
     own = list(read_toml(name_or_path, _Cameras).root.values())
     if len(own) != 1:
         raise InputError(f"{name_or_path}: has {len(own)} cameras; keep one table [NAME]")

@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from uas_coverage_env.files.strict_toml import StrictModel
+from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.vehicle import vehicle_names
 
@@ -200,10 +201,9 @@ class Uas(StrictModel):
             return vehicle
         path = Path(vehicle)
         if path.suffix != ".toml":
-            shipped = ", ".join(vehicle_names())
-            raise ValueError(
-                f"unknown vehicle {vehicle[:80]!r}; take {shipped} or the path of a .toml file"
-            )
+            shipped = f"take {', '.join(vehicle_names())} or the path of a .toml file"
+            instead = did_you_mean(vehicle, vehicle_names(), shipped)
+            raise ValueError(f"unknown vehicle {vehicle[:80]!r}; {instead}")
         folder = Path((info.context or {}).get("folder", "."))
         try:
             path = (folder / path).resolve()

@@ -3,9 +3,12 @@
 from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError, read_toml
+from uas_coverage_env.files.suggestions import did_you_mean
+from uas_coverage_env.scenario.family import SERIES
 from uas_coverage_env.scenario.model import Scenario
 
 _SHIPPED = Path(__file__).parent
+_LONGEST_SEED = 18  # digits, as in a sweep
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -17,8 +20,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     """Read a scenario and check it.
 
     Args:
-        name_or_path: The name of a shipped scenario, or the path of a TOML file in the same
-            format; a string is a path where it ends in `.toml` or contains a folder.
+        name_or_path: The name of a shipped scenario, the name and the seed of a generated one as
+            in `generated:7` (see `SERIES`), or the path of a TOML file in the same format; a
+            string is a path where it ends in `.toml` or contains a folder.
 
     Raises:
         InputError: There is no such scenario, or something in it is wrong: one line that names
@@ -29,11 +33,23 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     elif is_path(name_or_path):
         path = Path(name_or_path)
     else:
-        raise InputError(
-            f"unknown scenario {str(name_or_path)[:80]!r}; "
-            f"take {', '.join(scenario_names())} or the path of a .toml file"
-        )
+        return _generated(str(name_or_path))
     return read_toml(path, Scenario, context={"folder": path.parent})
+
+
+def _generated(text: str) -> Scenario:
+    """SERIES:SEED."""
+    series, colon, seed = text.partition(":")
+    if not colon or series not in SERIES:
+        known = (*scenario_names(), *(f"{name}:{seed[:18] or 'SEED'}" for name in SERIES))
+        otherwise = f"take {', '.join(known)} or the path of a .toml file"
+        raise InputError(f"unknown scenario {text[:80]!r}; {did_you_mean(text, known, otherwise)}")
+    if not (seed.isdecimal() and len(seed) <= _LONGEST_SEED):
+        raise InputError(
+            f"scenario {text[:80]!r}: should be {series}:SEED with one whole number of at most "
+            f"{_LONGEST_SEED} digits, as in {series}:7"
+        )
+    return SERIES[series](int(seed))
 
 
 def is_path(name_or_path: str | Path) -> bool:

@@ -9,6 +9,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, read_toml
+from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.vehicle import checks
 from uas_coverage_env.vehicle.parts import Parts
 
@@ -91,9 +92,8 @@ def load_vehicle(name_or_path: str | Path) -> VehicleParams:
         return _shipped(text)
     if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text:
         return read_toml(name_or_path, VehicleParams)
-    raise InputError(
-        f"unknown vehicle {text!r}; allowed: {', '.join(vehicle_names())}, or a path to a file"
-    )
+    shipped = f"allowed: {', '.join(vehicle_names())}, or a path to a file"
+    raise InputError(f"unknown vehicle {text!r}; {did_you_mean(text, vehicle_names(), shipped)}")
 
 
 @cache

@@ -12,6 +12,7 @@ from uas_coverage_agents.training.published import PUBLISHED, published_names
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_agents.waypoint.settings import WaypointSettings
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse, read_toml
+from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.scenario import load_scenario
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -154,10 +155,9 @@ def load_config(
     elif name_or_path.endswith(".toml"):
         path = Path(name_or_path)
     else:
-        names = ", ".join(published_names())
-        raise InputError(
-            f"unknown algorithm {name_or_path[:80]!r}; take {names}, or the path of a .toml file"
-        )
+        take = f"take {', '.join(published_names())}, or the path of a .toml file"
+        instead = did_you_mean(name_or_path, published_names(), take)
+        raise InputError(f"unknown algorithm {name_or_path[:80]!r}; {instead}")
     config = read_toml(path, TrainingConfig)
     if scenario is None and not changes:
         return config

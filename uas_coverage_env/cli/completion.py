@@ -1,0 +1,15 @@
+"""What a shell offers to complete arguments with."""
+
+from uas_coverage_env.flight import planner_names
+from uas_coverage_env.scenario import SERIES, scenario_names
+
+
+def scenarios(incomplete: str) -> list[str]:
+    """Scenarios by name; of those that are generated, all but the seed."""
+    known = (*scenario_names(), *(f"{series}:" for series in SERIES))
+    return [name for name in known if name.startswith(incomplete)]
+
+
+def planners(incomplete: str) -> list[str]:
+    """Planners by name."""
+    return [name for name in planner_names() if name.startswith(incomplete)]

@@ -1,0 +1,58 @@
+"""`uas-coverage demo`: a first flight, and the page to look at it."""
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uas_coverage_env.cli.flights import keep_flight, report_flight
+from uas_coverage_env.cli.output import console, loaded
+from uas_coverage_env.cli.progress import shown
+from uas_coverage_env.cli.run import free_directory
+from uas_coverage_env.flight import check_directory, load_planner, rollout
+from uas_coverage_env.replay import write_replay
+
+_SCENARIO, _PLANNER = "village", "nearest-waypoint"
+_SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def demo(
+    out: Annotated[
+        Path | None, typer.Option(help="Flight directory; default: flights/demo, numbered.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the flight in --out.")
+    ] = False,
+    no_open: Annotated[
+        bool, typer.Option("--no-open", help="Do not open the page in a browser.")
+    ] = False,
+) -> None:
+    """Fly a first mission with a fast planner, and open its replay page in a browser.
+
+    A minute on a fresh installation, which compiles first; seconds from then on.
+    """
+    screen = console()
+    directory = out or free_directory("demo")
+    check_directory(directory, overwrite=overwrite)
+    screen.print(f"{_PLANNER} flies the {_SCENARIO}", markup=False)
+    mission = loaded(_SCENARIO)
+    with shown(screen, mission) as on_step:
+        flight = rollout(mission, load_planner(_PLANNER), 0, on_step=on_step)
+    keep_flight(flight, directory, overwrite=overwrite)
+    page = write_replay([flight], directory / "replay.html", sources=[str(directory)])
+    report_flight(screen, flight, directory)
+    opened = not no_open and _open(page)
+    screen.print(f"{'opened' if opened else 'to look at it, open'} {page}", markup=False)
+
+
+def _open(page: Path) -> bool:
+    """Show a page in a browser that has a screen; one for the terminal would take it over."""
+    if sys.platform == "linux" and not any(os.environ.get(name) for name in _SCREENS):
+        return False
+    try:
+        return webbrowser.open(page.resolve().as_uri())
+    except webbrowser.Error:
+        return False

@@ -1,0 +1,108 @@
+"""What a person is told of a flight: whether it is good, and its figures."""
+
+from typing import Any
+
+from uas_coverage_env.flight import (
+    MODES,
+    Flight,
+    accomplished,
+    energy_Wh,
+    fallback_reasons,
+    filtered_share,
+    summary,
+)
+
+_ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped by hand"}
+NONE = "-"
+
+
+def verdict(flight: Flight) -> str:
+    """Whether the mission succeeded, and what it lacks if not, in a line."""
+    if accomplished(flight):
+        return "mission accomplished: everything covered, every UAS home, no violation"
+    result = summary(flight)
+    lacks = [
+        _ENDED[flight.ended],
+        "" if result["coverage"] == 1.0 else f"{result['coverage']:.0%} covered",
+        "" if result["all_home"] else f"not home: {', '.join(_not_home(flight))}",
+        _several(len(flight.violations), "violation"),
+    ]
+    return f"mission not accomplished: {'; '.join(filter(None, lacks))}"
+
+
+def figures(flight: Flight) -> dict[str, str]:
+    """The figures of a flight with their units, by name, as a person reads them."""
+    result = summary(flight)
+    times = result["decision_time_s"]
+    reasons = ", ".join(f"{n} {reason}" for reason, n in fallback_reasons(flight).items())
+    rows = {
+        "scenario": flight.scenario.name,
+        "planner": flight.planner,
+        "seed": str(flight.seed),
+        "model": flight.dynamics,
+        "accomplished": "yes" if accomplished(flight) else "no",
+        "ended": _ENDED[flight.ended] or "complete",
+        "covered": f"{result['coverage']:.0%}",
+        "all home": "yes" if result["all_home"] else f"not {', '.join(_not_home(flight))}",
+        "steps": str(flight.steps),
+        "energy, Wh": f"{result['energy_Wh']:.2f}",
+        "least charge left": f"{flight.soc.min():.1%}",
+        "least clearance of obstacles, m": _metres(flight.min_obstacle_clearance_m),
+        "least separation of UAS, m": _metres(flight.min_separation_m),
+        "violations": str(len(flight.violations)),
+        "breaches": str(flight.breaches),
+        "of them too low": str(flight.height_breaches) if flight.scenario.min_height_m else NONE,
+        "decisions": str(len(flight.decisions)),
+        "fallbacks": f"{result['fallbacks']}{f' ({reasons})' if reasons else ''}",
+        "decision time p50, ms": _milliseconds(times["p50"]),
+        "decision time p95, ms": _milliseconds(times["p95"]),
+        "decision time max, ms": _milliseconds(times["max"]),
+        "gap of the joint program": NONE if (g := result["mip_gap_p50"]) is None else f"{g:.1%}",
+        "commands that the filter replaced": (
+            f"{filtered_share(flight):.1%}" if flight.safety_filter else NONE
+        ),
+    }
+    return rows
+
+
+def by_uas(flight: Flight) -> list[tuple[str, str, str, str, str]]:
+    """Of each UAS its name, how it ended, its last step, its energy and the charge left."""
+    energies_Wh = energy_Wh(flight)
+    return [
+        (
+            name,
+            end if (end := MODES[flight.mode[-1, i]]) in ("landed", "lost") else "in the air",
+            str(flight.last_sample[i]),
+            f"{energies_Wh[i]:.2f}",
+            f"{flight.soc[-1, i]:.1%}",
+        )
+        for i, name in enumerate(flight.names)
+    ]
+
+
+def data(flight: Flight, directory: str) -> dict[str, Any]:
+    """A flight as plain data for machines: `summary.json` and what identifies the flight."""
+    return {
+        "directory": directory,
+        "scenario": flight.scenario.name,
+        "dynamics": flight.dynamics,
+        "ended": flight.ended,
+        "accomplished": accomplished(flight),
+        **summary(flight),
+    }
+
+
+def _not_home(flight: Flight) -> list[str]:
+    return [name for i, name in enumerate(flight.names) if MODES[flight.mode[-1, i]] != "landed"]
+
+
+def _several(count: int, thing: str) -> str:
+    return f"{count} {thing}{'s' if count > 1 else ''}" if count else ""
+
+
+def _metres(value: float | None) -> str:
+    return NONE if value is None else f"{value:.2f}"
+
+
+def _milliseconds(value_s: float | None) -> str:
+    return NONE if value_s is None else f"{1e3 * value_s:.2f}"

@@ -1,0 +1,102 @@
+"""`uas-coverage show`: what a flight gave, in figures."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from uas_coverage_env.cli.figures_of_flight import NONE, by_uas, data, figures, verdict
+from uas_coverage_env.cli.output import console
+from uas_coverage_env.flight import Flight, accomplished
+
+
+def show(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+    other: Annotated[
+        Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
+    ] = None,
+    bound: Annotated[
+        bool,
+        typer.Option(
+            "--bound", help="Beside the least energy that the mission takes (some 10 seconds)."
+        ),
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")] = False,
+) -> None:
+    """Show the figures of a flight, or of two side by side.
+
+    What is better has no sign of its own: of flights that accomplish the same mission, the one
+    with less energy, or fewer steps.
+    """
+    sources = [str(path) for path in (directory, other) if path is not None]
+    flights = [Flight.load(source) for source in sources]
+    bounds = [_bound(flight) if bound else None for flight in flights]
+    if as_json:
+        _print_json(flights, sources, bounds)
+        return
+    out = console()
+    table = Table("", *sources, box=None)
+    columns = [figures(flight) for flight in flights]
+    for name in columns[0]:
+        cells = [column[name] for column in columns]
+        if any(cell != NONE for cell in cells):
+            table.add_row(name, *cells, style="bold" if name == "accomplished" else None)
+    if bound:
+        for name in ("least energy, Wh", "above it", "fewest steps", "bound computed in, s"):
+            table.add_row(name, *(_bound_cell(one, name) for one in bounds))
+    out.print(table)
+    for flight, source in zip(flights, sources, strict=True):
+        if len(flights) > 1:
+            out.print(f"\n{source}", markup=False)
+        each = Table("UAS", "end", "steps", "energy, Wh", "charge left", box=None)
+        for row in by_uas(flight):
+            each.add_row(*row)
+        out.print(each)
+        for violation in flight.violations:
+            out.print(f"violation: {violation}", markup=False)
+        out.print(verdict(flight), markup=False)
+
+
+def _print_json(
+    flights: list[Flight], sources: list[str], bounds: list[dict[str, Any] | None]
+) -> None:
+    entries = [
+        data(flight, source) | ({} if least is None else {"bound": least})
+        for flight, source, least in zip(flights, sources, bounds, strict=True)
+    ]
+    typer.echo(json.dumps(entries[0] if len(entries) == 1 else entries, indent=2))
+
+
+def _bound(flight: Flight) -> dict[str, Any]:
+    """The lower bound of the mission, and how far above it the flight is, where there is one."""
+    from uas_coverage_env.bound import MissionBound  # a second that other flights need not wait
+
+    began = time.perf_counter()
+    least: dict[str, Any] = {"energy_Wh": None, "steps": None, "above": None, "why_not": None}
+    if flight.dynamics != "lpv":
+        return least | {"why_not": "it holds for the LPV model only"}
+    try:
+        of_mission = MissionBound(flight.scenario)
+    except ValueError as error:
+        return least | {"why_not": str(error)}
+    least |= {"energy_Wh": of_mission.energy_Wh(), "steps": of_mission.steps}
+    if accomplished(flight):
+        flown_Wh = data(flight, "")["energy_Wh"]
+        in_steps_Wh = of_mission.energy_Wh(flight.steps)
+        least |= {"energy_Wh": in_steps_Wh, "above": flown_Wh / in_steps_Wh - 1.0}
+    return least | {"computed_in_s": time.perf_counter() - began}
+
+
+def _bound_cell(least: dict[str, Any] | None, name: str) -> str:
+    if least is None or least["energy_Wh"] is None:
+        return least["why_not"] if least and name.startswith("least") else NONE
+    if name.startswith("above"):
+        return "mission not accomplished" if least["above"] is None else f"{least['above']:.1%}"
+    return {
+        "least energy, Wh": f"{least['energy_Wh']:.2f}",
+        "fewest steps": str(least["steps"]),
+        "bound computed in, s": f"{least['computed_in_s']:.1f}",
+    }[name]

@@ -1,0 +1,23 @@
+"""What a person probably meant by a name that there is not."""
+
+import difflib
+from collections.abc import Iterable
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """The known name that is closest to a misspelt one; empty where none is close."""
+    by_lower = {each.lower(): each for each in known}
+    close = difflib.get_close_matches(name[:80].lower(), by_lower, n=1)
+    return by_lower[close[0]] if close else ""
+
+
+def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
+    """How a message about an unknown name ends.
+
+    Args:
+        name: As it was given.
+        known: The names that there are.
+        otherwise: What to say where none of them is close.
+    """
+    closest = meant(name, known)
+    return f"did you mean {closest}?" if closest else otherwise
