@@ -5,10 +5,12 @@ import itertools
 
 import numpy as np
 import pytest
+from chromium import started
 
 from uas_coverage_env.flight import Flight, Violation, load_planner, rollout
 from uas_coverage_env.flight.record import PLAN_DTYPE
 from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.vehicle import DOD
 
 HORIZON = 18
 
@@ -30,3 +32,25 @@ def flight(plain) -> Flight:
         plan=np.array(rows, PLAN_DTYPE),
         violations=(Violation(30.0, "uas_1", "obstacle", "church"),),
     )
+
+
+@pytest.fixture(scope="session")
+def discharged(plain) -> Flight:
+    """The second UAS loses charge so fast that on the way it cannot be sure to come home."""
+    x = plain.x.copy()
+    x[:, 1, DOD] += np.linspace(0.0, 0.2, len(x))
+    return dataclasses.replace(plain, x=x)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    driver = started()
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def browser_without_webgl():
+    driver = started("--disable-3d-apis")
+    yield driver
+    driver.quit()

@@ -1,138 +1,38 @@
-"""The replay page in a real Chromium without a screen, opened from disk.
-
-Needs the Debian packages `chromium` and `chromium-driver`.
-"""
+"""The replay page in a real Chromium without a screen, opened from disk."""
 
 import dataclasses
-import io
-import json
-import os
-import shutil
 
-import numpy as np
 import pytest
-from PIL import Image
-from selenium import webdriver
+from chromium import (
+    DESKTOP,
+    PHONE,
+    cards,
+    colours,
+    complaints,
+    emulate,
+    needs_chromium,
+    opened,
+    pixels,
+    pressed,
+    requests,
+    settled,
+    time_s,
+)
 from selenium.webdriver import Keys
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env.replay import write_replay
 
-BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-pytestmark = pytest.mark.skipif(
-    not (BROWSER and DRIVER),
-    reason="no Chromium here: apt-get install chromium chromium-driver",
-)
+pytestmark = needs_chromium
 
-DESKTOP, PHONE = (1400, 900), (390, 844)
-# fewer pixels to compute where the size does not matter
-SMALL = (1020, 560)
 HOSTILE = '</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 1">'
-
-
-def started(*arguments: str) -> webdriver.Chrome:
-    options = Options()
-    options.binary_location = BROWSER or ""
-    # WebGL is computed by the processor; a container has little shared memory
-    for argument in (
-        *("--headless=new", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
-        *arguments,
-    ):
-        options.add_argument(argument)
-    if os.geteuid() == 0:
-        # Chromium does not isolate its processes for the superuser
-        options.add_argument("--no-sandbox")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    return webdriver.Chrome(options=options, service=Service(DRIVER))
-
-
-@pytest.fixture(scope="module")
-def browser():
-    driver = started()
-    yield driver
-    driver.quit()
-
-
-@pytest.fixture(scope="module")
-def browser_without_webgl():
-    driver = started("--disable-3d-apis")
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")
 def page(flight, tmp_path_factory):
     return write_replay([flight], tmp_path_factory.mktemp("page") / "replay.html")
-
-
-def opened(driver, page, size=SMALL, theme="light", moment=""):
-    """Open a page anew; what the browser has logged until now is forgotten."""
-    driver.get("about:blank")
-    emulate(driver, size, theme)
-    for kind in ("browser", "performance"):
-        driver.get_log(kind)
-    driver.get(page.as_uri() + moment)
-    WebDriverWait(driver, 20).until(lambda _: driver.find_elements(By.CLASS_NAME, "card"))
-    settled(driver)
-    return driver
-
-
-def emulate(driver, size, theme):
-    width, height = size
-    driver.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride",
-        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 700},
-    )
-    driver.execute_cdp_cmd(
-        "Emulation.setEmulatedMedia",
-        {"features": [{"name": "prefers-color-scheme", "value": theme}]},
-    )
-
-
-def settled(driver):
-    """Wait until what was asked for has been drawn."""
-    driver.execute_async_script(
-        "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))"
-    )
-
-
-def pressed(driver, *keys):
-    driver.find_element(By.TAG_NAME, "body").send_keys(*keys)
-    settled(driver)
-
-
-def time_s(driver) -> float:
-    return float(driver.find_element(By.CLASS_NAME, "time").text.split()[0])
-
-
-def cards(driver) -> list[str]:
-    return [card.text for card in driver.find_elements(By.CLASS_NAME, "card")]
-
-
-def pixels(driver, css) -> np.ndarray:
-    png = driver.find_element(By.CSS_SELECTOR, css).screenshot_as_png
-    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
-
-
-def colours(image) -> int:
-    return len(np.unique(image.reshape(-1, 3), axis=0))
-
-
-def complaints(driver) -> list[str]:
-    return [entry["message"] for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
-
-
-def requests(driver) -> list[str]:
-    events = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
-    return [
-        event["params"]["request"]["url"]
-        for event in events
-        if event["method"] == "Network.requestWillBeSent"
-    ]
 
 
 def test_it_opens_from_disk_draws_and_asks_for_nothing(browser, page):

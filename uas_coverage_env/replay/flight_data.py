@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, covered_at, summary
+from uas_coverage_env.replay.home_data import way_home
+from uas_coverage_env.replay.mark_data import marks
+from uas_coverage_env.replay.safety_data import floors_m, rooms
 from uas_coverage_env.replay.scene_data import scene_data
 from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA
 
@@ -17,6 +20,8 @@ SOC = 0.0001
 VOLTAGE_V = 0.001
 CURRENT_A = 0.01
 DURATION_S = 0.00001
+ROOM_M = 0.01
+FLOOR_M = 0.1
 
 
 def flight_data(flight: Flight, source: str) -> dict[str, Any]:
@@ -43,6 +48,9 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "moving": (flight.moving_position_m, POSITION_M),
         "duration": (durations_s, DURATION_S),
     }
+    flown = {name: _series(values, unit, name, source) for name, (values, unit) in series.items()}
+    # of values that are finite, as is known now
+    home, room = way_home(flight), rooms(flight)
     return {
         "planner": flight.planner,
         "seed": flight.seed,
@@ -50,7 +58,9 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "dt_s": flight.scenario.dt_s,
         "samples": len(flight.x),
         "scene": scene_data(flight.scenario),
-        **{name: _series(values, unit, name, source) for name, (values, unit) in series.items()},
+        **flown,
+        "needed": _series(home.needed_soc, SOC, "charge for the way home", source),
+        "floor": _series(floors_m(flight), FLOOR_M, "roofs", source),
         "modes": list(MODES),
         "mode": flight.mode.ravel().tolist(),
         "last": flight.last_sample.tolist(),
@@ -58,6 +68,11 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "covered_at": covered_at(flight).tolist(),
         "fallbacks": [k for k, decision in enumerate(flight.decisions) if decision.fallback],
         "plan": {"unit": PLAN_M, "steps": _plan(flight, source)},
+        "room": {kind: _series(room_m, ROOM_M, kind, source) for kind, (room_m, _) in room.items()},
+        "min_height_m": flight.scenario.min_height_m,
+        "no_return": list(home.no_return),
+        "least_spare": [[sample, round(spare, 4)] for sample, spare in home.least_spare],
+        "marks": marks(flight, room, home),
         "violations": outcome["violations"],
         "summary": {
             key: outcome[key] for key in ("coverage", "steps", "energy_Wh", "all_home", "breaches")

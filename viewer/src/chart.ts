@@ -1,7 +1,7 @@
 // One small chart over time: lines that are told apart by dashes and numbers as well as colour,
 // and a cursor at the time of the page.
 
-import { stroke } from "./marks";
+import { noReturn, stroke } from "./marks";
 import { bright, colour } from "./palette";
 import { roundStep } from "./round_step";
 
@@ -11,6 +11,19 @@ export interface Line {
   /** One value per sample from t = 0. */
   values: number[];
   dash: number[];
+  /** Whose it is; the others are pale while one UAS is looked at. */
+  uas?: number;
+  /** A thin line that goes with another one: no number, no dot, no name. */
+  limit?: boolean;
+}
+
+/** A diamond on a line: at a sample and value, filled where it is serious, with words. */
+export interface Point {
+  sample: number;
+  value: number;
+  serious: boolean;
+  colour: string;
+  words: string;
 }
 
 export interface ChartContent {
@@ -26,6 +39,11 @@ export interface ChartContent {
   levels?: [number, string][];
   /** Samples to be marked on the first line. */
   marked?: number[];
+  points?: Point[];
+  /** Words in their colours, beside the title. */
+  legend?: [string, string][];
+  /** Values beyond the range are drawn at its edge. */
+  clipped?: boolean;
   steps?: boolean;
 }
 
@@ -33,6 +51,7 @@ export const LEFT = 40;
 export const RIGHT = 18;
 const TOP = 22;
 const FEW = 4;
+const MANY = 8;
 const BOTTOM = 5;
 
 export const DASHES = [[], [6, 3], [2, 3], [9, 3, 2, 3]];
@@ -44,6 +63,7 @@ export abstract class TimeCanvas {
   private readonly still = document.createElement("canvas");
   protected width = 0;
   protected height = 0;
+  protected focused: number | null = null;
 
   constructor(title: string, private readonly duration: number, seek: (time: number) => void) {
     this.canvas.className = "chart";
@@ -75,6 +95,13 @@ export abstract class TimeCanvas {
     this.pen.clearRect(0, 0, this.width, this.height);
     this.drawStill();
     this.still.getContext("2d")!.drawImage(this.canvas, 0, 0);
+  }
+
+  /** Look at one UAS; null: at all. */
+  focus(uas: number | null): void {
+    if (uas === this.focused) return;
+    this.focused = uas;
+    if (this.width > 0) this.resize();
   }
 
   draw(time: number): void {
@@ -116,9 +143,21 @@ export class Chart extends TimeCanvas {
   private readonly high: number;
   private readonly step: number;
 
-  constructor(private readonly content: ChartContent, duration: number, seek: (t: number) => void) {
+  private content: ChartContent;
+
+  /** @param contentOf what is to be seen while one UAS, or none, is looked at */
+  constructor(
+    private readonly contentOf: (focused: number | null) => ChartContent,
+    duration: number,
+    seek: (t: number) => void,
+  ) {
+    const content = contentOf(null);
     super(content.title, duration, seek);
-    const values = content.lines.flatMap((line) => line.values);
+    this.content = content;
+    const most = content.to ?? Infinity;
+    const values = content.lines
+      .flatMap((line) => line.values)
+      .filter((value) => !content.clipped || value <= most);
     const low = values.reduce((a, b) => Math.min(a, b), content.from ?? Infinity);
     const high = values.reduce((a, b) => Math.max(a, b), content.to ?? -Infinity);
     const range = Number.isFinite(high - low) && high > low ? high - low : 1;
@@ -128,9 +167,14 @@ export class Chart extends TimeCanvas {
   }
 
   protected drawStill(): void {
-    const { pen, content } = this;
+    const content = (this.content = this.contentOf(this.focused));
+    const { pen } = this;
     const [left, right] = [LEFT, this.width - RIGHT];
     this.write(content.title, 2, 9, colour("--ink"), "left", 600);
+    let beside = right;
+    for (const [word, hex] of [...(content.legend ?? [])].reverse()) {
+      beside -= this.write(word, beside, 9, bright(hex), "right", 600) + 8;
+    }
     pen.setLineDash([]);
     const first = Math.ceil(this.low / this.step - 1e-6);
     for (let n = first; n * this.step <= this.high * (1 + 1e-6); n++) {
@@ -146,8 +190,11 @@ export class Chart extends TimeCanvas {
       pen.setLineDash([]);
       this.write(words, left + 4, y + 7, colour("--faint"));
     }
-    for (const line of content.lines) this.line(line);
+    const together = content.lines.filter((line) => line.uas !== undefined && !line.limit);
+    if (together.length > MANY && this.focused === null) this.band(together);
+    else for (const line of content.lines) this.line(line);
     this.names();
+    for (const point of content.points ?? []) this.point(point);
     const marked = content.lines[0]?.values ?? [];
     for (const k of content.marked ?? []) {
       pen.fillStyle = colour("--discharged");
@@ -159,15 +206,17 @@ export class Chart extends TimeCanvas {
     const { pen, content } = this;
     const shown: [number, string][] = [];
     for (const line of [...content.lines].reverse()) {
+      if (line.limit || this.pale(line)) continue;
       const k = Math.min(line.values.length - 1, Math.floor(time / content.dt + 1e-6));
       if (k < 0) continue;
       const ink = bright(line.colour);
       pen.fillStyle = ink;
       pen.beginPath();
       pen.arc(this.x(k * content.dt), this.y(line.values[k]), 3, 0, 2 * Math.PI);
-      pen.fill();
+      if (content.lines.length <= MANY) pen.fill();
       shown.push([line.values[k], ink]);
     }
+    if (content.legend) return;
     let right = this.width - RIGHT;
     if (shown.length > FEW) {
       const [low, high] = [Math.min, Math.max].map((pick) => pick(...shown.map(([value]) => value)));
@@ -180,10 +229,62 @@ export class Chart extends TimeCanvas {
     }
   }
 
+  private pale(line: Line): boolean {
+    return this.focused !== null && line.uas !== undefined && line.uas !== this.focused;
+  }
+
+  /** Of many lines what is between the least and the greatest, and the one in the middle. */
+  private band(lines: Line[]): void {
+    const { pen, content } = this;
+    const samples = Math.max(...lines.map((line) => line.values.length));
+    const spread = Array.from({ length: samples }, (_, k) =>
+      // what has ended stays where it ended
+      lines.map((line) => line.values[Math.min(k, line.values.length - 1)]).sort((a, b) => a - b),
+    );
+    const along = (rank: number) => {
+      spread.forEach((sorted, k) => {
+        pen.lineTo(this.x(k * content.dt), this.y(sorted[Math.round(rank * (sorted.length - 1))]));
+      });
+    };
+    pen.fillStyle = colour("--accent");
+    pen.globalAlpha = 0.2;
+    pen.beginPath();
+    along(0);
+    spread.reverse();
+    spread.forEach((sorted, n) => {
+      pen.lineTo(this.x((samples - 1 - n) * content.dt), this.y(sorted.at(-1)!));
+    });
+    spread.reverse();
+    pen.fill();
+    pen.globalAlpha = 1;
+    for (const [rank, width] of [
+      [0, 1.6],
+      [0.5, 1],
+    ]) {
+      pen.strokeStyle = colour("--accent");
+      pen.lineWidth = width;
+      pen.beginPath();
+      along(rank);
+      pen.stroke();
+    }
+    const words = `least and median of ${lines.length}`;
+    this.write(words, this.width - RIGHT, this.height - BOTTOM - 10, colour("--faint"), "right");
+  }
+
+  private point({ sample, value, serious, colour: hex, words }: Point): void {
+    const [x, y] = [this.x(sample * this.content.dt), this.y(value)];
+    noReturn(this.pen, x, y, 5, serious, hex);
+    const left = x > this.width / 2;
+    const ink = serious ? colour("--discharged") : bright(hex);
+    const above = y - 12 > TOP ? y - 11 : y + 12;
+    this.write(words, left ? x - 6 : x + 6, above, ink, left ? "right" : "left", 600);
+  }
+
   private line(line: Line): void {
     const { pen, content } = this;
+    pen.globalAlpha = this.pale(line) ? 0.2 : 1;
     pen.strokeStyle = bright(line.colour);
-    pen.lineWidth = 1.6;
+    pen.lineWidth = line.limit ? 1 : 1.6;
     pen.lineJoin = "round";
     pen.setLineDash(line.dash);
     pen.beginPath();
@@ -194,15 +295,17 @@ export class Chart extends TimeCanvas {
     });
     pen.stroke();
     pen.setLineDash([]);
+    pen.globalAlpha = 1;
   }
 
   /** The number of each line where it ends, moved apart where two end together. */
   private names(): void {
     const { content } = this;
-    // the names of many would cover each other
-    if (content.lines.length < 2 || content.lines.length > 2 * FEW) return;
-    const ends = content.lines
-      .filter((line) => line.values.length > 0)
+    // the names of many would cover each other, and the readings above
+    const named = content.lines.filter((line) => !line.limit && !this.pale(line));
+    if (named.length < 2 || 11 * named.length > this.height - TOP) return;
+    const ends = named
+      .filter((line) => line.values.length > 0 && line.label !== "")
       .map((line) => ({
         line,
         x: this.x((line.values.length - 1) * content.dt) + 3,
@@ -222,6 +325,7 @@ export class Chart extends TimeCanvas {
 
   private y(value: number): number {
     const bottom = this.height - BOTTOM - 4;
-    return bottom - ((value - this.low) / (this.high - this.low)) * (bottom - TOP - 2);
+    const shown = this.content.clipped ? Math.min(this.high, Math.max(this.low, value)) : value;
+    return bottom - ((shown - this.low) / (this.high - this.low)) * (bottom - TOP - 2);
   }
 }

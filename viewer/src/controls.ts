@@ -3,6 +3,8 @@
 import { type Clock, SPEEDS } from "./clock";
 import { element } from "./dom";
 import type { Flight } from "./flight";
+import { kindOf, timed } from "./panel";
+import { TRAILS, type TrailKind } from "./trail";
 
 export interface ViewChoice {
   threeD: boolean;
@@ -14,6 +16,7 @@ export interface ControlEvents {
   follow(uas: number | null): void;
   overview(): void;
   top(): void;
+  trail(kind: TrailKind): void;
 }
 
 const KEYS: [string, string][] = [
@@ -25,6 +28,7 @@ const KEYS: [string, string][] = [
   ["O", "whole area"],
   ["T", "from above"],
   ["M", "map or 3D"],
+  ["C", "colour of the paths flown"],
   ["?", "this list"],
 ];
 
@@ -42,6 +46,7 @@ export class Controls {
   private readonly kind = button("", "Map or 3D (M)");
   private readonly top: HTMLButtonElement;
   private readonly followed = element("select", { "aria-label": "Follow", title: "Follow (1 … 9)" });
+  private readonly trails = element("select", { "aria-label": "Trails", title: "Colour of the paths flown (C)" });
   private readonly help = helpDialog();
 
   constructor(
@@ -58,6 +63,9 @@ export class Controls {
       element("option", { value: "" }, "Follow"),
       ...names.map(({ name }, i) => element("option", { value: String(i) }, `Follow ${name}`)),
     );
+    this.trails.append(
+      ...TRAILS.map(([kind, words]) => element("option", { value: kind }, `Trails ${words}`)),
+    );
     const overview = button("Overview", "Whole area (O)");
     this.top = button("Top", "From above (T)");
     const question = button("?", "Keys (?)");
@@ -66,7 +74,7 @@ export class Controls {
       "footer",
       { class: "controls" },
       element("div", { class: "row" }, this.play, this.track(flights), this.clockText, this.speed),
-      element("div", { class: "row views" }, this.kind, overview, this.top, this.followed, question),
+      element("div", { class: "row views" }, this.kind, overview, this.top, this.followed, this.trails, question),
       this.help,
     );
     this.kind.hidden = !has3d;
@@ -83,6 +91,7 @@ export class Controls {
       const { value } = this.followed;
       events.follow(value === "" ? null : Number(value));
     });
+    this.trails.addEventListener("change", () => events.trail(this.trails.value as TrailKind));
     this.kind.addEventListener("click", () => events.show(!choice.threeD));
     overview.addEventListener("click", () => events.overview());
     this.top.addEventListener("click", () => events.top());
@@ -110,15 +119,33 @@ export class Controls {
     this.followed.value = this.choice.followed === null ? "" : String(this.choice.followed);
   }
 
-  /** The slider, with a mark where a violation happened. */
+  /** The slider, with a mark at all that happened: a click leads there. */
   private track(flights: Flight[]): HTMLElement {
     const track = element("div", { class: "track" }, this.slider);
-    for (const { t_s } of flights.flatMap((flight) => flight.data.violations)) {
-      const mark = element("i", { class: "violation" });
-      mark.style.left = `${100 * Math.min(1, t_s / (this.clock.duration || 1))}%`;
+    const share = (time: number) => `${100 * Math.min(1, time / (this.clock.duration || 1))}%`;
+    for (const happened of flights.flatMap((flight) => flight.marks())) {
+      const { t_s, until_s, kind } = happened;
+      const mark = element("i", { class: kindOf(kind), role: "button", title: timed(happened) });
+      mark.setAttribute("aria-label", timed(happened));
+      mark.style.left = share(t_s);
+      mark.style.width = `max(4px, ${share(until_s - t_s)})`;
+      mark.addEventListener("click", () => {
+        this.clock.playing = false;
+        this.clock.seek(t_s);
+      });
       track.append(mark);
     }
     return track;
+  }
+
+  showTrail(kind: TrailKind): void {
+    this.trails.value = kind;
+    this.events.trail(kind);
+  }
+
+  private nextTrail(): void {
+    this.trails.selectedIndex = (this.trails.selectedIndex + 1) % TRAILS.length;
+    this.events.trail(this.trails.value as TrailKind);
   }
 
   private toggleHelp(): void {
@@ -158,6 +185,7 @@ export class Controls {
       "-": () => clock.faster(-1),
       o: () => events.overview(),
       t: () => events.top(),
+      c: () => this.nextTrail(),
       m: () => this.has3d && events.show(!choice.threeD),
       "?": () => this.toggleHelp(),
     };
@@ -195,7 +223,9 @@ function helpDialog(): HTMLDialogElement {
       "p",
       {},
       "A ring is a waypoint, a double ring one that counts more; it is filled and ticked once " +
-        "covered. The ring around a UAS is as long as its charge, green, yellow, red. Dots are " +
+        "covered. The ring around a UAS is as long as its charge, its notch is what the way home " +
+        "takes with margin: green while more than 5 % is left beyond that, red where it is too " +
+        "little. A diamond is where least was left, a red one the point of no return. Dots are " +
         "where the planner means to fly.",
     ),
     element("p", {}, "Drag to turn, wheel or two fingers to come closer, right button to move."),

@@ -5,17 +5,26 @@ import type { Flight, Series } from "./flight";
 import { shortName } from "./marks";
 import { ModeChart } from "./mode_chart";
 
+const FEW = 4;
+
 export function curves(
   flight: Flight,
   all: Flight[],
   duration: number,
   seek: (time: number) => void,
 ): TimeCanvas[] {
-  const contents = (each: Flight) => [charge(each), voltage(each), current(each), coverage(each)];
+  const contents = (each: Flight, focused: number | null = null) => [
+    charge(each, focused),
+    room(each, focused),
+    voltage(each),
+    current(each),
+    coverage(each),
+  ];
   const decisions = all.some((each) => each.data.duration.values.length > 0);
-  const charts = contents(flight).map((content, i) => {
+  const charts = contents(flight).map((_, i) => {
     const shared = all.flatMap((each) => values(contents(each)[i]));
-    return new Chart(widened(content, shared), duration, seek);
+    const of = (focused: number | null) => widened(contents(flight, focused)[i], shared);
+    return new Chart(of, duration, seek);
   });
   const modes = new ModeChart(flight, duration, seek);
   if (!decisions) return [...charts, modes];
@@ -25,19 +34,68 @@ export function curves(
   const [unit, scale] = longest * all[0].data.duration.unit < 0.1 ? ["ms", 1000] : ["s", 1];
   const content = (each: Flight) => decisionTime(each, unit as string, scale as number);
   const shared = all.flatMap((each) => values(content(each)));
-  return [...charts, modes, new Chart(widened(content(flight), shared), duration, seek)];
+  return [...charts, modes, new Chart(() => widened(content(flight), shared), duration, seek)];
 }
 
-function charge(flight: Flight): ChartContent {
+/** Charge, and what of it the way home takes with margin: where they meet is no return. */
+function charge(flight: Flight, focused: number | null): ChartContent {
   const floors = new Set(flight.scene.uas.map((uas) => uas.lowest_soc));
+  const looked = (i: number) => (focused === null ? flight.uas <= FEW : i === focused);
+  const needed = lines(flight, flight.data.needed, 100)
+    .filter((line) => looked(line.uas!))
+    .map((line) => ({ ...line, dash: [1.5, 2.5], limit: true }));
+  const points = flight.scene.uas.flatMap(({ colour }, i) => {
+    const passed = flight.data.no_return[i];
+    if (!flight.nearNoReturn(i, focused)) return [];
+    const [least, spare] = flight.data.least_spare[i];
+    const sample = passed ?? least;
+    const value = 100 * flight.column(flight.data.soc, i)[sample];
+    const words = passed === null ? `${(100 * spare).toFixed(1)} % to spare` : "no return";
+    return [{ sample, value, serious: passed !== null, colour, words }];
+  });
   return {
-    title: "Charge, %",
-    lines: lines(flight, flight.data.soc, 100),
+    title: "Charge, %; dotted: for home",
+    lines: [...lines(flight, flight.data.soc, 100), ...needed],
+    points,
     dt: flight.data.dt_s,
     show: (value) => `${value.toFixed(1)} %`,
     from: 0,
     to: 100,
     levels: [...floors].map((floor) => [100 * floor, "lowest allowed"]),
+  };
+}
+
+const ROOMS: Record<string, [string, string, number[]]> = {
+  obstacles: ["obstacles", "#8c564b", []],
+  moving: ["moving", "#c81e2d", [6, 3]],
+  others: ["UAS", "#0072b2", [2, 3]],
+  fence: ["fence", "#7f7f7f", [9, 3, 2, 3]],
+  height: ["height", "#b8860b", [4, 2]],
+};
+const NEAR_M = 20;
+
+/** Room beyond the safe distances of what is nearest: of one UAS, or the least of all. */
+function room(flight: Flight, focused: number | null): ChartContent {
+  const uas = flight.scene.uas.map((_, i) => i).filter((i) => focused === null || i === focused);
+  const kinds = Object.entries(flight.data.room);
+  return {
+    title: "Room, m",
+    lines: kinds.map(([kind, { values: whole, unit }]) => ({
+      label: "",
+      colour: ROOMS[kind][1],
+      values: Array.from(
+        { length: Math.max(...uas.map((i) => flight.data.last[i])) + 1 },
+        (_, k) => Math.min(...uas.map((i) => whole[k * flight.uas + i] * unit)),
+      ),
+      dash: ROOMS[kind][2],
+    })),
+    legend: kinds.map(([kind]) => [ROOMS[kind][0], ROOMS[kind][1]]),
+    dt: flight.data.dt_s,
+    show: (value) => (value >= NEAR_M ? "far" : value.toFixed(1)),
+    from: -1,
+    to: NEAR_M,
+    levels: [[0, "safe distance"]],
+    clipped: true,
   };
 }
 
@@ -94,6 +152,7 @@ function lines(flight: Flight, series: Series, scale: number): Line[] {
     colour: uas.colour,
     values: flight.column(series, i).map((value) => value * scale),
     dash: DASHES[i % DASHES.length],
+    uas: i,
   }));
 }
 
@@ -102,6 +161,7 @@ function values(content: ChartContent): number[] {
 }
 
 function widened(content: ChartContent, shared: number[]): ChartContent {
+  if (content.clipped) shared = shared.filter((value) => value <= content.to!);
   return {
     ...content,
     from: shared.reduce((a, b) => Math.min(a, b), content.from ?? Infinity),

@@ -40,6 +40,15 @@ export interface Violation {
   limit?: number;
 }
 
+/** What happened, and why; it may last. Violations are apart. */
+export interface Mark {
+  t_s: number;
+  until_s: number;
+  kind: string;
+  uas: string | null;
+  text: string;
+}
+
 export interface FlightData {
   planner: string;
   seed: number;
@@ -50,6 +59,18 @@ export interface FlightData {
   position: Series;
   attitude: Series;
   soc: Series;
+  /** Charge below which coming home is not sure. */
+  needed: Series;
+  /** Altitude of the roof, or the ground, under each UAS. */
+  floor: Series;
+  /** Room beyond the safe distances by kind of what is near. */
+  room: Record<string, Series>;
+  min_height_m: number;
+  /** Sample of the point of no return of each UAS, where it was passed. */
+  no_return: (number | null)[];
+  /** Of each UAS the sample with the least charge beyond the way home, and that charge. */
+  least_spare: [number, number][];
+  marks: Mark[];
   voltage: Series;
   current: Series;
   moving: Series;
@@ -75,6 +96,8 @@ export interface VehicleMoment {
   position: Point3;
   attitude: Point3;
   soc: number;
+  /** Charge beyond what the way home takes with margin. */
+  spare: number;
   speed: number;
   mode: string;
 }
@@ -87,6 +110,9 @@ export interface Moment {
   moving: Point3[];
   covered: number;
 }
+
+const FEW = 8;
+const LITTLE_SPARE = 0.1;
 
 export class Flight {
   readonly scene: Scene;
@@ -140,6 +166,32 @@ export class Flight {
     return (steps[sample]?.[i] ?? []).map((value) => value * unit);
   }
 
+  /** Whether it matters where a UAS had least charge beyond the way home: is it looked at? */
+  nearNoReturn(i: number, focused: number | null): boolean {
+    if (this.data.no_return[i] !== null || focused === i) return true;
+    return focused === null && this.uas <= FEW && this.data.least_spare[i][1] < LITTLE_SPARE;
+  }
+
+  /** What is going on at a time: the marks that last, the violations of that sample. */
+  at(time: number): Mark[] {
+    const near = 0.5 * this.data.dt_s;
+    return this.marks().filter(
+      ({ t_s, until_s }) => t_s - near < time + 1e-6 && time < until_s + near,
+    );
+  }
+
+  /** Violations and all else that happened, in order of time. */
+  marks(): Mark[] {
+    const violations = this.data.violations.map((violation) => ({
+      t_s: violation.t_s,
+      until_s: violation.t_s,
+      kind: "violation",
+      uas: violation.uas,
+      text: words(violation),
+    }));
+    return [...violations, ...this.data.marks].sort((a, b) => a.t_s - b.t_s);
+  }
+
   where(violation: Violation): Point3 {
     const i = this.scene.uas.findIndex((uas) => uas.name === violation.uas);
     const sample = Math.min(Math.round(violation.t_s / this.data.dt_s), this.data.samples - 1);
@@ -147,15 +199,18 @@ export class Flight {
   }
 
   private vehicle(sample: number, part: number, i: number): VehicleMoment {
-    const { attitude, soc, dt_s, samples } = this.data;
+    const { attitude, soc, needed, dt_s, samples } = this.data;
     const next = Math.min(sample + 1, samples - 1);
     const from = this.position(sample, i);
     const to = this.position(next, i);
     const [before, after] = [sample, next].map((k) => soc.values[k * this.uas + i] * soc.unit);
+    const [less, more] = [sample, next].map((k) => needed.values[k * this.uas + i] * needed.unit);
+    const charge = before + part * (after - before);
     return {
       position: mix(from, to, part),
       attitude: this.between(attitude, sample, part, i, this.uas),
-      soc: before + part * (after - before),
+      soc: charge,
+      spare: charge - less - part * (more - less),
       speed: Math.hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]) / dt_s,
       mode: this.mode(sample, i),
     };
@@ -165,6 +220,16 @@ export class Flight {
     const next = Math.min(sample + 1, this.data.samples - 1);
     return mix(point(series, sample * width + i), point(series, next * width + i), part);
   }
+}
+
+/** A violation in words, without its time. */
+export function words({ uas, kind, with: partner, value, limit }: Violation): string {
+  if (kind === "limit") {
+    const numbers = `${value?.toPrecision(3)} of ${limit?.toPrecision(3)}`;
+    return `${uas} beyond its limit of ${partner?.replaceAll("_", " ")}, ${numbers}`;
+  }
+  const what = kind.replaceAll("_", " ");
+  return `${uas}, ${what} contact${partner ? ` with ${partner}` : ""}`;
 }
 
 function point(series: Series, row: number): Point3 {

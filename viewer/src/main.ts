@@ -6,6 +6,7 @@ import { element } from "./dom";
 import { Flight, type FlightData } from "./flight";
 import { onThemeChange } from "./palette";
 import { Panel } from "./panel";
+import { Trail, TRAILS, type TrailKind } from "./trail";
 
 const data: FlightData[] = JSON.parse(document.getElementById("flights")!.textContent!);
 const flights = data.map((each) => new Flight(each));
@@ -35,6 +36,7 @@ const controls = new Controls(clock, flights, choice, has3d, {
   follow,
   overview: () => frame("overview"),
   top: () => frame("top"),
+  trail: colourTrails,
 });
 controls.sampleTime = Math.min(...data.map((each) => each.dt_s));
 
@@ -61,12 +63,18 @@ function frame(how: "overview" | "top"): void {
   invalidate();
 }
 
+function colourTrails(kind: TrailKind): void {
+  const trail = new Trail(kind, flights);
+  for (const panel of panels) panel.setTrail(trail);
+  invalidate();
+}
+
 function resize(): void {
   for (const panel of panels) panel.resize();
   invalidate();
 }
 
-// "#t=60&follow=2&view=map": a moment to link to
+// "#t=60&follow=2&view=map&trail=power": a moment to link to
 function readAddress(): void {
   const wanted = new URLSearchParams(location.hash.slice(1));
   const number = (name: string) => Number(wanted.get(name) ?? NaN);
@@ -74,6 +82,8 @@ function readAddress(): void {
   if (number("follow") >= 1 && number("follow") <= flights[0].uas) {
     choice.followed = number("follow") - 1;
   }
+  const trail = TRAILS.find(([kind]) => kind === wanted.get("trail"));
+  if (trail) controls.showTrail(trail[0]);
   show(wanted.get("view") !== "map");
 }
 

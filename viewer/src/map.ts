@@ -5,6 +5,7 @@ import type { Flight, Moment, Point2, Point3 } from "./flight";
 import * as marks from "./marks";
 import { bright, colour, darker, dim } from "./palette";
 import { roundStep } from "./round_step";
+import { Trail } from "./trail";
 import type { View } from "./view";
 
 const FOLLOWED_ZOOM = 3;
@@ -15,6 +16,7 @@ export class MapView implements View {
   private readonly high: Point2;
   private readonly gridStep: number;
   private followed: number | null = null;
+  private trail: Trail;
   /** Size of marks: smaller on a small map. */
   private unit = 1;
   private scale = 1;
@@ -22,6 +24,7 @@ export class MapView implements View {
 
   constructor(readonly canvas: HTMLCanvasElement, private readonly flight: Flight) {
     this.pen = canvas.getContext("2d")!;
+    this.trail = new Trail("uas", [flight]);
     const { outline } = flight.scene.fence;
     const [north, east] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
     this.low = [Math.min(...north), Math.min(...east)];
@@ -41,6 +44,10 @@ export class MapView implements View {
 
   follow(uas: number | null): void {
     this.followed = uas;
+  }
+
+  setTrail(trail: Trail): void {
+    this.trail = trail;
   }
 
   overview(): void {
@@ -70,7 +77,18 @@ export class MapView implements View {
       marks.cross(pen, x, y, 9);
       pen.globalAlpha = 1;
     });
+    flight.scene.uas.forEach((_, i) => this.noReturn(moment, i));
     flight.scene.uas.forEach((_, i) => this.vehicle(moment, i));
+  }
+
+  private noReturn(moment: Moment, i: number): void {
+    const passed = this.flight.data.no_return[i];
+    const sample = passed ?? this.flight.data.least_spare[i][0];
+    if (!this.flight.nearNoReturn(i, this.followed)) return;
+    const [x, y] = this.pixel(this.flight.position(sample, i));
+    this.pen.globalAlpha = sample <= moment.sample ? 1 : 0.35;
+    marks.noReturn(this.pen, x, y, 7 * this.unit, passed !== null, this.flight.scene.uas[i].colour);
+    this.pen.globalAlpha = 1;
   }
 
   private frame(moment: Moment): void {
@@ -165,11 +183,19 @@ export class MapView implements View {
     pen.strokeStyle = pen.fillStyle = ink;
     pen.lineWidth = 2;
     pen.lineJoin = "round";
-    pen.beginPath();
-    for (let k = 0; k <= Math.min(moment.sample, flight.data.last[i]); k++) {
-      pen.lineTo(...this.pixel(flight.position(k, i)));
+    const flown = Math.min(moment.sample, flight.data.last[i]);
+    for (let k = 0; k <= flown; k++) {
+      // one line as long as its colour is the same
+      const paint = this.trail.colour(flight, i, k) ?? ink;
+      if (k === 0 || paint !== pen.strokeStyle) {
+        if (k > 0) pen.stroke();
+        pen.strokeStyle = paint;
+        pen.beginPath();
+        pen.moveTo(...this.pixel(flight.position(k, i)));
+      }
+      const to = k < flown ? flight.position(k + 1, i) : moment.vehicles[i].position;
+      pen.lineTo(...this.pixel(to));
     }
-    pen.lineTo(...this.pixel(moment.vehicles[i].position));
     pen.stroke();
     const predicted = flight.predicted(moment.sample, i);
     for (let n = 0; n + 2 < predicted.length; n += 3) {
@@ -201,14 +227,14 @@ export class MapView implements View {
 
   private vehicle(moment: Moment, i: number): void {
     const { pen } = this;
-    const { position, attitude, soc, mode } = moment.vehicles[i];
+    const { position, attitude, soc, spare, mode } = moment.vehicles[i];
     const { name, colour: hex } = this.flight.scene.uas[i];
     const [x, y] = this.pixel(position);
-    const { unit } = this;
+    const unit = this.unit * (this.followed === null ? marks.ofMany(this.flight.uas) : 1);
     if (mode === "lost") marks.cross(pen, x, y, 10 * unit);
     else if (mode === "landed") marks.landed(pen, x, y, 5 * unit, hex);
     else {
-      marks.charge(pen, x, y, 14 * unit, soc, marks.shortName(name), hex);
+      marks.charge(pen, x, y, 14 * unit, soc, spare, marks.shortName(name), hex);
       marks.vehicle(pen, x, y, 8 * unit, attitude[2], hex);
     }
   }

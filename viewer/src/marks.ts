@@ -1,7 +1,7 @@
 // What stands for a waypoint, a vehicle, a violation: drawn alike on the map and, as small
 // pictures, in the 3D scene. What has a meaning has a shape, not only a colour.
 
-import { bright, colour, ofCharge } from "./palette";
+import { bright, colour, ofSpare } from "./palette";
 
 type Pen = CanvasRenderingContext2D;
 
@@ -42,13 +42,14 @@ export function waypoint(
   }
 }
 
-/** The ring that is as long and as green as the charge, and whose it is. */
+/** The ring that is as long as the charge, with a notch where it is needed for home; whose. */
 export function charge(
   pen: Pen,
   x: number,
   y: number,
   radius: number,
   soc: number,
+  spare: number,
   label: string,
   hex: string,
 ): void {
@@ -56,7 +57,11 @@ export function charge(
   pen.lineCap = "butt";
   ring(pen, x, y, radius, whole, 0.36 * radius, colour("--halo"));
   ring(pen, x, y, radius, whole, 0.08 * radius, colour("--faint"));
-  ring(pen, x, y, radius, whole * Math.min(1, Math.max(0, soc)), 0.26 * radius, ofCharge(soc));
+  ring(pen, x, y, radius, whole * Math.min(1, Math.max(0, soc)), 0.26 * radius, ofSpare(spare));
+  const needed = whole * Math.min(1, Math.max(0, soc - spare)) - Math.PI / 2;
+  const [dx, dy] = [Math.cos(needed), Math.sin(needed)];
+  const [from, to] = [0.8 * radius, 1.25 * radius];
+  stroke(pen, x + from * dx, y + from * dy, x + to * dx, y + to * dy, 0.16 * radius, colour("--ink"));
   words(pen, label, x + 1.25 * radius, y - 1.05 * radius, 1.05 * radius, bright(hex));
 }
 
@@ -116,6 +121,21 @@ export function cross(pen: Pen, x: number, y: number, arm: number): void {
   }
 }
 
+/** A diamond where least charge was left beyond the way home; filled: the point of no return. */
+export function noReturn(pen: Pen, x: number, y: number, arm: number, passed: boolean, hex: string): void {
+  pen.beginPath();
+  pen.moveTo(x, y - arm);
+  pen.lineTo(x + arm, y);
+  pen.lineTo(x, y + arm);
+  pen.lineTo(x - arm, y);
+  pen.closePath();
+  pen.fillStyle = passed ? colour("--discharged") : colour("--halo");
+  pen.strokeStyle = passed ? colour("--ink") : bright(hex);
+  pen.lineWidth = 0.3 * arm;
+  pen.fill();
+  pen.stroke();
+}
+
 /** Words with an edge that keeps them readable on any ground. */
 export function words(
   pen: Pen,
@@ -152,6 +172,11 @@ export function stroke(
   pen.moveTo(x1, y1);
   pen.lineTo(x2, y2);
   pen.stroke();
+}
+
+/** Marks of many UAS are smaller, so that they do not hide each other and the waypoints. */
+export function ofMany(uas: number): number {
+  return Math.max(0.4, Math.min(1, Math.sqrt(8 / uas)));
 }
 
 /** What a UAS is called on the map: the end of its name. */

@@ -6,6 +6,9 @@ import { shortName } from "./marks";
 import { bright, colour } from "./palette";
 
 const TOP = 20;
+/** Height of a row of charts, of which a chart of many takes several. */
+const ROW_PX = 94;
+const WORDS_PX = 11;
 
 /** [custom property of the style, colour of words on it] */
 const PAINT: Record<string, [string, string]> = {
@@ -19,7 +22,8 @@ const PAINT: Record<string, [string, string]> = {
 export class ModeChart extends TimeCanvas {
   constructor(private readonly flight: Flight, duration: number, seek: (time: number) => void) {
     super("Operation modes", duration, seek);
-    this.canvas.style.minHeight = `${TOP + 8 + flight.uas * 15}px`;
+    const high = TOP + 8 + flight.uas * (flight.uas > 6 ? 7 : 15);
+    this.canvas.style.gridRow = `span ${Math.ceil(high / ROW_PX)}`;
   }
 
   protected drawStill(): void {
@@ -36,8 +40,12 @@ export class ModeChart extends TimeCanvas {
     this.flight.scene.uas.forEach((uas, i) => {
       const y = TOP + i * height;
       const ink = bright(uas.colour);
-      this.write(shortName(uas.name), 35, y + height / 2, ink, "right", 600);
-      for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - 3);
+      // of many every fifth has room for its number
+      if (height >= WORDS_PX || i % 5 === 4) {
+        this.write(shortName(uas.name), 35, y + height / 2, ink, "right", 600);
+      }
+      const gap = height >= WORDS_PX ? 3 : 1;
+      for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - gap);
     });
   }
 
@@ -51,7 +59,7 @@ export class ModeChart extends TimeCanvas {
     pen.fillStyle = colour(paint);
     pen.fillRect(x, y, Math.max(1.5, end - x - 1), height);
     pen.font = "400 11px system-ui, sans-serif";
-    if (pen.measureText(mode).width + 8 < end - x) this.write(mode, x + 4, y + height / 2, ink);
+    if (height >= WORDS_PX + 1 && pen.measureText(mode).width + 8 < end - x) this.write(mode, x + 4, y + height / 2, ink);
   }
 
   /** [mode, first sample, first sample of the next], in order of time. */

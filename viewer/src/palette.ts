@@ -42,9 +42,11 @@ export function darker(hex: string, share: number): string {
   return mixed(hex, 0, share);
 }
 
-/** Green, yellow or red for a charged, half-charged or discharged battery, as in the paper. */
-export function ofCharge(soc: number): string {
-  return colour(soc > 0.6 ? "--charged" : soc > 0.35 ? "--half" : "--discharged");
+const LITTLE = 0.05;
+
+/** Green: enough charge for the way home with margin; yellow: little more; red: not enough. */
+export function ofSpare(spare: number): string {
+  return colour(spare > LITTLE ? "--charged" : spare > 0 ? "--half" : "--discharged");
 }
 
 function mixed(hex: string, towards: number, share: number): string {

@@ -4,9 +4,12 @@ import { Cards } from "./cards";
 import type { TimeCanvas } from "./chart";
 import { curves } from "./curves";
 import { element } from "./dom";
-import type { Flight, Violation } from "./flight";
+import { type Flight, type Mark, words } from "./flight";
 import { MapView } from "./map";
+import { ProfileChart } from "./profile";
+import { rampStops } from "./ramp";
 import { SceneView, webgl } from "./scene";
+import { TRAILS, type Trail } from "./trail";
 import type { Pose, View } from "./view";
 
 export interface PanelEvents {
@@ -28,6 +31,9 @@ export class Panel {
   private view: View;
   private readonly cards: Cards;
   private readonly charts: TimeCanvas[];
+  private readonly now = element("ul", { class: "now", "aria-live": "polite", "aria-label": "Now" });
+  private readonly legend = element("div", { class: "legend" });
+  private shownNow = "";
 
   constructor(
     readonly flight: Flight,
@@ -47,19 +53,24 @@ export class Panel {
     this.map = new MapView(mapCanvas, flight);
     this.view = this.scene ?? this.map;
     this.cards = new Cards(flight, (i) => events.follow(i));
-    this.charts = curves(flight, all, duration, events.seek);
-    this.stage.append(this.sceneCanvas, mapCanvas);
+    const profile = new ProfileChart(flight, all, duration, events.seek);
+    const beside = curves(flight, all, duration, events.seek);
+    this.charts = [profile, ...beside];
+    this.legend.hidden = true;
+    this.stage.append(this.sceneCanvas, mapCanvas, this.now, this.legend);
     this.element = element(
       "section",
       { class: "flight" },
       element("header", {}, element("h1", {}, title(flight)), element("p", {}, outcome(flight))),
       this.stage,
+      element("div", { class: "below" }, profile.canvas),
       element(
         "div",
         { class: "side", "data-title": title(flight) },
         this.cards.element,
         ...this.violations(),
-        element("div", { class: "charts" }, ...this.charts.map((chart) => chart.canvas)),
+        ...this.marks(),
+        element("div", { class: "charts" }, ...beside.map((chart) => chart.canvas)),
       ),
     );
     this.show(this.has3d);
@@ -93,7 +104,29 @@ export class Panel {
     for (const view of [this.scene, this.map]) view?.follow(uas);
     this.view.draw(moment);
     this.cards.draw(moment, uas);
-    for (const chart of this.charts) chart.draw(moment.time);
+    for (const chart of this.charts) {
+      chart.focus(uas);
+      chart.draw(moment.time);
+    }
+    this.say(this.flight.at(time));
+  }
+
+  /** What is going on now, each with its reason. */
+  private say(marks: Mark[]): void {
+    const shown = marks.map(({ text }) => text).join("\n");
+    if (shown === this.shownNow) return;
+    this.shownNow = shown;
+    this.now.replaceChildren(...marks.map(({ kind, text }) => element("li", { class: kindOf(kind) }, text)));
+  }
+
+  setTrail(trail: Trail): void {
+    for (const view of [this.scene, this.map]) view?.setTrail(trail);
+    const [, words, unit, digits] = TRAILS.find(([kind]) => kind === trail.kind)!;
+    this.legend.hidden = trail.kind === "uas";
+    const bar = element("i");
+    bar.style.background = `linear-gradient(to right, ${rampStops()})`;
+    const [low, high] = [trail.low, trail.high].map((value) => value.toFixed(digits));
+    this.legend.replaceChildren(`${words.replace("by ", "")}: ${low}`, bar, `${high} ${unit}`);
   }
 
   overview(): void {
@@ -110,11 +143,33 @@ export class Panel {
 
   private violations(): HTMLElement[] {
     const list = this.flight.data.violations.map((violation) => {
-      const button = element("button", { type: "button" }, words(violation));
+      const button = element("button", { type: "button" }, `${violation.t_s} s: ${words(violation)}`);
       button.addEventListener("click", () => this.events.seek(violation.t_s));
       return element("li", {}, button);
     });
     return list.length === 0 ? [] : [element("ul", { class: "violations" }, ...list)];
+  }
+
+  /** All else that happened, in a list that opens. */
+  private marks(): HTMLElement[] {
+    const { marks } = this.flight.data;
+    if (marks.length === 0) return [];
+    const list = marks.map((mark) => {
+      const button = element("button", { type: "button", class: kindOf(mark.kind) }, timed(mark));
+      button.addEventListener("click", () => this.events.seek(mark.t_s));
+      return element("li", {}, button);
+    });
+    const counts = new Map<string, number>();
+    for (const { kind } of marks) counts.set(kind, (counts.get(kind) ?? 0) + 1);
+    const summary = [...counts].map(([kind, n]) => `${n} × ${kind}`).join(", ");
+    return [
+      element(
+        "details",
+        { class: "marks" },
+        element("summary", {}, summary),
+        element("ul", {}, ...list),
+      ),
+    ];
   }
 }
 
@@ -137,11 +192,11 @@ function outcome(flight: Flight): string {
   ].join(" · ");
 }
 
-function words({ t_s, uas, kind, with: partner, value, limit }: Violation): string {
-  if (kind === "limit") {
-    const numbers = `${value?.toPrecision(3)} of ${limit?.toPrecision(3)}`;
-    return `${t_s} s: ${uas} beyond its limit of ${partner?.replaceAll("_", " ")}, ${numbers}`;
-  }
-  const what = kind.replaceAll("_", " ");
-  return `${t_s} s: ${uas}, ${what} contact${partner ? ` with ${partner}` : ""}`;
+/** A kind of mark as a class of the style. */
+export function kindOf(kind: string): string {
+  return `mark ${kind.replaceAll(" ", "-")}`;
+}
+
+export function timed({ t_s, until_s, text }: Mark): string {
+  return `${t_s}${until_s > t_s ? ` to ${until_s}` : ""} s: ${text}`;
 }

@@ -2,12 +2,14 @@
 
 import { AmbientLight, Color, DirectionalLight, PCFShadowMap, Scene, WebGLRenderer } from "three";
 import type { Flight, Moment } from "./flight";
+import { ofMany } from "./marks";
 import { colour } from "./palette";
 import { Camera } from "./scene_camera";
 import { place } from "./scene_space";
 import { extentOf, terrain, type Extent } from "./scene_terrain";
-import { MovingObstacles, Violations, Waypoints } from "./scene_things";
+import { MovingObstacles, NoReturns, Violations, Waypoints } from "./scene_things";
 import { Vehicles } from "./scene_vehicles";
+import { Trail } from "./trail";
 import type { Pose, View } from "./view";
 
 /** A context for a scene, or null where this browser has none. */
@@ -24,6 +26,8 @@ export class SceneView implements View {
   private waypoints!: Waypoints;
   private moving!: MovingObstacles;
   private violations!: Violations;
+  private noReturns!: NoReturns;
+  private trail: Trail;
   private followed: number | null = null;
   private framed: "overview" | "top" | null = "overview";
 
@@ -36,6 +40,7 @@ export class SceneView implements View {
     private readonly flight: Flight,
     moved: (pose: Pose | null) => void,
   ) {
+    this.trail = new Trail("uas", [flight]);
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -56,10 +61,12 @@ export class SceneView implements View {
     // marks are smaller in a small picture
     const size = Math.min(1, Math.max(0.6, Math.min(width, 1.3 * height) / 800));
     const pixel = (size * 2 * Math.tan((lens.fov * Math.PI) / 360)) / height;
-    this.vehicles.draw(moment, pixel, (i) => lens.position.distanceTo(positions[i]));
+    const crowded = pixel * (this.followed === null ? ofMany(this.flight.uas) : 1);
+    this.vehicles.draw(moment, crowded, (i) => lens.position.distanceTo(positions[i]));
     this.waypoints.draw(moment);
     this.moving.draw(moment, pixel);
     this.violations.draw(moment, pixel);
+    this.noReturns.draw(moment, pixel, this.followed);
     this.renderer.render(this.scene, lens);
   }
 
@@ -83,15 +90,18 @@ export class SceneView implements View {
     this.scene = new Scene();
     this.scene.background = new Color(colour("--outside"));
     this.vehicles = new Vehicles(this.flight, ground);
+    this.vehicles.setTrail(this.trail);
     this.waypoints = new Waypoints(this.flight, ground);
     this.moving = new MovingObstacles(this.flight);
     this.violations = new Violations(this.flight);
+    this.noReturns = new NoReturns(this.flight);
     this.scene.add(
       terrain(this.flight.scene, this.extent),
       this.waypoints.group,
       this.moving.group,
       this.vehicles.group,
       this.violations.group,
+      this.noReturns.group,
       new AmbientLight("#ffffff", 1.65),
       sun(centre.x, ground, centre.z, half),
     );
@@ -101,6 +111,11 @@ export class SceneView implements View {
   follow(uas: number | null): void {
     this.followed = uas;
     if (uas !== null) this.framed = null;
+  }
+
+  setTrail(trail: Trail): void {
+    this.trail = trail;
+    this.vehicles.setTrail(trail);
   }
 
   overview(): void {

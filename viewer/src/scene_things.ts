@@ -15,7 +15,7 @@ import {
   SpriteMaterial,
 } from "three";
 import type { Flight, Moment } from "./flight";
-import { cross, waypoint, words } from "./marks";
+import { cross, noReturn, waypoint, words } from "./marks";
 import { colour } from "./palette";
 import { badge, drawn } from "./scene_sprites";
 import { place } from "./scene_space";
@@ -120,6 +120,31 @@ export class Violations {
       sprite.scale.setScalar(60 * pixel);
       sprite.material.opacity = time <= moment.time + 1e-6 ? 1 : 0.35;
     }
+  }
+}
+
+/** Diamonds at the points of no return, or where least charge was left beyond the way home. */
+export class NoReturns {
+  readonly group = new Group();
+  private readonly marks: { sprite: Sprite; sample: number }[];
+
+  constructor(private readonly flight: Flight) {
+    this.marks = flight.scene.uas.map((uas, i) => {
+      const passed = flight.data.no_return[i] !== null;
+      const sample = flight.data.no_return[i] ?? flight.data.least_spare[i][0];
+      const sprite = badge(drawn((pen, px) => noReturn(pen, px / 2, px / 2, 0.3 * px, passed, uas.colour)));
+      sprite.position.copy(place(flight.position(sample, i)));
+      this.group.add(sprite);
+      return { sprite, sample };
+    });
+  }
+
+  draw(moment: Moment, pixel: number, followed: number | null): void {
+    this.marks.forEach(({ sprite, sample }, i) => {
+      sprite.visible = this.flight.nearNoReturn(i, followed);
+      sprite.scale.setScalar(26 * pixel);
+      sprite.material.opacity = sample <= moment.sample ? 1 : 0.35;
+    });
   }
 }
 

@@ -5,6 +5,7 @@ import {
   BufferAttribute,
   BufferGeometry,
   CanvasTexture,
+  Color,
   CylinderGeometry,
   DoubleSide,
   Euler,
@@ -24,11 +25,13 @@ import { LineGeometry } from "three/addons/lines/LineGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import type { Flight, Moment, VehicleMoment } from "./flight";
 import { charge, cross, landed, shortName } from "./marks";
-import { bright, colour } from "./palette";
+import { bright, colour, ofSpare } from "./palette";
 import { badge, drawn, redraw } from "./scene_sprites";
 import { place } from "./scene_space";
+import type { Trail } from "./trail";
 
 const MOST_PREDICTED = 256;
+const WIDTH_PX = 2.4;
 
 export class Vehicles {
   readonly group = new Group();
@@ -37,6 +40,10 @@ export class Vehicles {
   constructor(flight: Flight, ground: number) {
     this.parts = flight.scene.uas.map((_, i) => new VehicleParts(flight, i, ground));
     for (const part of this.parts) this.group.add(part.group);
+  }
+
+  setTrail(trail: Trail): void {
+    for (const part of this.parts) part.setTrail(trail);
   }
 
   /** Sizes in pixels become sizes in the scene by the height of one pixel at distance 1. */
@@ -53,6 +60,8 @@ class VehicleParts {
   private ringShows = "";
   private readonly path: Line2;
   private readonly latest: Line2;
+  private readonly latestPaint: LineMaterial;
+  private trail: Trail | null = null;
   private readonly drop: Line;
   private readonly predicted: Line;
   private readonly predictedDots: Points;
@@ -74,8 +83,9 @@ class VehicleParts {
     }
     // a line needs two points
     if (samples.length === 3) samples.push(...samples);
-    this.path = wide(samples, ink);
-    this.latest = wide([0, 0, 0, 0, 0, 0], ink);
+    this.path = wide(samples, new LineMaterial({ vertexColors: true, linewidth: WIDTH_PX }));
+    this.latestPaint = new LineMaterial({ color: ink, linewidth: WIDTH_PX });
+    this.latest = wide([0, 0, 0, 0, 0, 0], this.latestPaint);
     this.drop = new Line(points(2), new LineBasicMaterial({ color: ink }));
     this.predicted = new Line(
       points(MOST_PREDICTED),
@@ -95,6 +105,16 @@ class VehicleParts {
     this.group.add(this.predicted, this.predictedDots);
     // their extents change with every moment
     for (const part of this.group.children) part.frustumCulled = false;
+  }
+
+  setTrail(trail: Trail): void {
+    this.trail = trail;
+    const ink = bright(this.flight.scene.uas[this.i].colour);
+    const colours: number[] = [];
+    for (let k = 0; k <= Math.max(1, this.flight.data.last[this.i]); k++) {
+      colours.push(...new Color(trail.colour(this.flight, this.i, k) ?? ink).toArray());
+    }
+    this.path.geometry.setColors(colours);
   }
 
   draw(moment: Moment, pixel: number, distance: number): void {
@@ -127,6 +147,9 @@ class VehicleParts {
     this.path.geometry.instanceCount = flown;
     this.path.visible = flown > 0;
     const from = place(this.flight.position(flown, this.i)).toArray();
+    const paint = this.trail?.colour(this.flight, this.i, flown);
+    if (paint) this.latestPaint.color.set(paint);
+    else this.latestPaint.color.set(bright(this.flight.scene.uas[this.i].colour));
     this.latest.visible = moment.sample < this.flight.data.last[this.i];
     // in place: new positions would be new memory of the graphics card in every picture
     const { data } = this.latest.geometry.getAttribute("instanceStart") as InterleavedBufferAttribute;
@@ -137,14 +160,15 @@ class VehicleParts {
   /** The ring is drawn anew only when it looks different. */
   private drawRing(vehicle: VehicleMoment): void {
     const { name, colour: hex } = this.flight.scene.uas[this.i];
-    const shows = `${Math.round(200 * vehicle.soc)} ${vehicle.mode}`;
+    const { soc, spare, mode } = vehicle;
+    const shows = `${Math.round(200 * soc)} ${Math.round(200 * spare)} ${ofSpare(spare)} ${mode}`;
     if (shows === this.ringShows) return;
     this.ringShows = shows;
     redraw(this.ringTexture, (pen, px) => {
       const middle = px / 2;
       if (vehicle.mode === "lost") cross(pen, middle, middle, 0.17 * px);
       else if (vehicle.mode === "landed") landed(pen, middle, middle, 0.09 * px, hex);
-      else charge(pen, middle, middle, 0.27 * px, vehicle.soc, shortName(name), hex);
+      else charge(pen, middle, middle, 0.27 * px, soc, spare, shortName(name), hex);
     });
   }
 }
@@ -183,10 +207,10 @@ function quadcopter(ink: string): Group {
   return group;
 }
 
-function wide(values: number[], ink: string): Line2 {
+function wide(values: number[], paint: LineMaterial): Line2 {
   const geometry = new LineGeometry();
   geometry.setPositions(values);
-  return new Line2(geometry, new LineMaterial({ color: ink, linewidth: 2.4 }));
+  return new Line2(geometry, paint);
 }
 
 function points(count: number): BufferGeometry {

@@ -1,6 +1,7 @@
 // A view draws one flight at a moment: the 3D scene, or the map where there is no WebGL.
 
 import type { Moment } from "./flight";
+import type { Trail } from "./trail";
 
 /** Where a 3D camera looks from: its offset from what it looks at, and that point. */
 export interface Pose {
@@ -17,6 +18,8 @@ export interface View {
   repaint(): void;
   /** Keep a UAS in the middle; null: the whole area. */
   follow(uas: number | null): void;
+  /** Colour the paths flown. */
+  setTrail(trail: Trail): void;
   overview(): void;
   top(): void;
 }

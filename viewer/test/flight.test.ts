@@ -69,3 +69,25 @@ test("a flight that Python wrote is read as Python recorded it", () => {
     assert.equal(moment.covered, covered);
   }
 });
+
+test("charge to spare is what is left beyond the way home", () => {
+  const flight = new Flight(someFlight());
+  const [first, second] = flight.moment(0.25).vehicles;
+  assert.ok(Math.abs(first.spare - (0.995 - 0.225)) < 1e-9);
+  assert.ok(Math.abs(second.spare - (0.895 - 0.25)) < 1e-9);
+});
+
+test("a mark is told of while it lasts, a violation at its sample", () => {
+  const flight = new Flight(someFlight());
+  const told = (time: number) => flight.at(time).map(({ kind }) => kind);
+  assert.deepEqual(told(0), []);
+  assert.deepEqual(told(0.5), ["violation", "breach"]);
+  assert.deepEqual(told(1), ["breach"]);
+});
+
+test("least charge to spare matters where it was little, passed, or is looked at", () => {
+  const flight = new Flight(someFlight());
+  assert.equal(flight.nearNoReturn(0, null), true);
+  assert.equal(flight.nearNoReturn(1, null), false);
+  assert.equal(flight.nearNoReturn(1, 1), true);
+});

@@ -1,0 +1,124 @@
+"""What happened when: marks on the time axis of a replay page, each with its reason."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.replay.home_data import WayHome
+from uas_coverage_env.replay.safety_data import (
+    FENCE,
+    HEIGHT,
+    MOVING,
+    OBSTACLES,
+    OTHERS,
+    Nearest,
+)
+
+LARGE_GAP = 0.05
+"""A decision that was solved to a larger gap than this is marked."""
+
+_TOLERANCE_M = 1e-6
+_Reason = tuple[str, str]  # what is said, and of whom
+
+
+def marks(flight: Flight, rooms: dict[str, Nearest], home: WayHome) -> list[dict[str, Any]]:
+    """Breaches, points of no return, fallbacks, large gaps and events, in order of time.
+
+    What lasts is one mark: `t_s`, `until_s`, `kind`, `uas` (None: of no one in particular) and
+    `text`. Contacts and limits are not among them: the page has them as violations.
+    """
+    found = [
+        *_breaches(flight, rooms),
+        *_no_returns(flight, home),
+        *_fallbacks(flight),
+        *_gaps(flight),
+        *_events(flight),
+    ]
+    return sorted(found, key=lambda mark: mark["t_s"])
+
+
+def _mark(
+    flight: Flight, first: int, last: int, kind: str, text: str, uas: str | None = None
+) -> dict[str, Any]:
+    dt_s = flight.scenario.dt_s
+    return {
+        "t_s": round(first * dt_s, 6),
+        "until_s": round(last * dt_s, 6),
+        "kind": kind,
+        "uas": uas,
+        "text": text,
+    }
+
+
+def _breaches(flight: Flight, rooms: dict[str, Nearest]) -> Iterator[dict[str, Any]]:
+    for kind, (room_m, which) in rooms.items():
+        for i, name in enumerate(flight.names):
+            near = room_m[:, i] < -_TOLERANCE_M
+            near[0] = False  # where a mission begins is given
+            for first, last in _runs(np.where(near, which[:, i], -1).tolist()):
+                worst_m = -float(room_m[first : last + 1, i].min())
+                partner = _partner(flight, kind, int(which[first, i]))
+                if kind == HEIGHT:
+                    text = f"{name}: {worst_m:.2f} m below the least height"
+                else:
+                    text = f"{name}: {worst_m:.2f} m within the safe distance of {partner}"
+                yield _mark(flight, first, last, "breach", text, name)
+
+
+def _partner(flight: Flight, kind: str, index: int) -> str:
+    scenario = flight.scenario
+    if kind == FENCE:
+        return "the fence"
+    if kind == HEIGHT:
+        return "the ground"
+    named = {OBSTACLES: scenario.obstacles, MOVING: scenario.moving_obstacles, OTHERS: scenario.uas}
+    return named[kind][index].name
+
+
+def _no_returns(flight: Flight, home: WayHome) -> Iterator[dict[str, Any]]:
+    for name, sample, (least, spare) in zip(
+        flight.names, home.no_return, home.least_spare, strict=True
+    ):
+        if sample is not None:
+            text = (
+                f"{name}: point of no return; coming home with margin takes more charge than is "
+                f"left, {-100.0 * spare:.1f} % more at {least * flight.scenario.dt_s:g} s"
+            )
+            yield _mark(flight, sample, sample, "no return", text, name)
+
+
+def _fallbacks(flight: Flight) -> Iterator[dict[str, Any]]:
+    reasons = [
+        (decision.reason or "no reason given") if decision.fallback else ""
+        for decision in flight.decisions
+    ]
+    for first, last in _runs([reason or -1 for reason in reasons]):
+        count = f" ({last - first + 1} decisions)" if last > first else ""
+        yield _mark(flight, first, last, "fallback", f"fallback{count}: {reasons[first]}")
+
+
+def _gaps(flight: Flight) -> Iterator[dict[str, Any]]:
+    gaps = [decision.mip_gap or 0.0 for decision in flight.decisions]
+    for first, last in _runs([0 if gap > LARGE_GAP else -1 for gap in gaps]):
+        largest = max(gaps[first : last + 1])
+        count = f"{last - first + 1} decisions" if last > first else "decision"
+        yield _mark(flight, first, last, "gap", f"{count} solved to a gap of {largest:.0%} at most")
+
+
+def _events(flight: Flight) -> Iterator[dict[str, Any]]:
+    for event in flight.events:
+        k = round(event.time_s / flight.scenario.dt_s)
+        what = event.kind.replace("_", " ")
+        of = f"{event.uas}: " if event.uas else ""
+        yield _mark(flight, k, k, "event", f"{of}{what}", event.uas)
+
+
+def _runs(values: Sequence[Any]) -> Iterator[tuple[int, int]]:
+    """First and last index of each run of equal values that are not -1."""
+    for value, run in groupby(enumerate(values), key=lambda pair: pair[1]):
+        indices = [index for index, _ in run]
+        if value != -1:
+            yield indices[0], indices[-1]
