@@ -202,6 +202,50 @@ def test_two_flights_are_played_side_by_side(browser, flight, plain, tmp_path):
     assert complaints(browser) == []
 
 
+def test_two_flights_of_a_mission_are_shown_in_one_scene(browser, flight, plain, tmp_path):
+    x = plain.x.copy()
+    x[30:, :, 1] += 60.0
+    covered = plain.covered.copy()
+    covered[30:] -= 1
+    other = dataclasses.replace(plain, planner="other", x=x, covered=covered)
+    page = write_replay([flight, other], tmp_path / "replay.html")
+    opened(browser, page, moment="#t=40&view=map")
+    first, second = browser.find_elements(By.CLASS_NAME, "flight")
+    half = first.rect["width"]
+    told = [text.text for text in browser.find_elements(By.CLASS_NAME, "beside")]
+    assert told == [
+        "beside other: ±0.00 Wh, +1 waypoint, as long",
+        "beside nearest-waypoint: ±0.00 Wh, −1 waypoint, as long",
+    ]
+    pressed(browser, "g")
+    assert not second.is_displayed()
+    assert first.rect["width"] > 1.9 * half
+    ghosts = {}
+    for view in ("map", "3d"):
+        opened(browser, page, DESKTOP, moment=f"#t=40&together=1&view={view}")
+        ghosts[view] = pixels(browser, ".stage")
+        alone = write_replay([flight], tmp_path / "alone.html")
+        opened(browser, alone, DESKTOP, moment=f"#t=40&view={view}")
+        without = pixels(browser, ".stage")
+        changed = (ghosts[view] != without).any(axis=2)
+        assert changed[60:].sum() > 300, "paths below the words at the top"
+        assert changed.mean() < 0.3
+    opened(browser, page, moment="#together=1&view=map")
+    pressed(browser, "g")
+    assert browser.find_elements(By.CLASS_NAME, "flight")[1].is_displayed()
+    assert complaints(browser) == []
+
+
+def test_flights_of_two_missions_stay_side_by_side(browser, flight, plain, tmp_path):
+    scenario = plain.scenario.model_copy(update={"waypoints": plain.scenario.waypoints[:9]})
+    other = dataclasses.replace(plain, scenario=scenario, covered=plain.covered.clip(max=9))
+    page = write_replay([flight, other], tmp_path / "replay.html")
+    opened(browser, page, moment="#together=1&view=map")
+    pressed(browser, "g")
+    assert all(one.is_displayed() for one in browser.find_elements(By.CLASS_NAME, "flight"))
+    assert not any(one.is_displayed() for one in browser.find_elements(By.CLASS_NAME, "beside"))
+
+
 def test_a_flight_of_one_sample_can_be_looked_at(browser, plain, tmp_path):
     """What is left where a person stops a flight before its first step."""
     series = ("x", "u", "voltage_V", "current_A", "mode", "covered", "moving_position_m")

@@ -8,6 +8,8 @@ import { TRAILS, type TrailKind } from "./trail";
 
 export interface ViewChoice {
   threeD: boolean;
+  /** Two flights in one scene. */
+  together: boolean;
   followed: number | null;
 }
 
@@ -17,6 +19,7 @@ export interface ControlEvents {
   overview(): void;
   top(): void;
   trail(kind: TrailKind): void;
+  together(on: boolean): void;
 }
 
 const KEYS: [string, string][] = [
@@ -29,6 +32,7 @@ const KEYS: [string, string][] = [
   ["T", "from above"],
   ["M", "map or 3D"],
   ["C", "colour of the paths flown"],
+  ["G", "two flights in one scene, or side by side"],
   ["?", "this list"],
 ];
 
@@ -45,9 +49,11 @@ export class Controls {
   private readonly speed = element("select", { "aria-label": "Speed", title: "Speed (+ −)" });
   private readonly kind = button("", "Map or 3D (M)");
   private readonly top: HTMLButtonElement;
+  private readonly both = button("", "Both flights in one scene, or side by side (G)");
   private readonly followed = element("select", { "aria-label": "Follow", title: "Follow (1 … 9)" });
   private readonly trails = element("select", { "aria-label": "Trails", title: "Colour of the paths flown (C)" });
   private readonly help = helpDialog();
+  private readonly ghosts: boolean;
 
   constructor(
     private readonly clock: Clock,
@@ -74,10 +80,13 @@ export class Controls {
       "footer",
       { class: "controls" },
       element("div", { class: "row" }, this.play, this.track(flights), this.clockText, this.speed),
-      element("div", { class: "row views" }, this.kind, overview, this.top, this.followed, this.trails, question),
+      element("div", { class: "row views" }, this.kind, this.both, overview, this.top, this.followed, this.trails, question),
       this.help,
     );
     this.kind.hidden = !has3d;
+    this.ghosts = flights.length === 2 && flights[0].sameMission(flights[1]);
+    this.both.hidden = !this.ghosts;
+    this.both.addEventListener("click", () => events.together(!choice.together));
     this.play.addEventListener("click", () => clock.toggle());
     this.slider.addEventListener("input", () => {
       clock.playing = false;
@@ -116,6 +125,7 @@ export class Controls {
     this.speed.value = String(clock.speed);
     this.top.hidden = !this.choice.threeD;
     this.kind.textContent = this.choice.threeD ? "Map" : "3D";
+    this.both.textContent = this.choice.together ? "Apart" : "Together";
     this.followed.value = this.choice.followed === null ? "" : String(this.choice.followed);
   }
 
@@ -186,6 +196,7 @@ export class Controls {
       o: () => events.overview(),
       t: () => events.top(),
       c: () => this.nextTrail(),
+      g: () => this.ghosts && events.together(!choice.together),
       m: () => this.has3d && events.show(!choice.threeD),
       "?": () => this.toggleHelp(),
     };

@@ -118,6 +118,7 @@ export class Flight {
   readonly scene: Scene;
   readonly uas: number;
   readonly duration: number;
+  private readonly energies: number[] = [];
 
   constructor(readonly data: FlightData) {
     this.scene = data.scene;
@@ -141,6 +142,31 @@ export class Flight {
       ),
       covered: this.data.covered[sample],
     };
+  }
+
+  /** Whether another flight is of the same mission, so that both can be shown in one scene. */
+  sameMission(other: Flight): boolean {
+    const told = ({ scene }: Flight) => JSON.stringify([scene.fence, scene.obstacles, scene.waypoints]);
+    return told(this) === told(other);
+  }
+
+  /** Energy that the swarm has taken until a time [Wh]. */
+  energy(time: number): number {
+    const { voltage, current, dt_s } = this.data;
+    if (this.energies.length === 0) {
+      let sum = 0;
+      for (let k = 0; k < this.data.samples; k++) {
+        this.energies.push(sum);
+        for (let i = 0; i < this.uas; i++) {
+          const n = k * this.uas + i;
+          sum += voltage.values[n] * voltage.unit * current.values[n] * current.unit * (dt_s / 3600);
+        }
+      }
+    }
+    const { time: at, sample } = this.moment(time);
+    const next = Math.min(sample + 1, this.data.samples - 1);
+    const part = at / dt_s - sample;
+    return this.energies[sample] + part * (this.energies[next] - this.energies[sample]);
   }
 
   position(sample: number, i: number): Point3 {

@@ -15,7 +15,7 @@ const duration = Math.max(...flights.map((flight) => flight.duration));
 let dirty = true;
 const invalidate = () => (dirty = true);
 const clock = new Clock(duration, invalidate);
-const choice: ViewChoice = { threeD: true, followed: null };
+const choice: ViewChoice = { threeD: true, followed: null, together: false };
 
 const panels = flights.map(
   (flight) =>
@@ -37,6 +37,7 @@ const controls = new Controls(clock, flights, choice, has3d, {
   overview: () => frame("overview"),
   top: () => frame("top"),
   trail: colourTrails,
+  together,
 });
 controls.sampleTime = Math.min(...data.map((each) => each.dt_s));
 
@@ -63,6 +64,17 @@ function frame(how: "overview" | "top"): void {
   invalidate();
 }
 
+/** The second flight as ghosts in the scene of the first, or beside it. */
+function together(on: boolean): void {
+  choice.together = on;
+  main.className = panels.length === 2 && !on ? "two" : "one";
+  panels.forEach((panel, i) => {
+    panel.element.hidden = on && i > 0;
+    panel.together(on && i === 0);
+  });
+  resize();
+}
+
 function colourTrails(kind: TrailKind): void {
   const trail = new Trail(kind, flights);
   for (const panel of panels) panel.setTrail(trail);
@@ -70,11 +82,11 @@ function colourTrails(kind: TrailKind): void {
 }
 
 function resize(): void {
-  for (const panel of panels) panel.resize();
+  for (const panel of panels) if (!panel.element.hidden) panel.resize();
   invalidate();
 }
 
-// "#t=60&follow=2&view=map&trail=power": a moment to link to
+// "#t=60&follow=2&view=map&trail=power&together=1": a moment to link to
 function readAddress(): void {
   const wanted = new URLSearchParams(location.hash.slice(1));
   const number = (name: string) => Number(wanted.get(name) ?? NaN);
@@ -84,6 +96,7 @@ function readAddress(): void {
   }
   const trail = TRAILS.find(([kind]) => kind === wanted.get("trail"));
   if (trail) controls.showTrail(trail[0]);
+  if (wanted.get("together") === "1" && panels[0].other) together(true);
   show(wanted.get("view") !== "map");
 }
 
@@ -91,7 +104,9 @@ function loop(now: number): void {
   if (clock.playing) clock.tick(now);
   if (dirty) {
     dirty = false;
-    for (const panel of panels) panel.draw(clock.time, choice.followed);
+    for (const panel of panels) {
+      if (!panel.element.hidden) panel.draw(clock.time, choice.followed);
+    }
     controls.draw();
   }
   requestAnimationFrame(loop);

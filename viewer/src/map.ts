@@ -17,6 +17,7 @@ export class MapView implements View {
   private readonly gridStep: number;
   private followed: number | null = null;
   private trail: Trail;
+  private ghost: Flight | null = null;
   /** Size of marks: smaller on a small map. */
   private unit = 1;
   private scale = 1;
@@ -46,6 +47,10 @@ export class MapView implements View {
     this.followed = uas;
   }
 
+  setGhost(ghost: Flight | null): void {
+    this.ghost = ghost;
+  }
+
   setTrail(trail: Trail): void {
     this.trail = trail;
   }
@@ -58,7 +63,7 @@ export class MapView implements View {
     this.followed = null;
   }
 
-  draw(moment: Moment): void {
+  draw(moment: Moment, time: number): void {
     this.frame(moment);
     const { pen, flight } = this;
     pen.fillStyle = colour("--outside");
@@ -69,7 +74,9 @@ export class MapView implements View {
       const [x, y] = this.pixel(at);
       marks.waypoint(pen, x, y, radius * this.scale, 1, heavy, covered);
     });
-    flight.scene.uas.forEach((_, i) => this.path(moment, i));
+    const other = this.ghost?.moment(time);
+    if (this.ghost && other) this.ghosts(this.ghost, other);
+    flight.scene.uas.forEach((_, i) => this.path(flight, moment, i));
     this.movingObstacles(moment);
     flight.data.violations.forEach((violation) => {
       const [x, y] = this.pixel(flight.where(violation));
@@ -177,8 +184,21 @@ export class MapView implements View {
     this.pen.stroke();
   }
 
-  private path(moment: Moment, i: number): void {
-    const { pen, flight } = this;
+  private ghosts(ghost: Flight, moment: Moment): void {
+    const { pen } = this;
+    ghost.scene.uas.forEach(({ name, colour: hex }, i) => {
+      pen.globalAlpha = 0.6;
+      pen.setLineDash([5, 4]);
+      this.path(ghost, moment, i);
+      pen.setLineDash([]);
+      const [x, y] = this.pixel(moment.vehicles[i].position);
+      marks.ghost(pen, x, y, 9 * this.unit, marks.shortName(name), hex);
+      pen.globalAlpha = 1;
+    });
+  }
+
+  private path(flight: Flight, moment: Moment, i: number): void {
+    const { pen } = this;
     const ink = bright(flight.scene.uas[i].colour);
     pen.strokeStyle = pen.fillStyle = ink;
     pen.lineWidth = 2;
@@ -197,6 +217,7 @@ export class MapView implements View {
       pen.lineTo(...this.pixel(to));
     }
     pen.stroke();
+    if (flight !== this.flight) return;
     const predicted = flight.predicted(moment.sample, i);
     for (let n = 0; n + 2 < predicted.length; n += 3) {
       const [x, y] = this.pixel([predicted[n], predicted[n + 1]]);

@@ -109,6 +109,12 @@ export function landed(pen: Pen, x: number, y: number, radius: number, hex: stri
   pen.stroke();
 }
 
+/** A UAS of another flight: a thin ring, its number with a stroke. */
+export function ghost(pen: Pen, x: number, y: number, radius: number, label: string, hex: string): void {
+  ring(pen, x, y, radius, 2 * Math.PI, 0.16 * radius, bright(hex));
+  words(pen, `${label}′`, x + 1.2 * radius, y + 1.1 * radius, 0.9 * radius, bright(hex));
+}
+
 /** A red cross: a UAS that is lost, or a violation. */
 export function cross(pen: Pen, x: number, y: number, arm: number): void {
   for (const [width, ink] of [

@@ -3,6 +3,7 @@
 import { Cards } from "./cards";
 import type { TimeCanvas } from "./chart";
 import { curves } from "./curves";
+import { difference } from "./difference";
 import { element } from "./dom";
 import { type Flight, type Mark, words } from "./flight";
 import { MapView } from "./map";
@@ -31,8 +32,11 @@ export class Panel {
   private view: View;
   private readonly cards: Cards;
   private readonly charts: TimeCanvas[];
+  /** Another flight of the same mission. */
+  readonly other: Flight | null;
   private readonly now = element("ul", { class: "now", "aria-live": "polite", "aria-label": "Now" });
   private readonly legend = element("div", { class: "legend" });
+  private readonly beside = element("p", { class: "beside" });
   private shownNow = "";
 
   constructor(
@@ -57,7 +61,9 @@ export class Panel {
     const beside = curves(flight, all, duration, events.seek);
     this.charts = [profile, ...beside];
     this.legend.hidden = true;
-    this.stage.append(this.sceneCanvas, mapCanvas, this.now, this.legend);
+    this.other = all.find((each) => each !== flight && each.sameMission(flight)) ?? null;
+    this.beside.hidden = this.other === null;
+    this.stage.append(this.sceneCanvas, mapCanvas, this.beside, this.now, this.legend);
     this.element = element(
       "section",
       { class: "flight" },
@@ -102,7 +108,8 @@ export class Panel {
     const moment = this.flight.moment(time);
     const uas = followed !== null && followed < this.flight.uas ? followed : null;
     for (const view of [this.scene, this.map]) view?.follow(uas);
-    this.view.draw(moment);
+    this.view.draw(moment, time);
+    if (this.other) this.beside.textContent = difference(this.flight, this.other, time);
     this.cards.draw(moment, uas);
     for (const chart of this.charts) {
       chart.focus(uas);
@@ -117,6 +124,11 @@ export class Panel {
     if (shown === this.shownNow) return;
     this.shownNow = shown;
     this.now.replaceChildren(...marks.map(({ kind, text }) => element("li", { class: kindOf(kind) }, text)));
+  }
+
+  /** Show the other flight in this scene, too. */
+  together(on: boolean): void {
+    for (const view of [this.scene, this.map]) view?.setGhost(on ? this.other : null);
   }
 
   setTrail(trail: Trail): void {

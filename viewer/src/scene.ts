@@ -28,6 +28,8 @@ export class SceneView implements View {
   private violations!: Violations;
   private noReturns!: NoReturns;
   private trail: Trail;
+  private ghost: Flight | null = null;
+  private ghosts: Vehicles | null = null;
   private followed: number | null = null;
   private framed: "overview" | "top" | null = "overview";
 
@@ -53,7 +55,7 @@ export class SceneView implements View {
     this.repaint();
   }
 
-  draw(moment: Moment): void {
+  draw(moment: Moment, time: number): void {
     const positions = moment.vehicles.map(({ position }) => place(position));
     this.camera.follow(this.followed === null ? null : positions[this.followed]);
     const { lens } = this.camera;
@@ -63,6 +65,9 @@ export class SceneView implements View {
     const pixel = (size * 2 * Math.tan((lens.fov * Math.PI) / 360)) / height;
     const crowded = pixel * (this.followed === null ? ofMany(this.flight.uas) : 1);
     this.vehicles.draw(moment, crowded, (i) => lens.position.distanceTo(positions[i]));
+    const other = this.ghost?.moment(time);
+    const away = (i: number) => lens.position.distanceTo(place(other!.vehicles[i].position));
+    if (other) this.ghosts?.draw(other, crowded, away);
     this.waypoints.draw(moment);
     this.moving.draw(moment, pixel);
     this.violations.draw(moment, pixel);
@@ -95,6 +100,9 @@ export class SceneView implements View {
     this.moving = new MovingObstacles(this.flight);
     this.violations = new Violations(this.flight);
     this.noReturns = new NoReturns(this.flight);
+    this.ghosts = this.ghost && new Vehicles(this.ghost, ground, true);
+    this.ghosts?.setTrail(this.trail);
+    if (this.ghosts) this.scene.add(this.ghosts.group);
     this.scene.add(
       terrain(this.flight.scene, this.extent),
       this.waypoints.group,
@@ -116,6 +124,13 @@ export class SceneView implements View {
   setTrail(trail: Trail): void {
     this.trail = trail;
     this.vehicles.setTrail(trail);
+    this.ghosts?.setTrail(trail);
+  }
+
+  setGhost(ghost: Flight | null): void {
+    if (ghost === this.ghost) return;
+    this.ghost = ghost;
+    this.repaint();
   }
 
   overview(): void {

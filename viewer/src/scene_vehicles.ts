@@ -24,7 +24,7 @@ import { Line2 } from "three/addons/lines/Line2.js";
 import { LineGeometry } from "three/addons/lines/LineGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import type { Flight, Moment, VehicleMoment } from "./flight";
-import { charge, cross, landed, shortName } from "./marks";
+import { charge, cross, ghost, landed, shortName } from "./marks";
 import { bright, colour, ofSpare } from "./palette";
 import { badge, drawn, redraw } from "./scene_sprites";
 import { place } from "./scene_space";
@@ -32,13 +32,15 @@ import type { Trail } from "./trail";
 
 const MOST_PREDICTED = 256;
 const WIDTH_PX = 2.4;
+const PALE = { linewidth: 1.5, transparent: true, opacity: 0.55 };
 
 export class Vehicles {
   readonly group = new Group();
   private readonly parts: VehicleParts[];
 
-  constructor(flight: Flight, ground: number) {
-    this.parts = flight.scene.uas.map((_, i) => new VehicleParts(flight, i, ground));
+  /** @param ghosts they are of another flight: pale, and without what they mean to do */
+  constructor(flight: Flight, ground: number, ghosts = false) {
+    this.parts = flight.scene.uas.map((_, i) => new VehicleParts(flight, i, ground, ghosts));
     for (const part of this.parts) this.group.add(part.group);
   }
 
@@ -70,9 +72,11 @@ class VehicleParts {
     private readonly flight: Flight,
     private readonly i: number,
     private readonly ground: number,
+    private readonly isGhost: boolean,
   ) {
     const ink = bright(flight.scene.uas[i].colour);
     this.body = quadcopter(ink);
+    const look = isGhost ? PALE : { linewidth: WIDTH_PX };
     this.ringTexture = drawn(() => undefined);
     this.ring = badge(this.ringTexture);
     // above the names of other things
@@ -83,8 +87,8 @@ class VehicleParts {
     }
     // a line needs two points
     if (samples.length === 3) samples.push(...samples);
-    this.path = wide(samples, new LineMaterial({ vertexColors: true, linewidth: WIDTH_PX }));
-    this.latestPaint = new LineMaterial({ color: ink, linewidth: WIDTH_PX });
+    this.path = wide(samples, new LineMaterial({ vertexColors: true, ...look }));
+    this.latestPaint = new LineMaterial({ color: ink, ...look });
     this.latest = wide([0, 0, 0, 0, 0, 0], this.latestPaint);
     this.drop = new Line(points(2), new LineBasicMaterial({ color: ink }));
     this.predicted = new Line(
@@ -121,7 +125,7 @@ class VehicleParts {
     const vehicle = moment.vehicles[this.i];
     const at = place(vehicle.position);
     const flies = vehicle.mode !== "landed" && vehicle.mode !== "lost";
-    this.body.visible = flies;
+    this.body.visible = flies && !this.isGhost;
     this.body.position.copy(at);
     const [phi, theta, psi] = vehicle.attitude;
     // body axes forward, right, down are -z, x, -y of the scene at heading north
@@ -132,8 +136,8 @@ class VehicleParts {
     this.drawRing(vehicle);
     this.drawPath(moment, at.toArray());
     setPoints(this.drop.geometry, [...at.toArray(), at.x, this.ground, at.z]);
-    this.drop.visible = flies;
-    const predicted = flies ? this.flight.predicted(moment.sample, this.i) : [];
+    this.drop.visible = flies && !this.isGhost;
+    const predicted = flies && !this.isGhost ? this.flight.predicted(moment.sample, this.i) : [];
     const line = [];
     for (let n = 0; n + 2 < Math.min(predicted.length, 3 * MOST_PREDICTED); n += 3) {
       line.push(predicted[n + 1], -predicted[n + 2], -predicted[n]);
@@ -166,7 +170,8 @@ class VehicleParts {
     this.ringShows = shows;
     redraw(this.ringTexture, (pen, px) => {
       const middle = px / 2;
-      if (vehicle.mode === "lost") cross(pen, middle, middle, 0.17 * px);
+      if (this.isGhost) ghost(pen, middle, middle, 0.2 * px, shortName(name), hex);
+      else if (vehicle.mode === "lost") cross(pen, middle, middle, 0.17 * px);
       else if (vehicle.mode === "landed") landed(pen, middle, middle, 0.09 * px, hex);
       else charge(pen, middle, middle, 0.27 * px, soc, spare, shortName(name), hex);
     });
