@@ -46,6 +46,7 @@ def test_a_name_that_is_like_none_is_answered_with_them_all(capsys):
     err = capsys.readouterr().err
     assert "take corridor, gasche2025, open_field, village, generated:SEED" in err
     assert did_you_mean("", ["village"], "take village") == "take village"
+    assert did_you_mean("a3c", ["ppo", "sac"], "take ppo or sac") == "take ppo or sac"
 
 
 @pytest.mark.parametrize("seed", ["x", "-1", "1.5", "0:3", "9" * 5000, ""])

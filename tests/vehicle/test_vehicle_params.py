@@ -44,8 +44,8 @@ def test_a_vehicle_loads_by_path(tmp_path, as_type):
 
 
 def test_an_unknown_name_lists_the_names_that_exist():
-    with pytest.raises(ValueError, match=r"unknown vehicle 's5000'.*hexacopter, s500_v2"):
-        load_vehicle("s5000")
+    with pytest.raises(ValueError, match=r"unknown vehicle 'kite'.*hexacopter, s500_v2"):
+        load_vehicle("kite")
 
 
 @pytest.mark.parametrize("missing", ["nowhere.toml", "no/such/file"])

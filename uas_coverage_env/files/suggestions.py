@@ -3,11 +3,16 @@
 import difflib
 from collections.abc import Iterable
 
+# of three letters, two in common are chance
+_SHORT = 3
+_CLOSE, _CLOSE_IF_SHORT = 0.6, 0.75
+
 
 def meant(name: str, known: Iterable[str]) -> str:
     """The known name that is closest to a misspelt one; empty where none is close."""
     by_lower = {each.lower(): each for each in known}
-    close = difflib.get_close_matches(name[:80].lower(), by_lower, n=1)
+    cutoff = _CLOSE if len(name) > _SHORT else _CLOSE_IF_SHORT
+    close = difflib.get_close_matches(name[:80].lower(), by_lower, n=1, cutoff=cutoff)
     return by_lower[close[0]] if close else ""
 
 
