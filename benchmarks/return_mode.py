@@ -325,12 +325,17 @@ def _table(tallies: Mapping[tuple[str, str], Counter[str]]) -> Table:
     return table
 
 
-def _chosen(names: str, allowed: Mapping[str, object], what: str) -> list[str]:
-    chosen = [name.strip() for name in names.split(",") if name.strip()]
-    for name in chosen:
+def chosen(names: str, allowed: Mapping[str, object], what: str) -> list[str]:
+    """The names in a list with commas.
+
+    Raises:
+        InputError: One is not allowed.
+    """
+    found = [name.strip() for name in names.split(",") if name.strip()]
+    for name in found:
         if name not in allowed:
             raise InputError(f"unknown {what} {name!r}; allowed: {', '.join(allowed)}")
-    return chosen
+    return found
 
 
 def main(
@@ -343,8 +348,8 @@ def main(
 ) -> None:
     """Fly random players until all UAS are down, and print a table."""
     tallies: dict[tuple[str, str], Counter[str]] = {}
-    for family in _chosen(families, FAMILIES, "family"):
-        for player in _chosen(players, PLAYERS, "player"):
+    for family in chosen(families, FAMILIES, "family"):
+        for player in chosen(players, PLAYERS, "player"):
             tallies[family, player] = Counter()
             for seed in range(first_seed, first_seed + missions):
                 tally = fly(family, player, seed, wind_mps)

@@ -162,7 +162,7 @@ def main(
     figure: Annotated[Path | None, typer.Option(help="Where to draw the growth.")] = None,
 ) -> None:
     """Measure each size in a process of its own, and print a table."""
-    options = dict(text.partition("=")[::2] for text in option or [])
+    options = {name: value for name, _, value in (text.partition("=") for text in option or [])}
     rows = []
     for n_uas, n_waypoints in _sizes(sizes):
         with (

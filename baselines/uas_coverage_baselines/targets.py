@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission import Approach, Attempts, MissionBrief, WorldView
+from uas_coverage_env.mission import Approach, Attempts, Handover, MissionBrief, WorldView
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 
@@ -20,6 +20,7 @@ class Targets:
         self._waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         self._view = WorldView(brief)
         self._attempts, self._approach = Attempts(brief), Approach(brief)
+        self._handover = Handover(brief)
         self._target: dict[str, int] = {}
 
     def commands(
@@ -31,14 +32,14 @@ class Targets:
             swarm: What the planner sees.
             choose: (swarm, index of the UAS, (W,) candidates) -> one of the candidates.
         """
+        works = self._handover.workers(swarm)
         wanted = self._attempts.wanted(swarm.uncovered)
         if not wanted.any():
             return {name: GoTo(None) for name in swarm.active}
         self._view.update(swarm)
         blocked = self._view.blocked()
         free = wanted & ~blocked
-        # one that no command reaches gets no waypoint: the others cover it
-        reached = [name for name in swarm.active if swarm.responds[swarm.names.index(name)]]
+        reached = [swarm.names[u] for u in np.flatnonzero(works)]
         self._target = {
             name: target
             for name, target in self._target.items()

@@ -12,6 +12,7 @@ from uas_coverage_env.autopilot import seconds_to_keep
 from uas_coverage_env.autopilot.belief import learn, speed_along
 from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
+from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ
 from uas_coverage_env.world import (
@@ -132,6 +133,40 @@ def test_what_return_mode_keeps_grows_with_headwind():
         kept_s.append(seconds_to_keep(world.arena, 0, x, 0.0, belief))
     assert (np.diff(kept_s) > 0.0).all()
     assert kept_s[-1] > kept_s[0] + 40.0
+
+
+@pytest.mark.parametrize("level", ["moderate", "strong"])
+def test_gusts_lead_no_descent_and_no_climb_beyond_their_limits(level):
+    world = World(with_disturbances(meadow([(100.0, 100.0, -2.0)], max_steps=900), level, 4))
+    for seed in range(6):
+        world.reset(seed)
+        for step in range(120):
+            altitude_m = 2.0 if step % 60 > 20 else 45.0
+            outcome = world.step({"uas_1": Velocity(3.0 * (-1) ** (step // 30), 0.0, altitude_m)})
+            assert outcome["limits_exceeded"][0] == 0
+
+
+@pytest.mark.parametrize(("altitude_m", "limit_mps"), [(2.0, 1.5), (45.0, -3.0)])
+def test_a_part_of_the_wind_is_kept_of_the_limits_of_descent_and_climb(altitude_m, limit_mps):
+    world = windy(7.0, 0.0)
+    for _ in range(10):
+        world.step(HOVER)
+    for _ in range(4):
+        world.step({"uas_1": Velocity(0.0, 0.0, altitude_m)})
+    kept_mps = abs(limit_mps) - abs(world.state.x[0, VZ])
+    assert kept_mps == pytest.approx(0.04 * 7.0, abs=0.03)
+
+
+def test_the_way_down_takes_longer_in_wind():
+    world = World(meadow(), disturbances=(constant_wind(8.0, 0.0),))
+    x, belief, kept_s = world.state.x[0].copy(), np.zeros(N_BELIEF), []
+    for altitude_m in (10.0, 40.0):
+        x[2] = -altitude_m
+        belief[WIND + 1] = 0.0
+        still_s = seconds_to_keep(world.arena, 0, x, 0.0, belief)
+        belief[WIND + 1] = 8.0
+        kept_s.append(seconds_to_keep(world.arena, 0, x, 0.0, belief) - still_s)
+    assert kept_s[1] - kept_s[0] > 5.0
 
 
 @pytest.mark.parametrize(

@@ -351,3 +351,26 @@ def test_the_nonlinear_world_can_be_flown_too(yard, listed):
     flight = rollout(yard, listed, dynamics="nonlinear", max_steps=15)
     assert flight.dynamics == "nonlinear"
     assert not np.array_equal(flight.x[15], rollout(yard, listed, max_steps=15).x[15])
+
+
+WIND = {"mean_mps": 2.0, "from_deg": 10.0}
+LOST = {"kind": "uas_lost", "at_s": 500.0}
+
+
+@pytest.mark.parametrize(
+    "pushing", [{"wind": WIND}, {"uncertainty": {"mass": 0.01}}, {"events": [LOST]},
+                {"sensing": {"position_noise_m": 0.1}}],
+)  # fmt: skip
+def test_where_something_pushes_back_assistants_fly_along_unless_they_are_refused(yard, pushing):
+    scenario = changed(yard, **pushing)
+    flight = rollout(scenario, Still(), max_steps=2)
+    assert (flight.return_mode, flight.safety_filter) == (True, True)
+    flight = rollout(scenario, Still(), max_steps=2, return_mode=False, safety_filter=False)
+    assert (flight.return_mode, flight.safety_filter) == (False, False)
+
+
+def test_in_still_air_a_planner_without_assistants_flies_without(yard):
+    flight = rollout(yard, Still(), max_steps=2)
+    assert (flight.return_mode, flight.safety_filter) == (False, False)
+    flight = rollout(changed(yard, wind=WIND), Still(), max_steps=2, disturbances=())
+    assert (flight.return_mode, flight.safety_filter) == (False, False)

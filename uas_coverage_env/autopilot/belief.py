@@ -44,6 +44,9 @@ MOST_WIND = 0.95
 _GUSTS = 0.1
 """What is kept of the speed limit for gusts, of the wind believed in."""
 
+_VERTICAL_GUSTS = 0.04
+"""What is kept of the limits of climb and descent for gusts, of the wind believed in."""
+
 MOST_SINK_MPS2 = 3.0
 CONSUMPTION_BOUNDS = (-0.3, 1.0)
 _LEAST_DOD = 1e-7
@@ -63,6 +66,12 @@ def speed_along(most_mps, wind_north_mps, wind_east_mps, north, east):
     along = wind_north_mps * north + wind_east_mps * east
     across2 = wind_north_mps**2 + wind_east_mps**2 - along * along
     return along + math.sqrt(max(most_mps * most_mps - across2, 0.0))
+
+
+@inlined_kernel
+def vertical_margin_mps(belief):
+    """By how much slower than its limits a UAS climbs and descends in the wind believed in."""
+    return _VERTICAL_GUSTS * math.sqrt(belief[WIND] ** 2 + belief[WIND + 1] ** 2)
 
 
 @inlined_kernel
@@ -101,6 +110,13 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
         command.values[0], command.values[1] = first, second
     if command.kind != WRENCH:
         lift_N = u[LIFT] - belief[SINK] / vehicle.vertical_B[1]
+        # lift takes from the speed downwards: the lift of the fastest descent is the least
+        held_mps = vehicle.vertical_A[1, 1] * x[VZ] + belief[SINK]
+        margin_mps = vertical_margin_mps(belief)
+        down_mps = vehicle.v_down_max_mps - margin_mps
+        up_mps = vehicle.v_up_max_mps - margin_mps
+        lift_N = max(lift_N, (down_mps - held_mps) / vehicle.vertical_B[1])
+        lift_N = min(lift_N, (-up_mps - held_mps) / vehicle.vertical_B[1])
         u[LIFT] = min(max(lift_N, vehicle.lift_min_N), vehicle.lift_max_N)
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.autopilot.belief import speed_along
+from uas_coverage_env.autopilot.belief import speed_along, vertical_margin_mps
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.geometry import signed_distance
@@ -118,6 +118,10 @@ def _flight_from(arena, i, x0, y0, z0, away_mps, belief=None):
         arena.vehicles[i], way_m, -away_mps, z1 - z0, roof_m + z1, before_m,
         max(way_m - until_m, 0.0),
     )  # fmt: skip
+    if belief is not None and arena.rules[0].disturbed:
+        down_mps = arena.vehicles[i].v_down_max_mps
+        slower_mps = down_mps - vertical_margin_mps(belief)
+        more_s += max(z1 - z0, 0.0) * (1.0 / slower_mps - 1.0 / down_mps)
     if obstructed:
         seconds += _out_of_overhangs_s(arena, i, x0, y0, z0)
         seconds += _out_of_overhangs_s(arena, i, x1, y1, z1)

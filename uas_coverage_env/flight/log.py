@@ -54,14 +54,20 @@ class _Step:
     modes: list[int]
     decision: DecisionRecord
     plan: NDArray[np.void]
-    paid: NDArray[np.float64]
+    paid: NDArray[np.float64] | None
     sample: _Sample
 
 
 class FlightLog:
-    """Keeps a flight while it is flown; Ctrl-C at any moment leaves whole steps behind."""
+    """Keeps a flight while it is flown; Ctrl-C at any moment leaves whole steps behind.
 
-    def __init__(self, world: World, scenario: Scenario, meter: RewardMeter) -> None:
+    Args:
+        world: What is flown.
+        scenario: As the mission begins.
+        meter: Of the reward; None where no commands are known that it could be paid for.
+    """
+
+    def __init__(self, world: World, scenario: Scenario, meter: RewardMeter | None = None) -> None:
         self._world = world
         self._scenario = scenario
         self._meter = meter
@@ -82,13 +88,15 @@ class FlightLog:
     def add(
         self,
         commands: Mapping[str, Command],
-        packed: NDArray[np.void],
+        packed: NDArray[np.void] | None,
         duration_s: float,
         decision: Decision | None,
         outcome: NDArray[np.void],
     ) -> None:
         """Keep the step just flown: the commands, how they were found, and what came of them."""
-        paid = self._meter.terms(packed, outcome)
+        paid = None
+        if self._meter is not None and packed is not None:
+            paid = self._meter.terms(packed, outcome)
         names = self._world.names
         modes = [
             _mode(commands.get(name), returning)
@@ -129,7 +137,7 @@ class FlightLog:
             "height_breaches": sum(int(step.outcome["too_low"].sum()) for step in self._steps),
             "events": self._events(),
             "reward_terms": self._reward_terms(),
-            "reward_names": self._meter.names,
+            "reward_names": () if self._meter is None else self._meter.names,
             "open_waypoints": int(self._world.state.uncovered.sum())
             if self._scenario.events
             else None,
@@ -137,8 +145,10 @@ class FlightLog:
             "min_obstacle_clearance_m": self._smallest("obstacle_clearance_m"),
         }
 
-    def _reward_terms(self) -> NDArray[np.float64]:
+    def _reward_terms(self) -> NDArray[np.float64] | None:
         """(T - 1, U, R)."""
+        if self._meter is None:
+            return None
         shape = (len(self._steps), len(self._world.names), len(self._meter.names))
         return np.array([step.paid for step in self._steps]).reshape(shape)
 

@@ -63,8 +63,9 @@ def rollout(
         planner: A planner, or the name of an installed one (flown with its default options).
         seed: The seed of the planner and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
-        return_mode: Let the world bring UAS home in time; None: as the planner asks.
-        safety_filter: Let the world keep commands clear of harm; None: as the planner asks.
+        return_mode: Let the world bring UAS home in time; None: as the planner asks, and where
+            something pushes back (wind, wrong models, sensors, events).
+        safety_filter: Let the world keep commands clear of harm; None: likewise.
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
             scenario are named in the record, but no flight directory holds what they do.
@@ -85,10 +86,12 @@ def rollout(
     if max_steps is not None and max_steps < 1:
         raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
     assistants: Assistants = getattr(planner, "assistants", Assistants())
+    # no plan is verified against what pushes back
+    uncertain = _is_uncertain(scenario, disturbances)
     if return_mode is None:
-        return_mode = assistants.return_mode
+        return_mode = assistants.return_mode or uncertain
     if safety_filter is None:
-        safety_filter = assistants.safety_filter
+        safety_filter = assistants.safety_filter or uncertain
     world = World(
         scenario,
         dynamics=dynamics,
@@ -120,6 +123,14 @@ def rollout(
         versions=recorded_versions(),
         **log.series(),
     )
+
+
+def _is_uncertain(scenario: Scenario, disturbances: Sequence[Disturbance] | None) -> bool:
+    """Whether anything may push back."""
+    if disturbances is not None:
+        return bool(disturbances) or bool(scenario.events) or scenario.sensing is not None
+    said = (scenario.wind, scenario.uncertainty, scenario.sensing)
+    return any(table is not None for table in said) or bool(scenario.events)
 
 
 def _make_ready(

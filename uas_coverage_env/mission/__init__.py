@@ -4,6 +4,7 @@ from uas_coverage_env.mission.approach import Approach, carefully, with_free_aim
 from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.views import WorldView, first_sight
@@ -12,6 +13,7 @@ from uas_coverage_env.mission.ways import Way, Ways
 __all__ = [
     "Approach",
     "Attempts",
+    "Handover",
     "Legs",
     "MissionBrief",
     "MovingObstacleBrief",
@@ -25,4 +27,5 @@ __all__ = [
     "first_sight",
     "seconds_home",
     "with_free_aims",
+    "without",
 ]

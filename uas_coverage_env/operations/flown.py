@@ -267,7 +267,7 @@ def _judged(scenario: Scenario, tracks: Sequence[_Track]) -> Flight:
         outcome = world.follow(x[k], resting[k])
         outcome["voltage_V"], outcome["current_A"] = voltage_V[k - 1], current_A[k - 1]
         outcome["returning"] = False  # no mode of the log
-        log.add({}, 0.0, None, outcome)
+        log.add({}, None, 0.0, None, outcome)
     return Flight(
         scenario=scenario,
         planner=PLANNER,

@@ -25,9 +25,17 @@ from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_p
 from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, next_to_decide
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import Approach, Attempts, MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission import (
+    Approach,
+    Attempts,
+    Handover,
+    MissionBrief,
+    WorldView,
+    first_sight,
+)
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
+    FLYING,
     HOME,
     OUTCOME_DTYPE,
     Command,
@@ -98,6 +106,7 @@ class WaypointRunner:
         )
         self._legs = legs_of(self._still)
         self._attempts, self._approach = Attempts(brief), Approach(brief)
+        self._handover = Handover(brief)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
@@ -126,7 +135,7 @@ class WaypointRunner:
 
     def _command(self, swarm: SwarmState, i: int) -> Command:
         # a UAS called by return mode is also sent home here: the world may fly without it
-        if self._returning[i] or self._targets[i] == HOME:
+        if self._returning[i] or self._targets[i] in (HOME, NO_TARGET):
             return GoTo(None)
         target = int(self._targets[i])
         if target >= 0 and self._attempts.is_hard(i, target):
@@ -138,7 +147,10 @@ class WaypointRunner:
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
         state.uncovered[:] = self._attempts.wanted(swarm.uncovered)
-        state.returning[:] |= self._returning
+        silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
+        self._targets[silent] = NO_TARGET
+        # one that takes no commands is as one on its way home, to the others and in simulations
+        state.returning[:] |= self._returning | silent
         choices = self._workspace.choices
         looked_ahead = self._simulations == 0
         while True:
@@ -159,7 +171,7 @@ class WaypointRunner:
                 choices.legal,
             )  # fmt: skip
             choose(self._targets, choices.candidates, i, choice if follow < 0 else follow)
-        self._returning[:] = state.returning
+        self._returning[:] = state.returning & (~silent | self._returning | swarm.returning)
 
     def _look_ahead(self, state: WorldState) -> None:
         """Make the plan better; the observation on the desk is lost."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Generic, Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
@@ -21,9 +22,10 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
+from uas_coverage_baselines.milp_mpc.unheard import Unheard
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import Attempts, MissionBrief, first_sight
-from uas_coverage_env.world import HOME, Command, Mode, SwarmState
+from uas_coverage_env.mission import Attempts, Handover, MissionBrief, first_sight, without
+from uas_coverage_env.world import FLYING, HOME, Command, GoTo, Mode, SwarmState
 
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
 
@@ -84,7 +86,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
-        self._attempts = Attempts(brief)
+        self._attempts, self._handover = Attempts(brief), Handover(brief)
+        self._unheard = Unheard(brief, self.options.moving_margin_m)
         self._called = set[str]()  # UAS whose plans have left no charge but for the way home
         self.last_decision = None
 
@@ -92,10 +95,21 @@ class MovingHorizon(ABC, Generic[Chosen]):
         """Decide for every active UAS: one step of Algorithm 1."""
         if not swarm.active:
             return {}
+        silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
+        commands = self._of_workers(without(swarm, silent), swarm, silent)
+        home = {swarm.names[u]: GoTo(None) for u in np.flatnonzero(silent)}
+        return {**commands, **home}
+
+    def _of_workers(
+        self, swarm: SwarmState, whole: SwarmState, silent: NDArray[np.bool_]
+    ) -> Mapping[str, Command]:
+        """Decide for those that take commands, the silent ones (U,) of the whole in their way."""
         began, self._returning_home = time.perf_counter(), frozenset[str]()
         wanted = self._attempts.wanted(swarm.uncovered)
         seen = swarm if wanted is swarm.uncovered else dataclasses.replace(swarm, uncovered=wanted)
-        problem = self.problem(seen)
+        problem = self._unheard.beside(self.problem(seen), whole, silent)
+        if any(plan and set(problem.names) - set(plan.names) for plan in (self.plan, self._backup)):
+            self.plan = self._backup = None  # one that is back has a part in neither
         overruled = self._overruled(problem, swarm)
         found = decide(
             problem,

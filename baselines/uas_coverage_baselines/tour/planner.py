@@ -15,7 +15,7 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight
 from uas_coverage_env.vehicle import VX, VY, VZ
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
 
@@ -70,7 +70,7 @@ class Tour:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Search the order from the starts."""
-        self._world = WorldView(brief)
+        self._world, self._handover = WorldView(brief), Handover(brief)
         self._arena = self._world.arena
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
@@ -185,7 +185,7 @@ class Tour:
             self._returns[i] = has_to_return(self._arena, self._world.state, i)
         return View(
             x=swarm.x,
-            may_work=flies & ~self._returns & swarm.responds,
+            may_work=self._handover.workers(swarm) & ~self._returns,
             flies=flies,
             uncovered=swarm.uncovered,
             blocked=self._world.blocked(_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M),

@@ -1,4 +1,4 @@
-"""Moving obstacles as far as a planner knows them: where they go if they go on as they go now."""
+"""What moves as far as a planner knows it: where it goes if it goes on as it goes now."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.space import Body, apart_m
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.vehicle import VX, VZ
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -34,6 +35,7 @@ class Movers:
         half_height_m: (M,).
         safe_m: (M,) distance that the rules ask for, without the UAS's radius.
         dt_s: Length of a step.
+        n_obstacles: How many of them, the first ones, are moving obstacles; the others are UAS.
     """
 
     position_m: FloatArray
@@ -42,22 +44,51 @@ class Movers:
     half_height_m: FloatArray
     safe_m: FloatArray
     dt_s: float
+    n_obstacles: int
 
     @staticmethod
-    def seen(brief: MissionBrief, swarm: SwarmState) -> Movers:
-        """What is seen in a state."""
-        obstacles = brief.moving_obstacles
+    def seen(brief: MissionBrief, swarm: SwarmState, silent: NDArray[np.bool_]) -> Movers:
+        """What is seen in a state.
+
+        Args:
+            brief: The mission.
+            swarm: The state.
+            silent: (U,) UAS that take no commands: they move as anything does.
+        """
+        obstacles, x = brief.moving_obstacles, swarm.x[silent]
+        radius_m = [uas.radius_m for uas, there in zip(brief.uas, silent, strict=True) if there]
+        points = np.zeros(len(x))
         return Movers(
-            np.asarray(swarm.moving_position_m, float).reshape(-1, 3),
-            np.asarray(swarm.moving_velocity_mps, float).reshape(-1, 3),
-            np.array([o.radius_m for o in obstacles], float),
-            np.array([0.5 * o.height_m for o in obstacles], float),
-            np.array([o.safe_distance_m for o in obstacles], float),
+            np.vstack([np.reshape(swarm.moving_position_m, (-1, 3)), x[:, :3]]),
+            np.vstack([np.reshape(swarm.moving_velocity_mps, (-1, 3)), x[:, VX : VZ + 1]]),
+            np.append(np.array([o.radius_m for o in obstacles], float), points),
+            np.append(np.array([0.5 * o.height_m for o in obstacles], float), points),
+            np.append(
+                np.array([o.safe_distance_m for o in obstacles], float),
+                np.array(radius_m, float) + brief.uas_safe_distance_m,
+            ),
             brief.dt_s,
+            len(obstacles),
         )
 
     def __len__(self) -> int:
         return len(self.radius_m)
+
+    def has_turned(self, before: Movers) -> bool:
+        """Whether a moving obstacle has another velocity than before."""
+        n = self.n_obstacles
+        return not np.array_equal(self.velocity_mps[:n], before.velocity_mps[:n])
+
+    def off_m(self, before: Movers, later_s: float) -> float:
+        """How far UAS are from where they would be now by what was seen before.
+
+        Args:
+            before: The same ones, then.
+            later_s: Since then.
+        """
+        expected_m = before.position_m + later_s * before.velocity_mps
+        away_m = np.linalg.norm(self.position_m - expected_m, axis=1)[self.n_obstacles :]
+        return float(away_m.max(initial=0.0))
 
     @property
     def surprise_m(self) -> FloatArray:

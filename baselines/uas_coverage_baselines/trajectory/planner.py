@@ -21,10 +21,12 @@ from uas_coverage_baselines.trajectory.mission_plan import (
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
 from uas_coverage_env.flight import PlannerOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight, without
+from uas_coverage_env.vehicle import VX, VZ
 from uas_coverage_env.world import FLYING, Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
@@ -108,22 +110,32 @@ class Trajectory:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts."""
         self._brief, self._seed = brief, seed
-        self._world = WorldView(brief)
+        self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self.mission_plan: MissionPlan | None = None
-        self._is_disturbed = False
+        self._is_disturbed, self._failures = False, Failures()
+        self._steering: Steering | None = None
         self._without_plan_since = np.full(len(brief.uas), -1)
         swarm = first_sight(brief)
         self._world.update(swarm)
-        self._make_plan(swarm, Movers.seen(brief, swarm))
+        self._silent = self._silent_then = np.zeros(len(brief.uas), np.bool_)
+        self._make_plan(swarm, self._seen_movers(swarm))
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
         self._world.update(swarm)
-        movers = Movers.seen(self._brief, swarm)
+        self._silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
+        movers = self._seen_movers(swarm)
+        swarm = without(swarm, self._silent)
+        home = {swarm.names[u]: GoTo(None, "return") for u in np.flatnonzero(self._silent)}
+        if self._steering is None and self._failures.are_many:
+            self._steering = self._steer()
+        if self._steering is not None:
+            self.last_decision = Decision({})
+            return {**self._steering.commands(swarm, self._world.blocked()), **home}
         flying = swarm.status == FLYING
         self._planned = {u: planned for u, planned in self._planned.items() if flying[u]}
         self._follow(swarm, movers)
@@ -134,7 +146,17 @@ class Trajectory:
         idle = [u for u in np.flatnonzero(flying).tolist() if u not in self._planned]
         staying = [u for u in idle if self._stays(u, swarm)]
         chosen = self._safeguard.chosen(swarm, courses, movers, staying)
-        return self._commands(swarm, flying, chosen, reason)
+        return {**self._commands(swarm, flying, chosen, reason), **home}
+
+    def _steer(self) -> Steering:
+        assert self.mission_plan is not None
+        moves, weight = self.options.moves // 10, self.options.weight_energy
+        order = self.mission_plan.order
+        return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
+
+    def _seen_movers(self, swarm: SwarmState) -> Movers:
+        """What moves, and with it UAS that take no commands."""
+        return Movers.seen(self._brief, swarm, self._silent)
 
     def _commands(
         self,
@@ -157,6 +179,7 @@ class Trajectory:
                 continue
             if not as_planned:
                 fallback = fallback or reason or "no backup trajectory"
+                self._failures.add(float(self._is_disturbed and swarm.responds[u]))
                 if self._without_plan_since[u] < 0:
                     self._without_plan_since[u] = step
             else:
@@ -197,10 +220,14 @@ class Trajectory:
 
     def _follow(self, swarm: SwarmState, movers: Movers) -> None:
         """Courses from where the UAS are, where that is not where they were planned to be."""
+        self._failures.next_step()
         for u, planned in list(self._planned.items()):
             rest = planned.course.rest(swarm.step)
             if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
                 continue
+            off = rest.x[0, VX : VZ + 1] - swarm.x[u, VX : VZ + 1]
+            if swarm.responds[u]:  # else it flies something else
+                self._failures.see(float(np.linalg.norm(off)))
             if not self._is_disturbed:
                 self._is_disturbed = True
                 self._fleet.leave_room()
@@ -216,6 +243,7 @@ class Trajectory:
             if new is None:
                 del self._planned[u]
             else:
+                self._failures.add(float(swarm.responds[u] * (new.course.end - planned.course.end)))
                 self._planned[u] = new
 
     def _bodies(self, movers: Movers, uas: int) -> list[Body]:
@@ -239,12 +267,17 @@ class Trajectory:
             return "no plan"
         if not np.array_equal(flying & self._may_fly, self._may_fly & self._flew(swarm)):
             return "a UAS is lost"
+        if (flying & self._silent_then).any():
+            return "a UAS is back"
         if waited and (swarm.uncovered & ~self._thought_of(swarm)).any() and self._planned:
             return "missed a waypoint"
         if not len(movers):
             return None
-        if not np.array_equal(movers.velocity_mps, self._seen_velocity_mps):
+        if len(movers) != len(self._seen) or movers.has_turned(self._seen):
             return "something moves otherwise"
+        later_s = self._brief.dt_s * (swarm.step - self._planned_at)
+        if waited and movers.off_m(self._seen, later_s) > _PLAN_MARGIN_M:
+            return "a UAS without a radio flies otherwise"
         opens = self._opens(movers)
         if not np.array_equal((opens > 0) & swarm.uncovered, self._blocked & swarm.uncovered):
             return "a waypoint opened or closed"
@@ -300,12 +333,14 @@ class Trajectory:
         if unknown.any():
             moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
         kept = None
-        if self.mission_plan is not None:
+        # changes of an order in which one that is back has no part rarely give it one
+        if self.mission_plan is not None and not (flying & self._silent_then).any():
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
         plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)
         self.mission_plan, self._planned = plan, dict(plan.planned)
-        self._planned_at, self._seen_velocity_mps = swarm.step, movers.velocity_mps.copy()
+        self._planned_at, self._seen = swarm.step, movers
+        self._silent_then = self._silent
         self._blocked = opens > 0
         self._may_fly = flying.copy()
         if first:

@@ -1,0 +1,220 @@
+"""R6: every kind of event, at a drawn time of a drawn mission, ends as `docs/faults.md` defines."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
+from uas_coverage_env import Scenario, generate_scenario, load_planner, rollout
+from uas_coverage_env.flight import Flight, accomplished, home
+
+FIRST_SEED = 7000
+PLANNERS = ("nearest-waypoint", "tour", "trajectory", "learned-waypoint")
+
+Rng = np.random.Generator
+Made = tuple[dict[str, Any], dict[str, Any]]
+"""Fields of the event, and what of the scenario changes for it."""
+
+
+def _uas(rng: Rng, scenario: Scenario) -> str:
+    return scenario.uas[int(rng.integers(len(scenario.uas)))].name
+
+
+def _free_m(rng: Rng, scenario: Scenario, away_m: float) -> tuple[float, float]:
+    """A place (north, east) in the fence's middle, this far from the starts."""
+    corners_m = scenario.fence.vertices_m[:, :2]
+    low_m, high_m = corners_m.min(axis=0) + 25.0, corners_m.max(axis=0) - 25.0
+    starts_m = np.array([uas.start_m[:2] for uas in scenario.uas])
+    for _ in range(1000):
+        place_m = rng.uniform(low_m, high_m)
+        if np.linalg.norm(starts_m - place_m, axis=1).min() > away_m:
+            return round(float(place_m[0]), 1), round(float(place_m[1]), 1)
+    raise RuntimeError("no place is free")
+
+
+def _block_m(rng: Rng, scenario: Scenario) -> list[tuple[float, float, float]]:
+    north_m, east_m = _free_m(rng, scenario, 50.0)
+    half_m, top_m = float(rng.uniform(4.0, 10.0)), float(rng.uniform(10.0, 35.0))
+    return [
+        (north_m + n * half_m, east_m + e * half_m, down_m)
+        for n in (-1, 1)
+        for e in (-1, 1)
+        for down_m in (0.0, -top_m)
+    ]
+
+
+def _mover(rng: Rng, scenario: Scenario) -> tuple[dict[str, Any], tuple[float, ...]]:
+    place_m = (*_free_m(rng, scenario, 60.0), -25.0)
+    return {"name": "helicopter", "radius_m": 4.0, "height_m": 5.0, "safe_distance_m": 3.0}, place_m
+
+
+def _velocity_mps(rng: Rng, speed_mps: float = 2.0) -> tuple[float, float, float]:
+    turn = float(rng.uniform(0.0, 2.0 * np.pi))
+    return round(speed_mps * np.cos(turn), 2), round(speed_mps * np.sin(turn), 2), 0.0
+
+
+def _radio(rng: Rng, scenario: Scenario) -> Made:
+    fields = {"uas": _uas(rng, scenario), "for_s": round(float(rng.uniform(5.0, 90.0)), 1)}
+    return fields | {"then": str(rng.choice(["go_on", "hover", "return"]))}, {}
+
+
+def _added(rng: Rng, scenario: Scenario) -> Made:
+    return {"position_m": (*_free_m(rng, scenario, 20.0), -42.0), "radius_m": 6.0}, {}
+
+
+def _hull(rng: Rng, scenario: Scenario) -> Made:
+    return {"name": "new", "safe_distance_m": 2.0, "vertices_m": _block_m(rng, scenario)}, {}
+
+
+def _appears(rng: Rng, scenario: Scenario) -> Made:
+    body, place_m = _mover(rng, scenario)
+    return {**body, "position_m": place_m, "velocity_mps": _velocity_mps(rng)}, {}
+
+
+def _turns(rng: Rng, scenario: Scenario) -> Made:
+    body, place_m = _mover(rng, scenario)
+    before = {"from_s": 0.0, "velocity_mps": _velocity_mps(rng)}
+    obstacle = {**body, "start_m": place_m, "schedule": [before]}
+    event = {"moving_obstacle": "helicopter", "velocity_mps": _velocity_mps(rng)}
+    return event, {"moving_obstacles": [obstacle]}
+
+
+def _closed(rng: Rng, scenario: Scenario) -> Made:
+    uas = scenario.uas[int(rng.integers(len(scenario.uas)))]
+    north_m, east_m, down_m = uas.start_m
+    starts_m = np.array([other.start_m[:2] for other in scenario.uas])
+    for _ in range(1000):  # along the row of starts, but beside all of them
+        other_m = np.array((north_m, east_m)) + rng.uniform(-30.0, 30.0, 2)
+        inside = float(scenario.fence.signed_distance([(*other_m, -10.0)])[0]) < -5.0
+        if inside and np.linalg.norm(starts_m - other_m, axis=1).min() > 8.0:
+            return {"uas": uas.name, "alternative_m": (*np.round(other_m, 1).tolist(), down_m)}, {}
+    raise RuntimeError("no place is free")
+
+
+def _motor(rng: Rng, scenario: Scenario) -> Made:
+    share_, factor = round(float(rng.uniform(0.85, 1.0)), 3), round(float(rng.uniform(1, 1.3)), 3)
+    return {"uas": _uas(rng, scenario), "thrust_share": share_, "power_factor": factor}, {}
+
+
+def _all_home(flight: Flight) -> bool:
+    return bool(home(flight).all()) and not flight.violations
+
+
+KINDS: Mapping[str, tuple[Callable[[Rng, Scenario], Made], Callable[[Flight], bool], str]] = {
+    "uas_lost": (lambda r, s: ({"uas": _uas(r, s)}, {}), accomplished, "accomplished"),
+    "radio_lost": (_radio, accomplished, "accomplished"),
+    "planner_lost": (
+        lambda r, s: ({"then": str(r.choice(["go_on", "hover", "return"]))}, {}),
+        _all_home,
+        "all land",
+    ),
+    "gnss_lost": (
+        lambda r, s: ({"uas": _uas(r, s), "for_s": 30.0, "drift_mps": 0.1}, {}),
+        _all_home,
+        "all land",
+    ),
+    "late_start": (lambda r, s: ({"uas": _uas(r, s)}, {}), accomplished, "accomplished"),
+    "motor_degraded": (_motor, _all_home, "all land"),
+    "charge_lost": (
+        lambda r, s: ({"uas": _uas(r, s), "share": round(float(r.uniform(0.05, 0.3)), 3)}, {}),
+        _all_home,
+        "all land",
+    ),
+    "waypoint_dropped": (
+        lambda r, s: ({"waypoint": int(r.integers(len(s.waypoints)))}, {}),
+        accomplished,
+        "accomplished",
+    ),
+    "waypoint_added": (_added, accomplished, "accomplished"),
+    "obstacle_added": (_hull, _all_home, "all land"),
+    "no_fly_zone": (_hull, _all_home, "all land"),
+    "moving_obstacle_added": (_appears, _all_home, "all land"),
+    "moving_obstacle_turns": (_turns, _all_home, "all land"),
+    "home_closed": (_closed, accomplished, "accomplished, landed at the alternative"),
+}
+"""Kind -> what is drawn of it, whether a flight ended as defined, and that in words."""
+
+
+def mission(kind: str, seed: int) -> Scenario:
+    """A small town in which the event happens once."""
+    rng = np.random.default_rng([seed, *kind.encode()])
+    town = generate_scenario(seed, n_uas=2, n_waypoints=10, n_obstacles=4)
+    fields, changes = KINDS[kind][0](rng, town)
+    # what appears, appears while UAS are near their starts still, far from it
+    soon = kind in ("obstacle_added", "moving_obstacle_added")
+    at_s = float(rng.integers(2, 5) if soon else rng.integers(3, 60))
+    event = {"kind": kind, "at_s": at_s, **fields}
+    return Scenario.model_validate(town.model_dump(by_alias=True) | changes | {"events": (event,)})
+
+
+def fly(kind: str, planner: str, seed: int) -> Result:
+    """One mission with its event; a UAS that has nothing to cover may have landed before."""
+    flight = rollout(
+        mission(kind, seed), load_planner(planner), seed, return_mode=True, safety_filter=True
+    )
+    return {
+        "kind": kind,
+        "planner": planner,
+        "happened": bool(flight.events),
+        "as_defined": KINDS[kind][1](flight),
+        "contacts": [[v.kind, v.partner, v.uas, v.time_s] for v in flight.violations],
+        "breaches": flight.breaches,
+        "steps": flight.steps,
+    }
+
+
+def trials(quick: bool) -> list[Trial]:
+    """Every kind with every planner."""
+    seeds = {"nearest-waypoint": (3, 100)}
+    return [
+        Trial(f"{kind} {planner} {seed}", fly, (kind, planner, seed))
+        for planner in PLANNERS
+        for kind in KINDS
+        for seed in range(FIRST_SEED, FIRST_SEED + seeds.get(planner, (1, 25))[not quick])
+    ]
+
+
+def finding(results: Mapping[str, Result]) -> Finding:
+    """Per kind and planner, in how many missions it ended as defined."""
+    cells: dict[tuple[str, str], list[Result]] = defaultdict(list)
+    for result in results.values():
+        if "error" not in result:
+            cells[result["kind"], result["planner"]].append(result)
+    rows = []
+    for kind, (_, _, words) in KINDS.items():
+        mine = [one for planner in PLANNERS for one in cells[kind, planner]]
+        if mine:
+            shares = [
+                f"{sum(one['as_defined'] for one in cells[kind, p])} of {len(cells[kind, p])}"
+                for p in PLANNERS
+            ]
+            failed = sum(not one["as_defined"] for one in mine)
+            rows.append([f"`{kind}`", words, *shares, share(failed, len(mine))])
+    headings = ["kind", "what must happen", *(f"`{planner}`" for planner in PLANNERS), "otherwise"]
+    failed = sum(not one["as_defined"] for many in cells.values() for one in many)
+    return Finding(len(results), failed + len(errors(results)), markdown(headings, rows))
+
+
+ROW = Row(
+    "R6",
+    "Faults and changes of the mission",
+    "missions",
+    "the outcome that `docs/faults.md` defines for the kind, and no violation",
+    trials,
+    finding,
+    lambda quick: (
+        f"towns of two UAS and ten waypoints from {FIRST_SEED} on; the seed draws when, "
+        "which UAS and how bad"
+    ),
+    "Several events in one mission, events in wind, and losses of charge or thrust that no UAS "
+    "could survive. Return mode and safety filter are on. Breaches are not counted here: a zone "
+    "that is closed round a UAS is one until it is left. A UAS that has landed does not take off "
+    "again: where one is lost when the others are home, what it leaves stays open, which counts as "
+    "failed. A limit that is exceeded counts as failed, too, even where the fault is the cause: a "
+    "damaged motor that cannot give what is asked for makes the inner loop believe in a sink, and "
+    "the next climb is too fast.",
+)

@@ -1,0 +1,133 @@
+"""R1: whole missions in still air and at the levels of wind and wrong models, per planner."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+
+from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
+from uas_coverage_env import load_planner, rollout
+from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
+from uas_coverage_env.scenario import sample_scenario
+
+LEVELS = ("still", "light", "moderate", "strong")
+FIRST_SEED = 3000
+
+_NO_CLOCK = {"deterministic": "true", "at_once": "1", "horizon": "12", "threads": "1"}
+OPTIONS: Mapping[str, Mapping[str, str]] = {
+    "nearest-waypoint": {},
+    "lawnmower": {},
+    "tour": {},
+    "trajectory": {},
+    "learned-waypoint": {},
+    "learned-velocity": {},
+    "milp-mpc-guided": _NO_CLOCK,
+}
+"""Planner -> options. The MILP planner decides without a clock, so that a seed repeats its
+flight."""
+
+# missions of each level: (quick, full)
+_MISSIONS = {"milp-mpc-guided": (1, 30), "learned-waypoint": (4, 100), "trajectory": (4, 100)}
+_OTHERS = (6, 110)
+
+SMALL = ((1, 2), (8, 12), (3, 8))
+"""Least and most UAS, waypoints and obstacles of the quick missions; the others are those of
+`sample_scenario`."""
+
+
+def fly(planner: str, level: str, seed: int, small: bool) -> Result:
+    """One mission: what there is to count.
+
+    Args:
+        planner: One of `OPTIONS`.
+        level: One of `LEVELS`.
+        seed: Of the generated scenario, and of the mission.
+        small: Whether it is one of the quick missions.
+    """
+    disturbances = None if level == "still" else level
+    if small:
+        scenario = sample_scenario(seed, *SMALL, disturbances=disturbances)
+    else:
+        scenario = sample_scenario(seed, disturbances=disturbances)
+    began = time.process_time()
+    flight = rollout(scenario, load_planner(planner, OPTIONS[planner]), seed)
+    return {
+        "planner": planner,
+        "level": level,
+        "seed": seed,
+        "uas": len(flight.names),
+        "accomplished": accomplished(flight),
+        "coverage": float(coverage(flight)),
+        "home": int(home(flight).sum()),
+        "steps": flight.steps,
+        "energy_Wh": round(float(energy_Wh(flight).sum()), 3),
+        "breaches": flight.breaches,
+        "violations": [
+            [v.kind, v.partner, v.uas, v.time_s, v.value, v.limit] for v in flight.violations
+        ],
+        "fallbacks": sum(decision.fallback for decision in flight.decisions),
+        "cpu_s": round(time.process_time() - began, 2),
+    }
+
+
+def trials(quick: bool) -> list[Trial]:
+    """Every planner at every level on the same missions."""
+    return [
+        Trial(f"{planner} {level} {seed}{' small' * quick}", fly, (planner, level, seed, quick))
+        for planner in OPTIONS
+        for seed in range(FIRST_SEED, FIRST_SEED + _MISSIONS.get(planner, _OTHERS)[not quick])
+        for level in LEVELS
+    ]
+
+
+def finding(results: Mapping[str, Result]) -> Finding:
+    """Per level and planner; a mission with a violation has failed."""
+    cells: dict[tuple[str, str], list[Result]] = defaultdict(list)
+    for result in results.values():
+        if "error" not in result:
+            cells[result["level"], result["planner"]].append(result)
+    order = [(level, planner) for level in LEVELS for planner in OPTIONS]
+    rows = [_line(*cell, cells[cell]) for cell in order if cells[cell]]
+    headings = ("level", "planner", "missions", "accomplished", "covered, %", "UAS lost")
+    headings += ("missions with a limit exceeded", "breaches", "missions with breaches", "Wh")
+    failed = sum(bool(one["violations"]) for many in cells.values() for one in many)
+    failed += len(errors(results))
+    return Finding(len(results), failed, markdown(headings, rows))
+
+
+def _line(level: str, planner: str, flown: list[Result]) -> list[object]:
+    uas = sum(one["uas"] for one in flown)
+    lost = Counter(kind for one in flown for kind, *_ in one["violations"] if kind != "limit")
+    to_what = ", ".join(f"{kind} {count}" for kind, count in sorted(lost.items()))
+    beyond = sum(any(kind == "limit" for kind, *_ in one["violations"]) for one in flown)
+    return [
+        level,
+        f"`{planner}`",
+        len(flown),
+        sum(one["accomplished"] for one in flown),
+        f"{100.0 * sum(one['coverage'] for one in flown) / len(flown):.1f}",
+        share(sum(lost.values()), uas) + (f" ({to_what})" if to_what else ""),
+        beyond,
+        sum(one["breaches"] for one in flown),
+        share(sum(one["breaches"] > 0 for one in flown), len(flown)),
+        f"{sum(one['energy_Wh'] for one in flown) / len(flown):.1f}",
+    ]
+
+
+ROW = Row(
+    "R1",
+    "Missions in still air, in wind, with wrong models",
+    "missions",
+    "no violation: no contact, no limit exceeded, no battery beyond its limit",
+    trials,
+    finding,
+    lambda quick: (
+        f"generated missions from {FIRST_SEED} on, the same for every level"
+        + ", small ones: 1 or 2 UAS, 8 to 12 waypoints, 3 to 8 blocks" * quick
+    ),
+    "Other families than `generated`, the nonlinear plant, `milp-mpc` without a guide, and the "
+    "MILP planner with a clock. `milp-mpc-guided` flies with "
+    + " ".join(f"`{key}={value}`" for key, value in _NO_CLOCK.items())
+    + ".",
+)

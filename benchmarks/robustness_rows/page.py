@@ -1,0 +1,85 @@
+"""The page `RELIABILITY.md`, made of what the rows have found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+
+from robustness_rows import NOT_MADE, ROWS
+from robustness_rows.row import Finding, Row, errors, markdown
+from robustness_rows.store import Store
+
+_HEAD = """# Reliability
+
+What was tried to make the software fail, and how often it did. This page is generated:
+
+```
+python benchmarks/robustness.py{option}
+```
+
+Each bound is the exact one-sided 95 % bound (Clopper and Pearson) of the share that fails, of the \
+trials as they are drawn here: missions of other kinds may fail more often. Version {version}.
+"""
+
+
+def page(stores: Mapping[str, Store], quick: bool) -> tuple[str, bool]:
+    """The text of the page, and whether anything failed its claim.
+
+    Args:
+        stores: Results of every row, by its name.
+        quick: Whether the quick sizes were asked for.
+    """
+    parts, summary, failed = [], [], False
+    for name, row in ROWS.items():
+        store = stores[name]
+        results = {key: entry["result"] for key, entry in store.entries.items()}
+        if not results:
+            summary.append((name, row.title, "not made", "–", "–"))
+            parts.append(f"## {name}: {row.title}\n\nNot made in this run.\n")
+            continue
+        finding = row.finding(results)
+        failed |= finding.failures > 0
+        bound = f"{finding.at_most:.2%}"
+        counted = f"{finding.trials:,} {row.unit}"
+        summary.append((name, row.title, counted, f"{finding.failures:,}", bound))
+        parts.append(_section(row, store, finding, quick))
+    for name, (title, reason) in NOT_MADE.items():
+        summary.append((name, title, "not covered", "–", "–"))
+        parts.append(f"## {name}: {title}\n\nNot covered here: {reason}\n")
+    summary.sort(key=lambda line: int(line[0][1:]))
+    parts.sort(key=lambda part: int(part[4 : part.index(":")]))
+    headings = ("row", "what", "tried", "failed", "share at most")
+    head = _HEAD.format(option=" --quick" if quick else "", version=version("uas-coverage-env"))
+    return "\n".join([head, _left(markdown(headings, summary)), "", *parts]), failed
+
+
+def _section(row: Row, store: Store, finding: Finding, quick: bool) -> str:
+    entries = store.entries.values()
+    dates = sorted({entry["date"] for entry in entries})
+    sources = sorted({entry["source"] for entry in entries})
+    when = dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
+    planned = len(row.trials(quick))
+    made = f"{len(entries)} of {planned} trials" if len(entries) < planned else "all trials"
+    lines = [
+        f"## {row.name}: {row.title}",
+        "",
+        f"Claim: {row.claim}. {finding.failures:,} of {finding.trials:,} {row.unit} failed, a "
+        f"share of at most {finding.at_most:.2%}.",
+        "",
+        f"Seeds: {row.seeds(quick)}. Made: {made}, {when}, source {', '.join(sources)}. Command: "
+        f"`python benchmarks/robustness.py{' --quick' if quick else ''} --rows {row.name}`.",
+        "",
+    ]
+    if finding.table:
+        lines += [finding.table, ""]
+    broken = errors({key: entry["result"] for key, entry in store.entries.items()})
+    if broken:
+        lines += ["Trials that ended in an exception:", ""]
+        lines += [f"- `{key}`: {text}" for key, text in broken.items()] + [""]
+    return "\n".join([*lines, f"Not covered: {row.not_covered}", ""])
+
+
+def _left(table: str) -> str:
+    lines = table.split("\n")
+    lines[1] = "|---|---|---:|---:|---:|"
+    return "\n".join(lines)

@@ -1,0 +1,169 @@
+"""R3 and R4: players that mean no good, of the environment and of return mode and filter."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import return_mode
+
+from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
+from uas_coverage_env import generate_scenario, uas_coverage_v0
+from uas_coverage_env.world import CONTACT_NAMES
+
+FIRST_SEED = 8000
+_STEPS = 60
+
+Rng = np.random.Generator
+Actions = dict[Any, Any]
+
+
+def _hostile(rng: Rng, good: Actions) -> Actions:
+    """Actions that have to be refused, made of those that would be taken."""
+    agent = str(rng.choice(sorted(good)))
+    bad: list[Any] = [
+        np.full(3, np.nan), np.array([np.inf, 0.0, 0.0]), np.zeros(2), np.zeros((3, 1)),
+        np.zeros(0), None, "north", b"north", [0.0, "1", 0.0], {}, object(), 10**400,
+        [[0.0, 0.0], [0.0]],
+        np.array([1 + 1j, 0, 0]), np.array(["a", "b", "c"]), np.array([None, None, None]),
+    ]  # fmt: skip
+    choice = int(rng.integers(len(bad) + 3))
+    if choice < len(bad):
+        return good | {agent: bad[choice]}
+    if choice == len(bad):
+        return {name: action for name, action in good.items() if name != agent}
+    return good | {("nobody", 7)[choice - len(bad) - 1]: np.zeros(3)}
+
+
+def _digest(parts: list[Any]) -> str:
+    total = hashlib.sha256()
+    for part in parts:
+        total.update(np.ascontiguousarray(part).tobytes())
+    return total.hexdigest()
+
+
+def attack(seed: int) -> Result:
+    """One episode beside a twin that never sees a hostile call.
+
+    A call has failed where it is accepted, raises anything but a ValueError, or leaves a trace: the
+    twin's observations, rewards and ends are compared after every step.
+    """
+    rng = np.random.default_rng([seed, 3])
+    town = generate_scenario(seed, n_uas=int(rng.integers(1, 4)), n_waypoints=6, n_obstacles=3)
+    attacked, twin = (uas_coverage_v0.parallel_env(town) for _ in range(2))
+    for env in (attacked, twin):
+        env.reset(seed=seed)
+    tally: Counter[str] = Counter()
+    for _ in range(_STEPS):
+        if not twin.agents:
+            break
+        good = {name: rng.uniform(-2.0, 2.0, 3).astype(np.float32) for name in twin.agents}
+        bad = _hostile(rng, good)
+        tally["calls"] += 1
+        try:
+            attacked.step(bad)
+            tally["accepted"] += 1
+        except ValueError:
+            tally["refused"] += 1
+        except Exception as error:
+            tally[f"{type(error).__name__} instead of ValueError"] += 1
+        ours, theirs = attacked.step(good), twin.step(good)
+        for mine, other in zip(ours[:4], theirs[:4], strict=True):
+            same = list(mine) == list(other)
+            digests = (_digest(list(mine.values())), _digest(list(other.values())))
+            tally["traces"] += not (same and digests[0] == digests[1])
+        tally["not finite"] += not all(np.isfinite(one).all() for one in ours[0].values())
+    return dict(tally)
+
+
+def attacks(quick: bool) -> list[Trial]:
+    """Episodes with hostile calls."""
+    return [
+        Trial(f"episode {seed}", attack, (seed,))
+        for seed in range(FIRST_SEED, FIRST_SEED + (100 if quick else 100_000))
+    ]
+
+
+def attacks_found(results: Mapping[str, Result]) -> Finding:
+    """An episode fails by one call."""
+    total: Counter[str] = Counter()
+    failed = 0
+    for result in results.values():
+        if "error" in result:
+            failed += 1
+            continue
+        total.update(result)
+        failed += any(count for name, count in result.items() if name not in ("calls", "refused"))
+    rows = sorted(total.items(), key=lambda item: -item[1])
+    return Finding(len(results), failed, markdown(("calls and what came of them", ""), rows))
+
+
+HOSTILE = Row(
+    "R3",
+    "Hostile calls of the environment",
+    "episodes",
+    "each call with an action that is none (not finite, of a wrong type or shape, missing, for an "
+    "agent that never was) is refused by a ValueError and leaves no trace, and nothing that is "
+    "observed is not finite",
+    attacks,
+    attacks_found,
+    lambda quick: (
+        f"episodes of {_STEPS} steps in generated towns from {FIRST_SEED} on, a hostile "
+        "call before each step"
+    ),
+    "Hostile arguments of `reset`, the other action kinds, Gymnasium's and the AEC interface, and "
+    "batches.",
+)
+
+
+def fly(family: str, player: str, seed: int, wind_mps: float) -> Result:
+    """One mission of `return_mode.py`."""
+    tally = return_mode.fly(family, player, seed, wind_mps)
+    return {"family": family, "wind_mps": wind_mps, "tally": dict(tally)}
+
+
+def flights(quick: bool) -> list[Trial]:
+    """Families and players, in still air and in a wind that is known to none."""
+    return [
+        Trial(f"{family} {player} {seed} {wind_mps:g} m/s", fly, (family, player, seed, wind_mps))
+        for seed in range(return_mode.FIRST_SEED, return_mode.FIRST_SEED + (1 if quick else 40))
+        for wind_mps in (0.0, 4.0, 7.0)
+        for player in return_mode.PLAYERS
+        for family in return_mode.FAMILIES
+    ]
+
+
+def flights_found(results: Mapping[str, Result]) -> Finding:
+    """Per wind, UAS lost and to what."""
+    cells: dict[float, Counter[str]] = defaultdict(Counter)
+    for result in results.values():
+        if "error" not in result:
+            cells[result["wind_mps"]].update(result["tally"])
+    rows, tried, lost = [], 0, len(errors(results))
+    for wind_mps, tally in sorted(cells.items()):
+        kinds = {name: tally[name] for name in (*CONTACT_NAMES, "still flying") if tally[name]}
+        here = sum(kinds.values())
+        what = ", ".join(f"{kind} {count}" for kind, count in kinds.items()) or "–"
+        counts = [tally["missions"], share(here, tally["flights"]), what]
+        rows.append([f"{wind_mps:g}", *counts, f"{tally['uas_steps']:,}", tally["breaches"]])
+        tried, lost = tried + tally["flights"], lost + here
+    headings = ("wind, m/s", "missions", "UAS lost", "to what", "UAS samples", "in breach")
+    return Finding(tried, lost, markdown(headings, rows))
+
+
+RANDOM = Row(
+    "R4",
+    "Random players with return mode and safety filter",
+    "UAS",
+    "no contact with anything, and home before the battery is empty",
+    flights,
+    flights_found,
+    lambda quick: (
+        f"from {return_mode.FIRST_SEED} on, every family and player of `benchmarks/return_mode.py`"
+    ),
+    "Moving obstacles (`benchmarks/safety_filter.py` has them), gusts and wrong models: the wind "
+    "is constant, and unknown to planner and file.",
+)

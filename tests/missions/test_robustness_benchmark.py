@@ -1,0 +1,120 @@
+"""The benchmark of reliability: what it keeps, what it makes again, and what its page says."""
+
+import numpy as np
+import pytest
+import robustness
+from robustness_rows import NOT_MADE, ROWS, faults, fuzz, missions, players
+from robustness_rows.page import page
+from robustness_rows.row import Finding, Row, Trial
+from robustness_rows.store import Store
+
+from uas_coverage_env.files.strict_toml import InputError
+
+
+def row_of(trials):
+    """A row whose trials give what they are asked to give."""
+    return Row(
+        "R1", "Nothing", "things", "nothing", lambda quick: trials,
+        lambda results: Finding(len(results), sum("error" in r for r in results.values())),
+        lambda quick: "none", "Everything.",
+    )  # fmt: skip
+
+
+def test_what_was_made_is_kept_and_not_made_again(tmp_path):
+    first = Trial("first", dict, ({"x": 1},))
+    robustness.make([row_of([first])], True, 1, None, tmp_path)
+    changed = [Trial("first", dict, ({"x": 2},)), Trial("second", dict, ({"x": 3},))]
+    robustness.make([row_of(changed)], True, 1, None, tmp_path)
+    kept = Store(tmp_path, "R1").entries
+    assert {key: entry["result"]["x"] for key, entry in kept.items()} == {"first": 1, "second": 3}
+
+
+def test_after_its_minutes_no_trial_begins(tmp_path):
+    stores = robustness.make([row_of([Trial("a", dict, ({},))])], True, 1, 0.0, tmp_path)
+    assert not stores["R1"].entries
+
+
+def test_an_exception_is_a_result():
+    assert robustness.tried(Trial("a", int, ("x",)))["error"].startswith("ValueError: ")
+
+
+def test_a_line_that_a_kill_cut_off_is_dropped(tmp_path):
+    Store(tmp_path, "R1").add("a", {"x": 1}, "source", "2026-01-01")
+    path = tmp_path / "R1.jsonl"
+    whole = path.read_text(encoding="utf-8")
+    path.write_text(whole + whole[:20], encoding="utf-8")
+    assert list(Store(tmp_path, "R1").entries) == ["a"]
+    assert path.read_text(encoding="utf-8") == whole
+
+
+@pytest.mark.parametrize("line", ["[]", "{}", "nonsense", '{"key": "a"}'])
+def test_what_is_no_result_is_refused_with_its_line(tmp_path, line):
+    (tmp_path / "R1.jsonl").write_text(line + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"R1\.jsonl:1: is no result"):
+        Store(tmp_path, "R1")
+
+
+def test_the_page_has_every_row_and_says_what_was_not_made(tmp_path):
+    stores = {name: Store(tmp_path, name) for name in ROWS}
+    text, failed = page(stores, True)
+    assert not failed
+    assert text.count("Not made in this run.") == len(ROWS)
+    assert {*ROWS, *NOT_MADE} == {f"R{number}" for number in range(1, 13)}
+    for name in (*ROWS, *NOT_MADE):
+        assert text.count(f"\n## {name}: ") == 1
+
+
+def test_the_page_counts_failures_with_their_exact_bound(tmp_path):
+    stores = {name: Store(tmp_path, name) for name in ROWS}
+    for number in range(10):
+        hashes = {"here": "a", "process": "b" if number == 0 else "a"}
+        stores["R5"].add(str(number), {"what": "tour", "hashes": hashes}, "abc", "2026-01-01")
+    text, failed = page(stores, True)
+    assert failed
+    # 1 - 0.05 is the chance of more than one in ten at this share
+    assert "| R5 | The same seed flies the same | 10 missions | 1 | 39.42% |" in text
+    assert "| tour | 10 | 20 | 1 |" in text
+    stores["R5"].add("broken", {"error": "RuntimeError: gone"}, "abc", "2026-01-01")
+    assert "- `broken`: RuntimeError: gone" in page(stores, True)[0]
+
+
+def test_trials_of_a_row_have_keys_of_their_own_and_quick_ones_are_fewer():
+    for row in ROWS.values():
+        quick, full = ([trial.key for trial in row.trials(size)] for size in (True, False))
+        assert len(set(full)) == len(full) > len(quick) == len(set(quick))
+
+
+@pytest.mark.parametrize("kind", list(faults.KINDS))
+def test_a_fault_is_drawn_with_its_seed_and_happens_in_the_mission(kind):
+    for seed in range(faults.FIRST_SEED, faults.FIRST_SEED + 3):
+        drawn = faults.mission(kind, seed)
+        assert drawn == faults.mission(kind, seed)
+        assert [event.kind for event in drawn.events] == [kind]
+
+
+def test_a_mission_is_counted_by_what_happened_in_it():
+    result = missions.fly("nearest-waypoint", "light", 3001, True)
+    assert result["accomplished"]
+    assert result["coverage"] == 1.0
+    assert result["home"] == result["uas"]
+    found = missions.ROW.finding({"a": result, "b": {"error": "gone"}})
+    assert (found.trials, found.failures) == (2, 1)
+    assert "| light | `nearest-waypoint` | 1 | 1 | 100.0 |" in found.table
+
+
+def test_hostile_calls_are_refused_and_leave_no_trace():
+    tally = players.attack(players.FIRST_SEED)
+    assert tally["refused"] == tally["calls"] > 5
+    assert tally["traces"] == tally["not finite"] == 0
+
+
+def test_damaged_files_differ_from_the_whole_one_and_repeat_with_their_seed():
+    text = b"[table]\nkey = 1.5\nother = [1, 2]\n" * 5
+    first, again, other = (
+        [fuzz.damaged(np.random.default_rng(seed), text) for _ in range(1)] for seed in (1, 1, 2)
+    )
+    assert first == again != other
+    assert first != [text]
+    result = fuzz.try_files("vehicle", 1)
+    assert sum(result["tally"].values()) == fuzz.FILES_OF_A_TRIAL
+    assert not result["failures"]

@@ -1,0 +1,63 @@
+"""In wind no flight goes as planned: `trajectory` then sends its UAS along their order."""
+
+import numpy as np
+import pytest
+from small_fleets import field
+from uas_coverage_baselines.trajectory import Trajectory
+from uas_coverage_baselines.trajectory.steering import FAILURES, Failures
+
+from uas_coverage_env import rollout
+from uas_coverage_env.flight import MODES, accomplished
+from uas_coverage_env.scenario import Wind
+from uas_coverage_env.scenario.levels import LEVELS
+
+STARTS_M = ((20.0, 20.0, -1.0), (180.0, 20.0, -1.0))
+
+
+def windy(mean_mps, **more):
+    wind = Wind(mean_mps=mean_mps, from_deg=240.0, turbulence=1.0, reference_height_m=20.0,
+                roughness_m=0.05, power="rotor")  # fmt: skip
+    town = field(starts_m=STARTS_M)
+    return town.model_copy(update={"wind": wind, **more})
+
+
+def planner():
+    return Trajectory(Trajectory.Options(orders=1, moves=20_000, programs=20))
+
+
+@pytest.mark.parametrize("mean_mps", [2.0, 6.5])
+def test_a_mission_in_wind_is_accomplished_without_violation(mean_mps):
+    scenario = windy(mean_mps, uncertainty=LEVELS["moderate"].uncertainty)
+    flight = rollout(scenario, planner(), seed=3)
+    assert accomplished(flight)
+    assert flight.steps < 110
+
+
+def test_the_waypoints_of_a_uas_that_is_lost_in_wind_are_covered_by_the_other():
+    lost = {"kind": "uas_lost", "at_s": 20.0, "uas": "uas_1"}
+    flight = rollout(windy(4.0, events=(lost,)), planner(), seed=1)
+    assert accomplished(flight)
+
+
+def test_in_still_air_nothing_is_steered():
+    flown = planner()
+    flight = rollout(field(starts_m=STARTS_M), flown)
+    assert accomplished(flight)
+    assert not flight.safety_filter
+    assert {decision.fallback for decision in flight.decisions} == {False}
+
+
+def test_in_strong_wind_nothing_is_flown_as_planned_for_long():
+    flight = rollout(windy(9.0), planner(), seed=3)
+    assert not flight.violations
+    assert all(mode in ("landed", "lost") for mode in map(MODES.__getitem__, flight.mode[-1]))
+
+
+def test_few_late_steps_are_forgiven_and_many_are_not():
+    failures = Failures()
+    for _ in range(100):
+        failures.add(0.1)
+        assert not failures.are_many
+        failures.next_step()
+    failures.add(np.nextafter(FAILURES, 9.0))
+    assert failures.are_many
