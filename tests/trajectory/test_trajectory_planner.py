@@ -4,6 +4,7 @@ import uas_coverage_baselines.trajectory.program as program_module
 from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import box, meadow, mover, waypoint
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
+from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env import Scenario, rollout
 from uas_coverage_env.flight import accomplished, energy_Wh
@@ -237,3 +238,46 @@ def test_outside_of_landing_zones_the_least_height_is_kept_above_ground_and_roof
         outside = np.linalg.norm(one.x[:, 0, :2] - one.x[0, 0, :2], axis=1) > zone_m
         lowest_m.append(-one.x[outside, 0, 2].max())
     assert lowest_m[0] < least_m <= lowest_m[1], "without the rule it flies lower"
+
+
+def test_a_yard_is_entered_straight_down_and_left_straight_up():
+    wings = [
+        box("south", (60.0, 60.0, -16.0), (68.0, 110.0, 0.0)),
+        box("north", (102.0, 60.0, -16.0), (110.0, 110.0, 0.0)),
+        box("west", (68.0, 60.0, -16.0), (102.0, 68.0, 0.0)),
+        box("east", (68.0, 102.0, -16.0), (102.0, 110.0, 0.0)),
+    ]
+    yard = waypoint((85.0, 85.0, -5.0), 4.0)
+    flown = rollout(meadow(((20.0, 20.0, -1.0),), waypoints=(yard,), obstacles=wings), planner())
+    assert accomplished(flown)
+    assert is_harmless(flown)
+    assert not any(decision.fallback for decision in flown.decisions)
+
+
+def test_a_way_round_two_corners_is_found():
+    walls = [
+        box("first", (0.0, 60.0, -50.0), (150.0, 64.0, 0.0)),
+        box("second", (50.0, 130.0, -50.0), (200.0, 134.0, 0.0)),
+    ]
+    behind = waypoint((150.0, 170.0, -10.0))
+    flown = rollout(meadow(((20.0, 20.0, -1.0),), waypoints=(behind,), obstacles=walls), planner())
+    assert accomplished(flown)
+    assert is_harmless(flown)
+    assert not any(decision.fallback for decision in flown.decisions)
+
+
+def test_what_was_flown_instead_of_a_plan_is_no_reason_to_give_plans_up(monkeypatch):
+    chosen, until = Safeguard.chosen, 9
+
+    def nothing_at_first(guard, swarm, *rest):
+        return chosen(guard, swarm, *rest) if swarm.step > until else {}
+
+    monkeypatch.setattr(Safeguard, "chosen", nothing_at_first)
+    watched = Watched(TrajectoryOptions(**QUICK))
+    flown = rollout(meadow(TWO, waypoints=FIELD), watched)
+    assert accomplished(flown)
+    assert all(decision.fallback for decision in watched.decisions[: until + 1])
+    later = watched.decisions[until + 1 : -1]
+    assert later
+    # steered UAS have no predicted path
+    assert all(decision.predicted_m and not decision.fallback for decision in later)

@@ -52,16 +52,17 @@ def first_flight(
     """A flight along a route that violates nothing, however slow; else what violates least."""
     best: Flight | None = None
     limits = program.model
-    tries = [(slower, 0.0) for slower in _SLOWER]
+    tries = [(slower, 0.0, False) for slower in _SLOWER]
     if np.abs(start[VELOCITY]).max() > 0.5:
-        tries += [(_SLOWER[1], wait_s) for wait_s in _WAITS_S]
-    for slower, wait_s in tries:
+        tries += [(_SLOWER[1], wait_s, False) for wait_s in _WAITS_S]
+    tries += [(slower, 0.0, True) for slower in _SLOWER]
+    for slower, wait_s, dips in tries:
         speeds = Speeds(
             _CRUISE * slower * float(limits.norms[0]),
             _CLIMB * float(limits.vertical[0]),
             _DESCENT * float(limits.vertical[1]),
         )
-        guess = guess_path(program, terrain, uas, start[POSITION], route, speeds)
+        guess = guess_path(program, terrain, uas, start[POSITION], route, speeds, dips=dips)
         if program.earliest is not None:
             guess = _delayed(guess, program.earliest[route])
         if wait_s:
@@ -119,8 +120,21 @@ def guess_path(
     start_m: FloatArray,
     route: IntArray,
     speeds: Speeds,
+    *,
+    dips: bool = False,
 ) -> Guess:
-    """Positions at every step along the quicker of the ways over and round."""
+    """Positions at every step along the quicker of the ways over and round.
+
+    Args:
+        program: Of the UAS.
+        terrain: Of the mission.
+        uas: Index of the UAS.
+        start_m: (3,).
+        route: (K,) waypoints.
+        speeds: Of the guess.
+        dips: Whether to fly straight down and up at waypoints that are too low to be reached on
+            the way, as in a yard.
+    """
     dt_s, space = program.model.dt_s, program.space
     points, marks = [np.asarray(start_m, float)], []
     n_waypoints = len(program.waypoints_m)
@@ -133,7 +147,8 @@ def guess_path(
         if target >= 0:
             marks.append(len(points) - 1)
     corners = np.array(points)
-    path_m, at_s, marks_at = _timed(corners, marks, space, speeds)
+    deep_m = 0.5 * program.radius_m[route] if dips else np.full(len(route), np.inf)
+    path_m, at_s, marks_at = _timed(corners, marks, deep_m, space, speeds)
     at_s[1:] += _SET_OFF_S
     n_steps = int(np.ceil((at_s[-1] + _SETTLE_S) / dt_s))
     clock_s = dt_s * np.arange(n_steps + 1)
@@ -143,12 +158,13 @@ def guess_path(
 
 
 def _timed(
-    corners: FloatArray, marks: list[int], space: Space, speeds: Speeds
+    corners: FloatArray, marks: list[int], deep_m: FloatArray, space: Space, speeds: Speeds
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Places along corners, raised over what they meet; their times; and where the marks are.
 
     Climbs begin and descents end far enough away to be flown on the way, but start and end are
-    left, and reached, straight up and down where they must be.
+    left, and reached, straight up and down where they must be; so are marks that the path would
+    pass more than `deep_m` (K,) too high.
     """
     dense, first = _dense(corners)
     top_m = _needed_m(dense, space)
@@ -158,7 +174,14 @@ def _timed(
     for n in range(1, len(top_m)):
         top_m[n] = max(top_m[n], top_m[n - 1] - speeds.down / speeds.level * step_m[n - 1])
     raised = np.column_stack([dense[:, :2], -top_m])
-    path_m = np.vstack([corners[:1], raised, corners[-1:]])
+    at = first[marks]
+    dip = -corners[marks, 2] < top_m[at] - deep_m
+    # down to the mark and up again
+    below = np.column_stack([raised[at[dip], :2], corners[np.array(marks, int)[dip], 2]])
+    twice = np.insert(raised, np.repeat(at[dip] + 1, 2), np.repeat(below, 2, axis=0), axis=0)
+    twice[at[dip] + 2 * np.arange(1, dip.sum() + 1)] = raised[at[dip]]
+    at = at + 2 * np.cumsum(dip) - dip  # the mark itself, where there is a dip
+    path_m = np.vstack([corners[:1], twice, corners[-1:]])
     away = np.diff(path_m, axis=0)
     seconds = np.maximum.reduce(
         [
@@ -167,7 +190,7 @@ def _timed(
             away[:, 2] / speeds.down,
         ]
     )
-    return path_m, np.concatenate([[0.0], np.cumsum(seconds)]), first[marks] + 1
+    return path_m, np.concatenate([[0.0], np.cumsum(seconds)]), at + 1
 
 
 def _dense(corners: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -119,6 +119,7 @@ class Trajectory:
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
         self._without_plan_since = np.full(len(brief.uas), -1)
+        self._flown_as_planned = set(range(len(brief.uas)))
         swarm = first_sight(brief)
         self._world.update(swarm)
         self._silent = self._silent_then = np.zeros(len(brief.uas), np.bool_)
@@ -167,6 +168,7 @@ class Trajectory:
     ) -> Mapping[str, Command]:
         step, dt_s = swarm.step, self._brief.dt_s
         commands: dict[str, Command] = {}
+        self._flown_as_planned = {u for u, (_, as_planned) in chosen.items() if as_planned}
         predicted_m: dict[str, FloatArray] = {}
         flown: dict[int, FloatArray] = {}
         rest: list[int] = []
@@ -224,6 +226,9 @@ class Trajectory:
         for u, planned in list(self._planned.items()):
             rest = planned.course.rest(swarm.step)
             if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
+                continue
+            if u not in self._flown_as_planned:  # nothing pushed it: it flew something else
+                del self._planned[u]
                 continue
             off = rest.x[0, VX : VZ + 1] - swarm.x[u, VX : VZ + 1]
             if swarm.responds[u]:  # else it flies something else

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.scenario import Obstacle
 from uas_coverage_env.world import Arena, build_arena, route
-from uas_coverage_env.world.routes import ROUND_CORNER
+from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner
 
 FloatArray = NDArray[np.float64]
 _ABOVE_M = 1.0
@@ -72,12 +72,10 @@ class Terrain:
 
 def _corners(arena: Arena, row: int, start_m: FloatArray, end_m: FloatArray) -> FloatArray:
     points = [start_m]
-    for _ in range(_CORNERS):
-        x, y, z = points[-1]
-        north_m, east_m, _, kind = route(arena, row, x, y, z, *end_m)
-        if kind != ROUND_CORNER:
-            break
+    north_m, east_m, _, kind = route(arena, row, *start_m, *end_m)
+    while kind == ROUND_CORNER and len(points) <= _CORNERS:
         points.append(np.array([north_m, east_m, end_m[2]]))
+        north_m, east_m, kind = leg_from_corner(arena, row, *points[-1], *end_m)
     return np.array([*points, end_m])
 
 
