@@ -279,7 +279,7 @@ def _insert_missing(task, routes, lengths, missing, total_weight):
                 break
 
 
-@allocating_kernel
+@allocating_kernel(nogil=True)
 def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window, total_weight, rng):
     """Anneal `routes` in place (its last row: left out); the cost of the best, which is returned.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +44,7 @@ class Effort:
         moves: Of each search.
         programs: Solved for each flight, about.
         total_weight: Worth of a second of each UAS's flight against one of the mission.
-        threads: UAS planned side by side.
+        threads: Searches made, and UAS planned for, side by side.
     """
 
     orders: int
@@ -150,14 +151,18 @@ def plan_mission(
 
 def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -> list[Routes]:
     found = [] if kept is None else [improve_routes(task, kept, SearchEffort(0), 0)]
-    for k in range(effort.orders):
+
+    def searched(k: int) -> Routes:
         begin = empty_routes(task.n_uas) if kept is None else kept
         search = SearchEffort(
             effort.moves,
             hottest_s=4.0 if kept is None or k else 1.5,
             total_weight=effort.total_weight,
         )
-        found.append(improve_routes(task, begin, search, seed + k))
+        return improve_routes(task, begin, search, seed + k)
+
+    with ThreadPoolExecutor(effort.threads) as side_by_side:  # the search frees the GIL
+        found += side_by_side.map(searched, range(effort.orders))
     return sorted(found, key=lambda order: order.cost_s)
 
 

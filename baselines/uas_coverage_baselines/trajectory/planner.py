@@ -80,7 +80,10 @@ class TrajectoryOptions(PlannerOptions):
         description="added for a moving obstacle's next change of velocity",
     )
     threads: int = Field(
-        default=2, ge=1, le=64, description="UAS planned side by side; the plans are the same"
+        default=2,
+        ge=1,
+        le=64,
+        description="searches and UAS planned side by side; plans stay the same",
     )
 
 
