@@ -87,11 +87,10 @@ def _n_parameters(arguments: ast.arguments) -> int:
 
 def _is_command(node: ast.AST) -> bool:
     """Whether a function is a command of the command line: each option is a parameter."""
-    return any(ast.unparse(made).startswith("app.command") for made in _decorators(node))
-
-
-def _decorators(node: ast.AST) -> list[ast.expr]:
-    return getattr(node, "decorator_list", [])
+    arguments = getattr(node, "args", None)
+    of_command = arguments.args if isinstance(arguments, ast.arguments) else []
+    said = [ast.unparse(each.annotation) for each in of_command if each.annotation]
+    return any(word in text for text in said for word in ("typer.Option(", "typer.Argument("))
 
 
 def _source_folders() -> list[str]:

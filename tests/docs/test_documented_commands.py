@@ -16,6 +16,7 @@ QUICK = {"nearest-waypoint", "lawnmower", "learned-velocity"}
 SHORTER = {
     "run": ["--steps", "1"],
     "reproduce": ["--steps", "2", "--seeds", "0:1"],
+    "score": ["--missions", "1", "--players", "nearest-waypoint"],
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }
 COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}

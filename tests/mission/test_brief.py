@@ -56,7 +56,8 @@ PUBLIC = {
     Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
 HIDDEN = {
-    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing"},
+    # a brief is that of one sortie
+    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "sorties"},
     MovingObstacle: {"schedule"},
 }
 

@@ -3,16 +3,22 @@
 import difflib
 from collections.abc import Iterable
 
-# of three letters, two in common are chance
 _SHORT = 3
-_CLOSE, _CLOSE_IF_SHORT = 0.6, 0.75
+"""Of so few letters, two in common are chance."""
+
+_AS_MANY = 3
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """The known name that is closest to a misspelt one; empty where none is close."""
+    """The known name that is closest to a misspelt one; empty where none is close.
+
+    Short names need to be the beginning of the known one, or its letters in another order.
+    """
     by_lower = {each.lower(): each for each in known}
-    cutoff = _CLOSE if len(name) > _SHORT else _CLOSE_IF_SHORT
-    close = difflib.get_close_matches(name[:80].lower(), by_lower, n=1, cutoff=cutoff)
+    given = name[:80].lower()
+    close = difflib.get_close_matches(given, by_lower, n=_AS_MANY)
+    if len(given) <= _SHORT:
+        close = [each for each in close if each.startswith(given) or sorted(each) == sorted(given)]
     return by_lower[close[0]] if close else ""
 
 
