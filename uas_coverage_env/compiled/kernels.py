@@ -48,6 +48,10 @@ inlined_kernel = _decorator(error_model="numpy", _nrt=False, forceinline=True)
 to hand over their hundred machine words takes longer than most of these parts themselves. Numba
 hands this on: a `kernel` that is compiled first because such a part calls it is inlined, too."""
 
+rare_kernel = _decorator(error_model="numpy", _nrt=False, forceinline=False)
+"""A `kernel` that stays a call, though its callers are inlined. For what few steps need: its
+machine code would lie between that of every step, which then fits into no cache."""
+
 counting_kernel = _decorator(
     error_model="numpy", _nrt=False, forceinline=True, fastmath={"reassoc", "nsz"}
 )
@@ -152,6 +156,33 @@ def _trailing_zeros() -> Any:
     return intrinsic(make)
 
 
+def rarely(condition: bool) -> bool:
+    """The same condition, known to be false nearly always.
+
+    What follows is put behind the rest of the kernel, and what it calls stays a call: machine code
+    that is passed over at each step would be fetched with what lies beside it.
+
+    Args:
+        condition: Of an `if`.
+    """
+    return condition
+
+
+def _expected_false() -> Any:
+    def make(typing_context, condition):
+        def generate(context, builder, signature, arguments):
+            bit = ir.IntType(1)
+            kind = ir.FunctionType(bit, [bit, bit])
+            code = cgutils.get_or_insert_function(builder.module, kind, "llvm.expect.i1")
+            given = context.cast(builder, arguments[0], condition, types.boolean)
+            given = builder.trunc(given, bit) if given.type != bit else given
+            return builder.call(code, [given, bit(0)])
+
+        return types.boolean(condition), generate
+
+    return intrinsic(make)
+
+
 def prefetch(array: NDArray[Any]) -> None:
     """Bring an array into the processor's cache while the kernel goes on.
 
@@ -181,6 +212,7 @@ def _prefetched(typing_context, array):
 
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
     lowest_bit = _trailing_zeros()
+    rarely = _expected_false()  # pyright: ignore[reportAssignmentType]
     prefetch = intrinsic(_prefetched)  # pyright: ignore[reportAssignmentType]
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

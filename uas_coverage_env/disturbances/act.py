@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.disturbances.wind import blow
 from uas_coverage_env.vehicle import LIFT, N_DEVIATIONS, TAU_Z, clip_wrench
@@ -66,7 +66,7 @@ def disturbance_code(disturbances: Sequence[Disturbance]) -> DisturbanceCode:
     return code
 
 
-@kernel
+@rare_kernel
 def begin_random(disturbances, random, seed, mission):
     """Put all generators where a mission begins: a function of seed and mission alone.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
 from uas_coverage_env.env.actions.acceleration import write as write_acceleration
 from uas_coverage_env.env.actions.velocity import write as write_velocity
@@ -175,13 +175,14 @@ def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
         begin_command(tables, learners, scratch, acting, i)
         values = slice_view(scratch.values, i * size, size)
         command = scratch.commands[i]
-        if which != _OWN:
+        if rarely(which == _OWN):
+            if on_gpu is None and state.status[i] == FLYING:
+                _write_command(
+                    acting.call[_ADDRESS], arena, state, tables, learners, i, acting.parameters,
+                    values, command,
+                )  # fmt: skip
+                refuse_unflyable(arena, learners, acting, i, command)
+        else:
             _write_as_usual(
                 arena, state, tables, learners, which, i, acting.parameters, values, command
             )
-        elif on_gpu is None and state.status[i] == FLYING:
-            _write_command(
-                acting.call[_ADDRESS], arena, state, tables, learners, i, acting.parameters,
-                values, command,
-            )  # fmt: skip
-            refuse_unflyable(arena, learners, acting, i, command)

@@ -10,7 +10,14 @@ from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import rows_view
-from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel, prefetch
+from uas_coverage_env.compiled.kernels import (
+    allocating_kernel,
+    inlined_kernel,
+    kernel,
+    prefetch,
+    rare_kernel,
+    rarely,
+)
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.random import SEEDS, counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
@@ -168,7 +175,7 @@ def _copy(source, target):
             target[i, k] = source[i, k]
 
 
-@inlined_kernel
+@rare_kernel
 def _begin_lane(pool, missions, lane, order, observation, width):
     """Begin a mission in a lane, as `Episode.reset` does for a single one."""
     lanes = missions.lanes
@@ -271,7 +278,7 @@ def _fetch_ahead(state, learners, observation):
             prefetch(observation[i])
 
 
-@inlined_kernel
+@rare_kernel
 def _keep_end(missions, lane, observation, width):
     """Keep the end of a mission, before the next begins in the same step."""
     final = missions.final
@@ -287,12 +294,12 @@ def _keep_end(missions, lane, observation, width):
 def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, observation, width):
     """One lane of `step_batch`."""
     lanes = missions.lanes
-    if order == REST:
+    if rarely(order == REST):
         whole = (observation.shape[1], width)
         _copy(rows_view(before, lane, whole), rows_view(observation, lane, whole))
         return
     begins = order != FLY
-    if begins:
+    if rarely(begins):
         lanes.terminated[lane] = False
         lanes.truncated[lane] = False
         for i in range(lanes.rewards.shape[1]):
@@ -318,7 +325,7 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
             _keep_end(missions, lane, observation, width)
             begins = True
             order = DRAW
-    if begins:
+    if rarely(begins):
         _begin_lane(pool, missions, lane, order, observation, width)
 
 

@@ -8,7 +8,7 @@ from numba import types
 
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.block import firsts_of
@@ -103,13 +103,14 @@ def observe_one(arena, state, tables, learners, observing, i, row, on_gpu):
     else:
         if observing.begins_as_usual[0]:
             _observe_as_usual(arena, state, tables, learners, i, row)
-        for b in range(observing.calls.shape[0]):
-            call = observing.calls[b]
-            _write_block(
-                call[0], arena, state, tables, learners, i,
-                slice_view(observing.parameters, call[3], call[4]),
-                slice_view(row, call[1], call[2]),
-            )  # fmt: skip
+        if rarely(observing.calls.shape[0] > 0):
+            for b in range(observing.calls.shape[0]):
+                call = observing.calls[b]
+                _write_block(
+                    call[0], arena, state, tables, learners, i,
+                    slice_view(observing.parameters, call[3], call[4]),
+                    slice_view(row, call[1], call[2]),
+                )  # fmt: skip
 
 
 @kernel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.env.memory import FIRST_TERM, LEARNERS, SCRATCH, TABLES, Paying
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
 from uas_coverage_env.env.rewards import terms as default
@@ -103,12 +103,13 @@ def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
         else:
             if paying.begins_as_usual[0]:
                 _pay_as_usual(arena, state, tables, learners, scratch, i)
-            for t in range(paying.calls.shape[0]):
-                call = paying.calls[t]
-                amounts[i, FIRST_TERM + call[1]] = _value_of(
-                    call[0], arena, state, tables, learners, scratch, i,
-                    slice_view(paying.parameters, call[2], call[3]),
-                )  # fmt: skip
+            if rarely(paying.calls.shape[0] > 0):
+                for t in range(paying.calls.shape[0]):
+                    call = paying.calls[t]
+                    amounts[i, FIRST_TERM + call[1]] = _value_of(
+                        call[0], arena, state, tables, learners, scratch, i,
+                        slice_view(paying.parameters, call[2], call[3]),
+                    )  # fmt: skip
         for term in range(n_terms):
             # adding zero makes -0.0 a plain zero
             amount = amounts[i, FIRST_TERM + term]

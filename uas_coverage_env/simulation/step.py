@@ -6,7 +6,7 @@ from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.belief import believed_wrench, expect, learn
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.array_views import slice_view
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, rarely
 from uas_coverage_env.compiled.views import Layout
 from uas_coverage_env.disturbances.act import disturb
 from uas_coverage_env.vehicle import (
@@ -106,7 +106,7 @@ def _write_inputs(arena, state, i, outcome):
     )
 
 
-@kernel
+@rare_kernel
 def _write_believed_inputs(arena, state, felt, nonlinear, i, outcome):
     """Likewise as the disturbances believed in demand it, and what is expected to come of it.
 
@@ -130,12 +130,30 @@ def write_all_inputs(arena, state, nonlinear, outcome):
             _write_believed_inputs(arena, state, felt, nonlinear, i, outcome)
 
 
-@kernel
+@rare_kernel
 def _move_deviating(vehicle, event, nonlinear, x, u):
-    """Fly one step of a vehicle that is another than it is believed to be; in a call of its own."""
+    """Fly one step of a vehicle that is another than it is believed to be."""
     if nonlinear:
         return deviating_plant_step(vehicle, event.deviation, x, u, x)
     return deviating_lpv_step(vehicle, event.deviation, event.rotor_power, x, u, x)
+
+
+@rare_kernel
+def _move_nonlinear(vehicle, x, u):
+    """Fly one step of the 6-DOF plant."""
+    return plant_step(vehicle, x, u, x)
+
+
+@rare_kernel
+def _be_pushed(vehicle, belief, event, step, dod_before, x):
+    """What wind, forces and faults add to a step that was flown in the air, and what is learnt."""
+    leave_air(vehicle, x, event.wind_mps)
+    if deviates(event.deviation):
+        add_force(vehicle, event.deviation, x, event.force_N)
+    else:
+        push(vehicle, x, event.force_N)
+    x[DOD] += event.dod_lost
+    learn(vehicle, belief, step, dod_before, x)
 
 
 @inlined_kernel
@@ -146,32 +164,26 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
     u = event.u[:]
     vehicle = arena.vehicles[i]
     dod_before = x[DOD]
-    if disturbed:
+    if rarely(disturbed):
         enter_air(x, event.wind_mps)
-    if disturbed and (event.rotor_power or deviates(event.deviation)):
+    if rarely(disturbed) and (event.rotor_power or deviates(event.deviation)):
         voltage_V, current_A = _move_deviating(vehicle, event, nonlinear, x, u)
-    elif nonlinear:
-        voltage_V, current_A = plant_step(vehicle, x, u, x)
+    elif rarely(nonlinear):
+        voltage_V, current_A = _move_nonlinear(vehicle, x, u)
     else:
         voltage_V, current_A = lpv_step(vehicle, x, u, x)
-    if disturbed:
-        leave_air(vehicle, x, event.wind_mps)
-        if deviates(event.deviation):
-            add_force(vehicle, event.deviation, x, event.force_N)
-        else:
-            push(vehicle, x, event.force_N)
-        x[DOD] += event.dod_lost
-        learn(vehicle, state.belief[i], state.step[0], dod_before, x)
+    if rarely(disturbed):
+        _be_pushed(vehicle, state.belief[i], event, state.step[0], dod_before, x)
     event.voltage_V = voltage_V
     event.current_A = current_A
     event.energy_Wh = voltage_V * current_A * (arena.rules[0].dt_s / 3600.0)
-    if event.applied_command.kind == WRENCH:
+    if rarely(event.applied_command.kind == WRENCH):
         reseed_reference(vehicle, x, state.reference[i])
 
 
 @inlined_kernel
 def _move_or_rest(arena, state, nonlinear, disturbed, i, outcome):
-    if outcome[i].grounded:
+    if rarely(outcome[i].grounded):
         rest(arena, state, i, outcome)
     else:
         _move(arena, state, nonlinear, disturbed, i, outcome)
@@ -189,7 +201,7 @@ def move_all(arena, state, nonlinear, outcome):
 def _fly(arena, state, nonlinear, disturbances, outcome):
     """Fly the commands for one step."""
     disturbed = arena.rules[0].disturbed
-    if disturbed:
+    if rarely(disturbed):
         write_all_inputs(arena, state, nonlinear, outcome)
         disturb(arena, state, disturbances, outcome)
     felt = as_felt(arena, state)
@@ -223,7 +235,7 @@ def carry_out(arena, state, nonlinear, disturbances, outcome):
 def judge(arena, state, nonlinear, outcome):
     """Judge what happened in a step that has been flown."""
     eventful = arena.rules[0].eventful
-    if eventful:
+    if rarely(eventful):
         happen(arena, state, outcome)
     check_obstacles(arena, state, outcome)
     check_separation(arena, state, outcome)
@@ -234,7 +246,7 @@ def judge(arena, state, nonlinear, outcome):
     check_limits(arena, state, nonlinear, outcome)
     _mark_lost(state, outcome)
     state.step[0] += 1
-    if eventful:
+    if rarely(eventful):
         sense(arena, state)
 
 
@@ -256,7 +268,7 @@ def advance(arena, state, commands, nonlinear, assistants, disturbances, outcome
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     begin_step(state, commands, outcome)
-    if arena.rules[0].eventful:
+    if rarely(arena.rules[0].eventful):
         heed(arena, state, outcome)
     seen = as_sensed(arena, state)
     for k in range(len(assistants)):

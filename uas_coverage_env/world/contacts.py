@@ -3,7 +3,7 @@
 import math
 
 from uas_coverage_env.compiled.array_views import rows_view
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
 from uas_coverage_env.geometry import (
     cylinder_clearance,
     cylinder_gap,
@@ -123,7 +123,7 @@ def obstacle_clearance(arena, x0, y0, z0, x1, y1, z1):
     return smallest, nearest
 
 
-@kernel
+@rare_kernel
 def _solid_clearance(arena, x0, y0, z0, x1, y1, z1):
     """`obstacle_clearance` without the no-fly zones: what can be touched; rarely asked for."""
     smallest = math.inf
@@ -279,7 +279,7 @@ def check_fence_and_battery(arena, state, outcome):
             _record_contact(outcome[i], BATTERY, -1)
 
 
-@kernel
+@rare_kernel
 def _obstacle_breaches(arena, next_m, i, x, y, z):
     """How many fixed and moving obstacles, at next_m (M, 3), UAS i is too near to."""
     count = 0

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel
 from uas_coverage_env.compiled.random import counted, normal, uniform
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.events import EFFECTS, OfUas
@@ -122,7 +122,7 @@ def goes_home(scenario: Scenario) -> bool:
     return any(effect.name == "deafen" and effect.values[0] == RETURN for effect in effects)
 
 
-@kernel
+@rare_kernel
 def begin_events(arena, state, seed, mission):
     """Draw what a mission's events and sensors need, a function of seed and mission alone.
 
@@ -171,7 +171,7 @@ def lasts(arena, state, e, step):
     return 0 <= since < arena.events[e].for_steps
 
 
-@kernel
+@rare_kernel
 def heed(arena, state, outcome):
     """Give UAS that hear nothing what they fly by themselves; ground those that start late.
 
@@ -213,14 +213,14 @@ def heed(arena, state, outcome):
             command.returning = then == RETURN
 
 
-@inlined_kernel
+@rare_kernel
 def rest(arena, state, i, outcome):
     """A UAS on the ground with its motors off: nothing moves, nothing is drawn."""
     x = state.x[i]
     outcome[i].voltage_V = open_circuit_V(arena.vehicles[i], x[DOD]) - x[U_TH]
 
 
-@kernel
+@rare_kernel
 def happen(arena, state, outcome):
     """What happens at the new sample, before it is judged.
 
@@ -245,7 +245,7 @@ def happen(arena, state, outcome):
                 state.x[i, DOD] = min(state.x[i, DOD] + event.values[0], 1.0)
 
 
-@kernel
+@rare_kernel
 def sense(arena, state):
     """Write what is sensed at the new sample, where that is not what is true.
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
@@ -91,7 +91,7 @@ STATE = Memory(WorldState)
 @inlined_kernel
 def as_felt(arena, state):
     """The state as the inner loop knows it: `x` is what it flies by."""
-    if arena.sensing.shape[0] > 0:
+    if rarely(arena.sensing.shape[0] > 0):
         return _with_x(state, state.felt)
     return _with_x(state, state.x)
 
@@ -99,7 +99,7 @@ def as_felt(arena, state):
 @inlined_kernel
 def as_sensed(arena, state):
     """The state as return mode, guidance and safety filter know it: `x` is what is sensed."""
-    if arena.sensing.shape[0] > 0:
+    if rarely(arena.sensing.shape[0] > 0):
         return _with_x(state, state.sensed)
     return _with_x(state, state.x)
 
@@ -107,7 +107,7 @@ def as_sensed(arena, state):
 @inlined_kernel
 def as_told(arena, state):
     """The state as learners know it: `x` is what they are told."""
-    if arena.sensing.shape[0] > 0:
+    if rarely(arena.sensing.shape[0] > 0):
         return _with_x(state, state.told)
     return _with_x(state, state.x)
 

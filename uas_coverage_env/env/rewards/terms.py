@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
 from uas_coverage_env.env.rewards.term import RewardTerm
 from uas_coverage_env.world import FLYING, VELOCITY
 from uas_coverage_env.world.outcome import NONE
@@ -64,7 +64,7 @@ def time(arena, state, tables, learners, scratch, i, parameters):
     return -1.0
 
 
-@kernel
+@rare_kernel
 def _covered_share(arena, state):
     total = 0.0
     covered = 0.0
@@ -76,7 +76,7 @@ def _covered_share(arena, state):
     return covered / total
 
 
-@kernel
+@rare_kernel
 def _change(arena, i, asked, applied):
     """How far the velocity flown is from the one asked for, in units of the limit."""
     if asked.kind != VELOCITY:
