@@ -1,5 +1,5 @@
-// What stands for a waypoint, a vehicle, a violation: drawn alike on the map and, as small
-// pictures, in the 3D scene. What has a meaning has a shape, not only a colour.
+// What stands for a waypoint, a vehicle, a violation: drawn alike on the map and over the 3D
+// scene. What has a meaning has a shape, not only a colour.
 
 import { bright, colour, ofSpare } from "./palette";
 
@@ -42,7 +42,7 @@ export function waypoint(
   }
 }
 
-/** The ring that is as long as the charge, with a notch where it is needed for home; whose. */
+/** The ring that is as long as the charge, with a notch where it is needed for home. */
 export function charge(
   pen: Pen,
   x: number,
@@ -50,8 +50,6 @@ export function charge(
   radius: number,
   soc: number,
   spare: number,
-  label: string,
-  hex: string,
 ): void {
   const whole = 2 * Math.PI;
   pen.lineCap = "butt";
@@ -62,7 +60,6 @@ export function charge(
   const [dx, dy] = [Math.cos(needed), Math.sin(needed)];
   const [from, to] = [0.8 * radius, 1.25 * radius];
   stroke(pen, x + from * dx, y + from * dy, x + to * dx, y + to * dy, 0.16 * radius, colour("--ink"));
-  words(pen, label, x + 1.25 * radius, y - 1.05 * radius, 1.05 * radius, bright(hex));
 }
 
 function ring(
@@ -125,6 +122,12 @@ export function cross(pen: Pen, x: number, y: number, arm: number): void {
     stroke(pen, x - arm, y - arm, x + arm, y + arm, width * arm, ink);
     stroke(pen, x - arm, y + arm, x + arm, y - arm, width * arm, ink);
   }
+}
+
+/** A contact: a cross in a ring. */
+export function violation(pen: Pen, x: number, y: number, arm: number): void {
+  cross(pen, x, y, arm);
+  ring(pen, x, y, 2.1 * arm, 2 * Math.PI, 0.3 * arm, colour("--discharged"));
 }
 
 /** A diamond where least charge was left beyond the way home; filled: the point of no return. */
