@@ -12,6 +12,7 @@ second where the machine does other work, too. Needs Chromium and its driver (De
 
 import argparse
 import os
+import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -19,6 +20,7 @@ from pathlib import Path
 import psutil
 from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -77,7 +79,10 @@ def browser() -> webdriver.Chrome:
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         # Chromium refuses to sandbox its processes for the superuser
         options.add_argument("--no-sandbox")
-    driver = webdriver.Chrome(options=options)
+    options.binary_location = shutil.which("chromium") or ""
+    driver = webdriver.Chrome(
+        options=options, service=Service(shutil.which("chromedriver") or "")
+    )
     width, height = WINDOW_PX
     driver.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",

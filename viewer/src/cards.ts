@@ -18,6 +18,7 @@ interface CardParts {
 export class Cards {
   readonly element: HTMLElement;
   private readonly parts: CardParts[];
+  private readonly looked: string[] = [];
   private readonly fleet: Fleet | null = null;
 
   /** @param changed other UAS are to be shown */
@@ -83,11 +84,17 @@ export class Cards {
       shown.forEach((text, n) => {
         if (texts[n].data !== text) texts[n].data = text;
       });
-      level.style.width = `${100 * Math.max(0, soc)}%`;
-      level.style.background = ofSpare(spare);
-      needed.style.left = `${100 * Math.min(1, Math.max(0, soc - spare))}%`;
+      const looks = [100 * Math.max(0, soc), 100 * Math.min(1, Math.max(0, soc - spare))]
+        .map((percent) => percent.toFixed(0))
+        .concat(ofSpare(spare), String(flies), String(followed === i));
+      // what looks the same costs nothing
+      if (this.looked[i] === looks.join()) return;
+      this.looked[i] = looks.join();
+      level.style.width = `${looks[0]}%`;
+      level.style.background = looks[2];
+      needed.style.left = `${looks[1]}%`;
       needed.hidden = !flies;
-      card.setAttribute("aria-pressed", String(followed === i));
+      card.setAttribute("aria-pressed", looks[4]);
     });
   }
 }

@@ -54,7 +54,7 @@ export class Fleet {
     const charges = vehicles.map(({ soc }) => soc).sort((a, b) => a - b);
     const percent = (share: number) => `${(100 * share).toFixed(0)} %`;
     const median = charges[Math.round(0.5 * (charges.length - 1))];
-    this.words.data = `Charge: least ${percent(charges[0])}, median ${percent(median)}. To spare: least `;
+    this.words.data = `Charge: least ${percent(charges[0])}, median ${percent(median)}. To spare: `;
     const spares = vehicles.map((vehicle) => (flies(vehicle) ? vehicle.spare : Infinity));
     const least = spares.reduce((a, b) => Math.min(a, b), Infinity);
     this.leastIndex = Math.max(0, spares.indexOf(least));
@@ -64,7 +64,8 @@ export class Fleet {
     this.least.setAttribute("aria-pressed", String(followed === this.leastIndex));
     for (const [kind, chip] of this.chips) {
       const count = kind === "all" ? vehicles.length : vehicles.filter((v) => kindsOf(v).includes(kind)).length;
-      chip.textContent = `${count} ${kind}`;
+      const words = `${count} ${kind}`;
+      if (chip.textContent !== words) chip.textContent = words;
       chip.setAttribute("aria-pressed", String(this.chosen === kind));
       chip.hidden = count === 0 && this.chosen !== kind;
     }

@@ -35,7 +35,7 @@ export class Overlay {
       if (at) pen.lineTo(...at);
     }
     pen.closePath();
-    pen.globalAlpha = 0.12;
+    pen.globalAlpha = 0.07;
     pen.fillStyle = hex;
     pen.fill();
     pen.globalAlpha = 0.9;

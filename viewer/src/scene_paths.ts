@@ -1,7 +1,15 @@
 // The paths flown, of all UAS in one: segments in order of time, so that what has been flown at a
 // moment is the first so many of them.
 
-import { Color, Group, InterleavedBufferAttribute } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  Group,
+  InterleavedBufferAttribute,
+  LineBasicMaterial,
+  LineSegments,
+} from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
@@ -16,8 +24,8 @@ const PALE = 0.75;
 
 export class Paths {
   readonly group = new Group();
-  private readonly flown: LineSegments2;
-  private readonly latest: LineSegments2;
+  private readonly flown: Segments;
+  private readonly latest: Segments;
   /** Whose each segment is, and its sample. */
   private readonly segments: [number, number][] = [];
   /** How many segments are over at a sample. */
@@ -35,15 +43,12 @@ export class Paths {
         for (const at of [k, k + 1]) corners.push(...place(flight.position(at, i)).toArray());
       }
     }
-    const look = {
-      linewidth: ghosts ? 1.5 : flight.uas > MANY ? 1.6 : WIDTH_PX,
-      ...(ghosts ? { transparent: true, opacity: 0.55 } : {}),
-    };
-    this.flown = lines(corners, new LineMaterial({ vertexColors: true, ...look }));
-    const newest = new Array(6 * flight.uas).fill(0);
-    this.latest = lines(newest, new LineMaterial({ vertexColors: true, ...look }));
-    this.latest.geometry.setColors(newest);
-    this.group.add(this.flown, this.latest);
+    const look = ghosts ? { transparent: true, opacity: 0.55 } : {};
+    const width = flight.uas > MANY ? null : ghosts ? 1.5 : WIDTH_PX;
+    this.flown = new Segments(this.segments.length, width, look);
+    this.flown.corners(corners);
+    this.latest = new Segments(flight.uas, width, look);
+    this.group.add(this.flown.lines, this.latest.lines);
     this.paint();
   }
 
@@ -60,30 +65,23 @@ export class Paths {
 
   draw(moment: Moment): void {
     const { sample, vehicles } = moment;
-    const count = this.over[Math.min(sample, this.over.length - 1)];
-    this.flown.geometry.instanceCount = count;
-    this.flown.visible = count > 0;
-    // in place: new buffers would be new memory of the graphics card in every picture
-    const corners = this.latest.geometry.getAttribute("instanceStart") as InterleavedBufferAttribute;
-    const colours = this.latest.geometry.getAttribute("instanceColorStart") as InterleavedBufferAttribute;
+    this.flown.show(this.over[Math.min(sample, this.over.length - 1)]);
+    const corners: number[] = [];
+    const colours: number[] = [];
     vehicles.forEach(({ position }, i) => {
       const flown = Math.min(sample, this.flight.data.last[i]);
-      const from = place(this.flight.position(flown, i)).toArray();
-      corners.data.array.set([...from, ...place(position).toArray()], 6 * i);
+      corners.push(...place(this.flight.position(flown, i)).toArray(), ...place(position).toArray());
       const ink = this.colour(i, flown);
-      colours.data.array.set([...ink, ...ink], 6 * i);
+      colours.push(...ink, ...ink);
     });
-    corners.data.needsUpdate = colours.data.needsUpdate = true;
+    this.latest.corners(corners);
+    this.latest.colours(colours);
   }
 
   private paint(): void {
-    if (this.segments.length === 0) return;
-    const colours = new Float32Array(6 * this.segments.length);
-    this.segments.forEach(([i, k], n) => {
-      colours.set(this.colour(i, k), 6 * n);
-      colours.set(this.colour(i, k + 1), 6 * n + 3);
-    });
-    this.flown.geometry.setColors(colours);
+    const colours: number[] = [];
+    for (const [i, k] of this.segments) colours.push(...this.colour(i, k), ...this.colour(i, k + 1));
+    this.flown.colours(colours);
   }
 
   /** Of others than the one that is looked at: nearly that of the ground. */
@@ -94,12 +92,51 @@ export class Paths {
   }
 }
 
-function lines(corners: number[], paint: LineMaterial): LineSegments2 {
-  const geometry = new LineSegmentsGeometry();
-  // a buffer cannot be empty
-  geometry.setPositions(corners.length > 0 ? corners : new Array(6).fill(0));
-  const made = new LineSegments2(geometry, paint);
-  // its extent changes with every moment
-  made.frustumCulled = false;
-  return made;
+/** Coloured segments: wide ones, or, of very many, those of one pixel. */
+class Segments {
+  readonly lines: LineSegments | LineSegments2;
+
+  constructor(private readonly count: number, width: number | null, look: object) {
+    // a buffer cannot be empty
+    const blank = () => new Float32Array(6 * Math.max(1, count));
+    if (width === null) {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute("position", new BufferAttribute(blank(), 3));
+      geometry.setAttribute("color", new BufferAttribute(blank(), 3));
+      this.lines = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true, ...look }));
+    } else {
+      const geometry = new LineSegmentsGeometry();
+      geometry.setPositions(blank());
+      geometry.setColors(blank());
+      const paint = new LineMaterial({ vertexColors: true, linewidth: width, ...look });
+      this.lines = new LineSegments2(geometry, paint);
+    }
+    // its extent changes with every moment
+    this.lines.frustumCulled = false;
+  }
+
+  corners(values: number[]): void {
+    this.set("position", "instanceStart", values);
+  }
+
+  colours(values: number[]): void {
+    this.set("color", "instanceColorStart", values);
+  }
+
+  /** The first so many. */
+  show(count: number): void {
+    const { geometry } = this.lines;
+    if (geometry instanceof LineSegmentsGeometry) geometry.instanceCount = count;
+    else geometry.setDrawRange(0, 2 * count);
+    this.lines.visible = count > 0;
+  }
+
+  // in place: new buffers would be new memory of the graphics card in every picture
+  private set(thin: string, wide: string, values: number[]): void {
+    const attribute =
+      this.lines.geometry.getAttribute(this.lines instanceof LineSegments2 ? wide : thin);
+    const buffer = attribute instanceof InterleavedBufferAttribute ? attribute.data : attribute;
+    buffer.array.set(values.slice(0, 6 * this.count));
+    buffer.needsUpdate = true;
+  }
 }

@@ -44,7 +44,8 @@ float segment(vec2 from, vec2 to) {
 void main() {
   float away = length(at);
   float pixel = fwidth(away);
-  float width = max(0.035, 0.6 * pixel);
+  float width = max(0.035, 0.5 * pixel);
+  float strength = clamp(0.09 / pixel, 0.45, 1.0);
   float line = abs(away - 1.0);
   if (what.x > 0.5 && pixel < 0.1) line = min(line, abs(away - 0.82));
   float ring = 1.0 - smoothstep(width - 0.5 * pixel, width + 0.5 * pixel, line);
@@ -55,6 +56,7 @@ void main() {
       segment(vec2(-0.3, 0.0), vec2(-0.08, -0.21)), segment(vec2(-0.08, -0.21), vec2(0.3, 0.21)));
     if (pixel < 0.14) ring = max(ring, 1.0 - smoothstep(0.05, 0.05 + pixel, tick));
   }
+  ring *= strength;
   float alpha = max(ring, fill);
   if (alpha < 0.02) discard;
   vec3 ink = what.y > 0.5 ? edge : open;
