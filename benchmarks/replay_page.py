@@ -80,9 +80,7 @@ def browser() -> webdriver.Chrome:
         # Chromium refuses to sandbox its processes for the superuser
         options.add_argument("--no-sandbox")
     options.binary_location = shutil.which("chromium") or ""
-    driver = webdriver.Chrome(
-        options=options, service=Service(shutil.which("chromedriver") or "")
-    )
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver") or ""))
     width, height = WINDOW_PX
     driver.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",

@@ -54,7 +54,7 @@ export class Fleet {
     const charges = vehicles.map(({ soc }) => soc).sort((a, b) => a - b);
     const percent = (share: number) => `${(100 * share).toFixed(0)} %`;
     const median = charges[Math.round(0.5 * (charges.length - 1))];
-    this.words.data = `Charge: least ${percent(charges[0])}, median ${percent(median)}. To spare: `;
+    this.words.data = `Charge: least ${percent(charges[0])}, median ${percent(median)}; spare: `;
     const spares = vehicles.map((vehicle) => (flies(vehicle) ? vehicle.spare : Infinity));
     const least = spares.reduce((a, b) => Math.min(a, b), Infinity);
     this.leastIndex = Math.max(0, spares.indexOf(least));

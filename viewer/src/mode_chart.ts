@@ -23,7 +23,7 @@ const PAINT: Record<string, [string, string]> = {
 export class ModeChart extends TimeCanvas {
   constructor(private readonly flight: Flight, duration: number, seek: (time: number) => void) {
     super("Operation modes", duration, seek);
-    const rows = flight.uas > MANY ? 5 : flight.uas;
+    const rows = flight.uas > MANY ? 4 : flight.uas;
     const high = TOP + 8 + rows * (rows > 6 ? 8 : 15);
     this.canvas.style.gridRow = `span ${Math.ceil(high / ROW_PX)}`;
   }
@@ -67,12 +67,13 @@ export class ModeChart extends TimeCanvas {
     this.write(String(this.flight.uas), 35, top + 5, colour("--faint"), "right");
     this.write("0", 35, bottom - 4, colour("--faint"), "right");
     for (let k = 0; k < samples - 1; k++) {
-      const [x, end] = [this.x(k * dt_s), this.x((k + 1) * dt_s)];
+      // whole pixels, or seams would be seen
+      const [x, end] = [k, k + 1].map((each) => Math.round(this.x(each * dt_s)));
       let y = bottom;
       for (const [m, mode] of modes.entries()) {
         const high = unit * this.count(k, m);
         this.pen.fillStyle = colour((PAINT[mode] ?? ["--landed"])[0]);
-        this.pen.fillRect(x, y - high, end - x + 0.5, high);
+        this.pen.fillRect(x, y - high, end - x, high);
         y -= high;
       }
     }
