@@ -45,7 +45,10 @@ export class ModeChart extends TimeCanvas {
     const height = Math.min(26, (this.height - TOP - 6) / this.flight.uas);
     this.flight.scene.uas.forEach((uas, i) => {
       const y = TOP + i * height;
-      this.write(shortName(uas.name), 35, y + height / 2, bright(uas.colour), "right", 600);
+      // of rows that are low every second has room for its number
+      if (height >= WORDS_PX || i % 2 === 0) {
+        this.write(shortName(uas.name), 35, y + height / 2, bright(uas.colour), "right", 600);
+      }
       const gap = height >= WORDS_PX ? 3 : 1;
       for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - gap);
     });

@@ -3,6 +3,7 @@
 import type { Clock } from "./clock";
 import type { Flight } from "./flight";
 import { colour } from "./palette";
+import { table } from "./table";
 
 const TITLE_PX = 26;
 const FILM_FPS = 30;
@@ -41,27 +42,6 @@ export function compose(shown: Shown[], on = document.createElement("canvas")): 
 
 export function savePicture(shown: Shown[], name: string): void {
   compose(shown).toBlob((blob) => blob && save(blob, `${name}.png`), "image/png");
-}
-
-/** The readings of all UAS at every sample. */
-export function table(flights: Flight[]): string {
-  const head = "flight,t_s,uas,x_m,y_m,z_m,soc,needed_soc,voltage_V,current_A,mode,covered";
-  const rows = flights.flatMap((flight, n) =>
-    flight.scene.uas.flatMap(({ name }, i) =>
-      Array.from({ length: flight.data.last[i] + 1 }, (_, k) => {
-        const { data } = flight;
-        const at = k * flight.uas + i;
-        const numbers = [data.soc, data.needed, data.voltage, data.current].map(({ values, unit }) =>
-          plain(values[at] * unit),
-        );
-        const position = flight.position(k, i).map(plain);
-        const mode = flight.mode(k, i);
-        const cells = [n + 1, plain(k * data.dt_s), quoted(name), ...position, ...numbers, mode, data.covered[k]];
-        return cells.join(",");
-      }),
-    ),
-  );
-  return [head, ...rows, ""].join("\n");
 }
 
 export function saveTable(flights: Flight[], name: string): void {
@@ -117,12 +97,4 @@ function save(blob: Blob, name: string): void {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
-
-function plain(value: number): string {
-  return String(Number(value.toFixed(4)));
-}
-
-function quoted(text: string): string {
-  return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
