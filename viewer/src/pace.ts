@@ -1,5 +1,5 @@
 // Whether pictures come fast enough; where they do not, they are drawn with fewer pixels as long as
-// something moves, and whole again when it stands.
+// something moves, picture after picture, and whole again when it stands.
 
 const SLOW_MS = 55;
 const STANDS_MS = 250;
@@ -21,9 +21,9 @@ export class Pace {
       this.moved = now;
       this.late = passed > SLOW_MS ? this.late + 1 : 0;
       if (this.late >= LATE) this.set(true);
-    } else if (now - this.moved > STANDS_MS) {
+    } else {
       this.late = 0;
-      this.set(false);
+      if (now - this.moved > STANDS_MS) this.set(false);
     }
   }
 

@@ -22,9 +22,13 @@ export function reachable(reach: ReachData, i: number, from: Point3, soc: number
     let [way, before] = [0, here];
     for (;;) {
       const next = way + step;
-      const after = left(from[0] + next * north, from[1] + next * east, next);
-      // beyond the fence nothing is reached
-      if (after === null) break;
+      const at = (far: number) => left(from[0] + far * north, from[1] + far * east, far);
+      const after = at(next);
+      if (after === null) {
+        // beyond the fence nothing is reached: halve the step up to it
+        for (let part = step / 2; part > step / 64; part /= 2) if (at(way + part) !== null) way += part;
+        break;
+      }
       if (after <= 0) {
         way += (step * before) / (before - after);
         break;

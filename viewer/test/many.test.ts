@@ -18,6 +18,8 @@ test("slow pictures get coarse while something moves, and fine once it stands", 
   drawn(16, true);
   for (let n = 0; n < 20; n++) drawn(16, true);
   assert.deepEqual(told, [], "fast enough");
+  for (let n = 0; n < 9; n++) drawn(120, n % 2 === 0);
+  assert.deepEqual(told, [], "one picture now and then may take its time");
   for (let n = 0; n < 4; n++) drawn(120, true);
   assert.deepEqual(told, [true]);
   for (let n = 0; n < 4; n++) drawn(30, true);
