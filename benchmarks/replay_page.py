@@ -117,7 +117,7 @@ def played(page: Path, view: str, seconds: float) -> tuple[float, float, float]:
 
 def main() -> None:
     """Fly, write the pages, play them, print a row for each."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Play replay pages and count.")
     parser.add_argument("--uas", default="2,8,32,100", help="numbers of UAS")
     parser.add_argument("--views", default="3d,map", help="of 3d, map")
     parser.add_argument("--seconds", type=float, default=8.0, help="of playing")

@@ -23,7 +23,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env import Flight
 
-PAGE_PX = (1100, 620)
+PAGE_PX = (1240, 699)
 SCALE = 2  # without a graphics card edges are smooth only if they are drawn larger
 GIF_PX = (880, 496)
 COLOURS = 128
