@@ -23,7 +23,7 @@ from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
 
 PICTURES = Path(__file__).parent / "pictures"
-TILE_PX, COLUMNS, TITLE_PX, COLOURS = 400, 3, 28, 128
+TILE_PX, COLUMNS, TITLE_PX, COLOURS = 400, 3, 28, 256
 PAGE_PX = (1280, 800)
 SCENARIOS = ("village", "gasche2025", "corridor", "open_field", "generated:3", "streets:2")
 PLANNERS = (
@@ -40,10 +40,14 @@ def titled(pixels: NDArray[np.uint8], title: str) -> Image.Image:
     return tile
 
 
-def save(image: Image.Image, name: str) -> None:
-    """Write a picture with few colours."""
+def save(image: Image.Image, name: str, *, colours: int | None = None) -> None:
+    """Write a picture, of maps with few colours."""
     path = PICTURES / name
-    image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    kept = image.convert("RGB")
+    if colours is not None:
+        # few pixels have the colours of paths and curves, and those have to stay
+        kept = kept.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    kept.save(path, optimize=True)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
 
 
@@ -54,7 +58,7 @@ def save_tiles(tiles: list[Image.Image], name: str) -> None:
     for n, tile in enumerate(tiles):
         row, column = divmod(n, COLUMNS)
         sheet.paste(tile, (column * TILE_PX, row * (TILE_PX + TITLE_PX)))
-    save(sheet, name)
+    save(sheet, name, colours=COLOURS)
 
 
 def flown_picture(flight: Flight) -> Image.Image:

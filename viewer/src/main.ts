@@ -157,7 +157,10 @@ function loop(now: number): void {
 }
 
 const observer = new ResizeObserver(resize);
-for (const panel of panels) observer.observe(panel.stage);
+for (const panel of panels) {
+  observer.observe(panel.stage);
+  observer.observe(panel.curveBox);
+}
 onThemeChange(() => {
   for (const panel of panels) panel.repaint();
   invalidate();

@@ -42,6 +42,7 @@ export class Panel {
   private readonly header = element("header");
   private readonly below = element("div", { class: "below" });
   private readonly side = element("div", { class: "side" });
+  readonly curveBox = element("div", { class: "charts" });
   private readonly now = element("ul", { class: "now", "aria-live": "polite", "aria-label": "Now" });
   private readonly legend = element("div", { class: "legend" });
   private readonly beside = element("p", { class: "beside" });
@@ -157,12 +158,13 @@ export class Panel {
     this.cards = new Cards(flight, events.follow, events.invalidate);
     this.header.replaceChildren(element("h1", {}, title(flight)), element("p", {}, outcome(flight)));
     this.below.replaceChildren(profile.canvas);
+    this.curveBox.replaceChildren(...beside.map((chart) => chart.canvas));
     this.side.dataset.title = title(flight);
     this.side.replaceChildren(
       this.cards.element,
       ...this.violations(),
       ...this.marks(),
-      element("div", { class: "charts" }, ...beside.map((chart) => chart.canvas)),
+      this.curveBox,
     );
   }
 

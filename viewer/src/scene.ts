@@ -13,7 +13,7 @@ import { extentOf, terrain, type Extent } from "./scene_terrain";
 import { Vehicles } from "./scene_vehicles";
 import { Waypoints } from "./scene_waypoints";
 import { Trail } from "./trail";
-import type { Focus, Pose, View } from "./view";
+import { type Focus, NO_FOCUS, type Pose, type View } from "./view";
 
 /** Of the pixels in each direction, while pictures are due faster than they can be drawn. */
 const COARSE = 0.5;
@@ -93,13 +93,13 @@ export class SceneView implements View {
     const size = Math.min(1, Math.max(0.6, Math.min(width, 1.3 * height) / 800));
     const pixel = (size * 2 * Math.tan((lens.fov * Math.PI) / 360)) / height;
     const { zoom } = this.camera;
-    this.vehicles.draw(moment, pixel, lens.position, uas, zoom);
-    const paths = [[this.paths, moment] as const];
+    this.vehicles.draw(moment, pixel, lens.position, focus, zoom);
+    this.paths.focus(focus);
+    this.paths.draw(moment);
     const other = this.ghost?.moment(time);
-    if (this.ghostPaths && other) paths.push([this.ghostPaths, other]);
-    for (const [drawn, at] of paths) {
-      drawn.focus(uas);
-      drawn.draw(at);
+    if (this.ghostPaths && other) {
+      this.ghostPaths.focus({ ...NO_FOCUS, uas });
+      this.ghostPaths.draw(other);
     }
     this.waypoints.draw(moment);
     this.moving.draw(moment);

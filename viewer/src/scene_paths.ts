@@ -17,6 +17,7 @@ import type { Flight, Moment } from "./flight";
 import { bright, colour } from "./palette";
 import { place } from "./scene_space";
 import type { Trail } from "./trail";
+import type { Focus } from "./view";
 
 const WIDTH_PX = 2.4;
 const MANY = 12;
@@ -31,9 +32,10 @@ export class Paths {
   /** How many segments are over at a sample. */
   private readonly over: number[] = [];
   private trail: Trail | null = null;
-  private focused: number | null = null;
+  private looked: boolean[];
 
   constructor(private readonly flight: Flight, ghosts: boolean) {
+    this.looked = flight.scene.uas.map(() => true);
     const corners: number[] = [];
     for (let k = 0; k < flight.data.samples; k++) {
       this.over.push(this.segments.length);
@@ -57,9 +59,11 @@ export class Paths {
     this.paint();
   }
 
-  focus(uas: number | null): void {
-    if (uas === this.focused) return;
-    this.focused = uas;
+  /** @param focus of this flight's UAS; those that are not looked at are pale */
+  focus({ uas, shown }: Focus): void {
+    const looked = this.flight.scene.uas.map((_, i) => shown(i) && (uas === null || uas === i));
+    if (looked.every((each, i) => each === this.looked[i])) return;
+    this.looked = looked;
     this.paint();
   }
 
@@ -87,8 +91,8 @@ export class Paths {
   /** Of others than the one that is looked at: nearly that of the ground. */
   private colour(i: number, k: number): number[] {
     const ink = this.trail?.colour(this.flight, i, k) ?? bright(this.flight.scene.uas[i].colour);
-    const pale = this.focused !== null && this.focused !== i;
-    return new Color(ink).lerp(new Color(colour("--ground")), pale ? PALE : 0).toArray();
+    const pale = this.looked[i] ? 0 : PALE;
+    return new Color(ink).lerp(new Color(colour("--ground")), pale).toArray();
   }
 }
 

@@ -27,10 +27,13 @@ import { ofMany } from "./marks";
 import { bright, colour } from "./palette";
 import { drawn } from "./scene_sprites";
 import { place } from "./scene_space";
+import type { Focus } from "./view";
 
 const MOST_PREDICTED = 128;
 const BODY_PX = 22;
 const LEAST_BODY_M = 0.5;
+/** Size of those that are not to be shown. */
+const HIDDEN = 0.5;
 
 export class Vehicles {
   readonly group = new Group();
@@ -75,14 +78,15 @@ export class Vehicles {
    * @param pixel height of one pixel at distance 1
    * @param zoom how much nearer the eye is than where it sees the whole area
    */
-  draw(moment: Moment, pixel: number, eye: Vector3, followed: number | null, zoom: number): void {
+  draw(moment: Moment, pixel: number, eye: Vector3, focus: Focus, zoom: number): void {
     const crowded = Math.min(1, ofMany(this.flight.uas) * Math.max(1, zoom));
     const drops = this.drops.geometry.getAttribute("position") as BufferAttribute;
     moment.vehicles.forEach(({ position, attitude, mode }, i) => {
       const at = place(position);
       const flies = mode !== "landed" && mode !== "lost";
       const [phi, theta, psi] = attitude;
-      const wanted = BODY_PX * (i === followed ? 1 : crowded) * pixel * eye.distanceTo(at);
+      const share = i === focus.uas ? 1 : focus.shown(i) ? crowded : HIDDEN * crowded;
+      const wanted = BODY_PX * share * pixel * eye.distanceTo(at);
       const size = flies ? Math.max(LEAST_BODY_M, wanted) : 0;
       // body axes forward, right, down are -z, x, -y of the scene at heading north
       const turned = new Quaternion().setFromEuler(new Euler(theta, -psi, -phi, "YXZ"));
