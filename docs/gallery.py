@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from replay_gif import browser, emulated
+from replay_gif import browser, emulated, few_coloured
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -23,7 +23,7 @@ from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
 
 PICTURES = Path(__file__).parent / "pictures"
-TILE_PX, COLUMNS, TITLE_PX, COLOURS = 400, 3, 28, 256
+TILE_PX, COLUMNS, TITLE_PX = 400, 3, 28
 PAGE_PX = (1280, 800)
 SCENARIOS = ("village", "gasche2025", "corridor", "open_field", "generated:3", "streets:2")
 PLANNERS = (
@@ -40,14 +40,10 @@ def titled(pixels: NDArray[np.uint8], title: str) -> Image.Image:
     return tile
 
 
-def save(image: Image.Image, name: str, *, colours: int | None = None) -> None:
-    """Write a picture, of maps with few colours."""
+def save(image: Image.Image, name: str) -> None:
+    """Write a picture with few colours."""
     path = PICTURES / name
-    kept = image.convert("RGB")
-    if colours is not None:
-        # few pixels have the colours of paths and curves, and those have to stay
-        kept = kept.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    kept.save(path, optimize=True)
+    few_coloured(image).save(path, optimize=True)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
 
 
@@ -58,7 +54,7 @@ def save_tiles(tiles: list[Image.Image], name: str) -> None:
     for n, tile in enumerate(tiles):
         row, column = divmod(n, COLUMNS)
         sheet.paste(tile, (column * TILE_PX, row * (TILE_PX + TITLE_PX)))
-    save(sheet, name, colours=COLOURS)
+    save(sheet, name)
 
 
 def flown_picture(flight: Flight) -> Image.Image:
