@@ -29,14 +29,20 @@ export class Picker {
     };
     const [uas, near] = nearest(moment.vehicles.map(({ position }) => away(position)));
     if (near <= NEAR_PX) return { words: "", at: moment.vehicles[uas].position, sample: null, uas };
-    const spots = flight.scene.waypoints.map(({ at }) => at);
-    const [waypoint, far] = nearest(spots.map(away));
-    if (far <= NEAR_PX) {
-      const sample = by[waypoint] === null ? null : flight.data.covered_at[waypoint];
-      const words = waypointWords(flight, waypoint, by);
-      return { words, at: spots[waypoint], sample, uas: by[waypoint] };
-    }
-    return this.leg(away, moment.sample, by);
+    const { waypoints } = flight.scene;
+    const [w, far] = nearest(waypoints.map(({ at }) => away(at)));
+    const waypoint = (): Picked => {
+      const sample = by[w] === null ? null : flight.data.covered_at[w];
+      return { words: waypointWords(flight, w, by), at: waypoints[w].at, sample, uas: by[w] };
+    };
+    if (far <= NEAR_PX) return waypoint();
+    const leg = this.leg(away, moment.sample, by);
+    if (leg || waypoints.length === 0) return leg;
+    // nothing else is there: somewhere in its ring is enough
+    const { at: [north, east, down], radius } = waypoints[w];
+    const [middle, edge] = [pixel([north, east, down]), pixel([north, east + radius, down])];
+    const inRing = middle && edge && far <= Math.hypot(edge[0] - middle[0], edge[1] - middle[1]);
+    return inRing ? waypoint() : null;
   }
 
   private leg(away: (point: Point3) => number, until: number, by: (number | null)[]): Picked | null {

@@ -55,6 +55,8 @@ test("a click finds the vehicle before the waypoint, the waypoint before the pat
   assert.equal(at(3, 2)?.words, "");
   assert.match(at(1.1, 2)!.words, /^Waypoint 1/);
   assert.match(at(0.2, 0.1)!.words, /^uas_1 to waypoint 1/);
+  assert.match(at(40, 43)!.words, /^Waypoint 2/, "in its ring, where nothing else is");
+  assert.equal(at(40, 45), null);
   assert.equal(at(-20, 20), null);
 });
 
