@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from replay_gif import browser, emulated, few_coloured
+from replay_gif import browser, emulated
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -43,7 +43,10 @@ def titled(pixels: NDArray[np.uint8], title: str) -> Image.Image:
 def save(image: Image.Image, name: str) -> None:
     """Write a picture with few colours."""
     path = PICTURES / name
-    few_coloured(image).save(path, optimize=True)
+    # a palette that keeps the colours of thin lines and of large areas
+    coverage = Image.Quantize.MAXCOVERAGE
+    few = image.convert("RGB").quantize(256, coverage, kmeans=4, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
 
 

@@ -26,7 +26,7 @@ from uas_coverage_env import Flight
 PAGE_PX = (1240, 699)
 SCALE = 2  # without a graphics card edges are smooth only if they are drawn larger
 GIF_PX = (880, 496)
-COLOURS = 256
+COLOURS = 128
 FRAME_MS = 80
 LAST_FRAME_MS = 2000
 _DRAWN = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))"
@@ -69,15 +69,9 @@ def frames(driver: webdriver.Chrome, page: Path, steps: int, stride: int) -> Ite
         yield shot.resize(GIF_PX, Image.Resampling.LANCZOS)
 
 
-def few_coloured(image: Image.Image) -> Image.Image:
-    """A picture with a palette that keeps the colours of thin lines and of large areas."""
-    coverage = Image.Quantize.MAXCOVERAGE
-    return image.convert("RGB").quantize(COLOURS, coverage, kmeans=4, dither=Image.Dither.NONE)
-
-
 def save_gif(pictures: list[Image.Image], path: Path) -> None:
     """Write the pictures with one palette, so that unchanged pixels cost nothing."""
-    palette = few_coloured(pictures[len(pictures) // 2])
+    palette = pictures[len(pictures) // 2].quantize(COLOURS, dither=Image.Dither.NONE)
     first, *others = (p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures)
     first.save(
         path,
