@@ -184,8 +184,18 @@ export function stroke(
 }
 
 /** Marks of many UAS are smaller, so that they do not hide each other and the waypoints. */
-export function ofMany(uas: number): number {
+function ofMany(uas: number): number {
   return Math.max(0.4, Math.min(1, Math.sqrt(8 / uas)));
+}
+
+/** Of many, those beside the one that is followed stay smaller than it. */
+const BESIDE = 0.6;
+
+/** Size of the marks of a UAS that is not followed: of many smaller, and whole again from near. */
+export function crowded(uas: number, zoom: number, oneIsFollowed: boolean): number {
+  const share = ofMany(uas);
+  const most = oneIsFollowed ? Math.max(BESIDE, share) : 1;
+  return Math.min(most, share * Math.max(1, zoom));
 }
 
 /** What a UAS is called on the map: the end of its name. */

@@ -85,7 +85,7 @@ export class Overlay {
   /** Size of one UAS's marks: of many smaller, and whole again from near. */
   private size(i: number, focus: Focus, unit: number, zoom: number): number {
     if (i === focus.uas) return unit;
-    return unit * Math.min(1, marks.ofMany(this.flight.uas) * Math.max(1, zoom));
+    return unit * marks.crowded(this.flight.uas, zoom, focus.uas !== null);
   }
 
   private vehicle(moment: Moment, i: number, focus: Focus, unit: number, zoom: number, crosses: boolean): void {

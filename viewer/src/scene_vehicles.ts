@@ -23,7 +23,7 @@ import {
 } from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import type { Flight, Moment } from "./flight";
-import { ofMany } from "./marks";
+import { crowded } from "./marks";
 import { bright, colour } from "./palette";
 import { drawn } from "./scene_sprites";
 import { place } from "./scene_space";
@@ -79,13 +79,13 @@ export class Vehicles {
    * @param zoom how much nearer the eye is than where it sees the whole area
    */
   draw(moment: Moment, pixel: number, eye: Vector3, focus: Focus, zoom: number): void {
-    const crowded = Math.min(1, ofMany(this.flight.uas) * Math.max(1, zoom));
+    const among = crowded(this.flight.uas, zoom, focus.uas !== null);
     const drops = this.drops.geometry.getAttribute("position") as BufferAttribute;
     moment.vehicles.forEach(({ position, attitude, mode }, i) => {
       const at = place(position);
       const flies = mode !== "landed" && mode !== "lost";
       const [phi, theta, psi] = attitude;
-      const share = i === focus.uas ? 1 : focus.shown(i) ? crowded : HIDDEN * crowded;
+      const share = i === focus.uas ? 1 : focus.shown(i) ? among : HIDDEN * among;
       const wanted = BODY_PX * share * pixel * eye.distanceTo(at);
       const size = flies ? Math.max(LEAST_BODY_M, wanted) : 0;
       // body axes forward, right, down are -z, x, -y of the scene at heading north
