@@ -23,7 +23,8 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env import Flight
 
-PAGE_PX = (1100, 620)
+PAGE_PX = (1240, 699)
+SCALE = 2  # without a graphics card edges are smooth only if they are drawn larger
 GIF_PX = (880, 496)
 COLOURS = 128
 FRAME_MS = 80
@@ -43,17 +44,22 @@ def browser() -> webdriver.Chrome:
     return webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver") or ""))
 
 
-def frames(driver: webdriver.Chrome, page: Path, steps: int, stride: int) -> Iterator[Image.Image]:
-    """The page at every `stride`-th step, and at the last one."""
-    width, height = PAGE_PX
+def emulated(driver: webdriver.Chrome, size: tuple[int, int], theme: str) -> None:
+    """Give a browser a window of so many pixels, light or dark."""
+    width, height = size
     driver.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",
-        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
+        {"width": width, "height": height, "deviceScaleFactor": SCALE, "mobile": False},
     )
     driver.execute_cdp_cmd(
         "Emulation.setEmulatedMedia",
-        {"features": [{"name": "prefers-color-scheme", "value": "light"}]},
+        {"features": [{"name": "prefers-color-scheme", "value": theme}]},
     )
+
+
+def frames(driver: webdriver.Chrome, page: Path, steps: int, stride: int) -> Iterator[Image.Image]:
+    """The page at every `stride`-th step, and at the last one."""
+    emulated(driver, PAGE_PX, "light")
     driver.get(page.as_uri())
     WebDriverWait(driver, 30).until(lambda _: driver.find_elements(By.CLASS_NAME, "card"))
     for step in [*range(0, steps, stride), steps]:

@@ -10,6 +10,7 @@ from rich.spinner import Spinner
 
 from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.compilation import compilation_shown
+from uas_coverage_env.cli.live import LiveView
 from uas_coverage_env.cli.watch import FlightWindow
 from uas_coverage_env.draw import NoDisplayError
 from uas_coverage_env.flight import Planner, Progress
@@ -23,7 +24,7 @@ _NO_CHARGE = {LANDED: "landed", LOST: "lost"}
 
 @contextmanager
 def shown(
-    out: Console, scenario: Scenario, *, watch: Planner | None = None
+    out: Console, scenario: Scenario, *, watch: Planner | None = None, live: bool = False
 ) -> Iterator[Callable[[Progress], object]]:
     """Show how a flight goes: gives the function that `rollout` calls in every step.
 
@@ -32,11 +33,13 @@ def shown(
         scenario: The scenario flown.
         watch: The planner, if the flight is to be watched: in a window, or as an ASCII map where
             there is no display.
+        live: Serve the replay page of the flight while it is flown.
     """
     window = None if watch is None else _window(out, scenario, watch)
     ascii_map = None
     if watch is not None and window is None:
         ascii_map = AsciiMap(scenario, *out.size)
+    server = LiveView(out) if live else None
     try:
         with _lines(out, ascii_map) as write:
 
@@ -44,9 +47,13 @@ def shown(
                 write(progress)
                 if window is not None:
                     window(progress)
+                if server is not None:
+                    server(progress)
 
             yield update
     finally:
+        if server is not None:
+            server.close()
         if window is not None:
             window.close()
 

@@ -74,6 +74,13 @@ def run(
             "map of letters.",
         ),
     ] = False,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live",
+            help="Serve the replay page while it is planned, on this machine alone (127.0.0.1).",
+        ),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(help="Flight directory; default: flights/SCENARIO-PLANNER-SEED, numbered."),
@@ -96,6 +103,8 @@ def run(
     """
     if sorties is not None and steps is not None:
         raise InputError("--steps ends a flight in the air: give either --steps or --sorties")
+    if sorties is not None and live:
+        raise InputError("--live shows one flight: give either --live or --sorties")
     mission = loaded(scenario)
     player = load_planner(planner, _options(option or ()))
     # KIND:ARGUMENT may hold a path
@@ -106,7 +115,7 @@ def run(
     screen = console(quiet=quiet or as_json)
 
     def fly(what: Scenario) -> Flight:
-        with shown(screen, what, watch=player if watch else None) as on_step:
+        with shown(screen, what, watch=player if watch else None, live=live) as on_step:
             return rollout(
                 what,
                 player,

@@ -31,12 +31,21 @@ _RECORDED_WHERE_INSTALLED = ("pyscipopt", "gurobipy")
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a flight stands: told before the first decision and after every step."""
+    """Where a flight stands: told before the first decision and after every step.
+
+    Attributes:
+        swarm: As it is now.
+        max_steps: After which the flight ends.
+        covered: Waypoints so far.
+        decision_time_s: Of the last decision [s]; None before the first.
+        flown: Makes a `Flight` of what has been flown so far.
+    """
 
     swarm: SwarmState
     max_steps: int
     covered: int
     decision_time_s: float | None
+    flown: Callable[[], Flight]
 
 
 def rollout(
@@ -106,23 +115,31 @@ def rollout(
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
     log = FlightLog(world, scenario, meter)
     started = time.perf_counter()
+
+    def flown(ended: str = "stopped") -> Flight:
+        return Flight(
+            scenario=scenario,
+            planner=name_of(planner),
+            planner_options=options_of(planner),
+            seed=seed,
+            dynamics=dynamics,
+            return_mode=return_mode,
+            safety_filter=safety_filter,
+            disturbances=tuple(disturbance.name for disturbance in world.disturbances),
+            ended=ended,
+            wall_time_s=time.perf_counter() - started,
+            versions=recorded_versions(),
+            **log.series(),
+        )
+
+    def tell(swarm: SwarmState, decision_time_s: float | None) -> None:
+        if on_step is not None:
+            on_step(Progress(swarm, limit, log.covered, decision_time_s, flown))
+
     ended = "stopped"
     with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid
-        ended = _fly(world, planner, log, limit, seed, on_step, should_stop)
-    return Flight(
-        scenario=scenario,
-        planner=name_of(planner),
-        planner_options=options_of(planner),
-        seed=seed,
-        dynamics=dynamics,
-        return_mode=return_mode,
-        safety_filter=safety_filter,
-        disturbances=tuple(disturbance.name for disturbance in world.disturbances),
-        ended=ended,
-        wall_time_s=time.perf_counter() - started,
-        versions=recorded_versions(),
-        **log.series(),
-    )
+        ended = _fly(world, planner, log, limit, seed, tell, should_stop)
+    return flown(ended)
 
 
 def _is_uncertain(scenario: Scenario, disturbances: Sequence[Disturbance] | None) -> bool:
@@ -158,13 +175,12 @@ def _fly(
     log: FlightLog,
     limit: int,
     seed: int,
-    on_step: Callable[[Progress], object] | None,
+    tell: Callable[[SwarmState, float | None], None],
     should_stop: Callable[[], bool] | None,
 ) -> str:
     """Fly until the end; returns how it came about, see `Flight.ended`."""
     swarm, revisions = world.swarm_state(), 0
-    if on_step is not None:
-        on_step(Progress(swarm, limit, log.covered, None))
+    tell(swarm, None)
     while not world.done:
         if log.steps >= limit:
             return "steps"
@@ -177,8 +193,7 @@ def _fly(
         if world.revisions != revisions:
             revisions = world.revisions
             planner.reset(MissionBrief.of(world.known), seed)
-        if on_step is not None:
-            on_step(Progress(swarm, limit, log.covered, decision))
+        tell(swarm, decision)
     return "complete"
 
 

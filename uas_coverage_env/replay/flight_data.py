@@ -9,8 +9,10 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, covered_at, summary
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.mark_data import marks
+from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.replay.safety_data import floors_m, rooms
 from uas_coverage_env.replay.scene_data import scene_data
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA
 
 POSITION_M = 0.01
@@ -68,6 +70,7 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "covered_at": covered_at(flight).tolist(),
         "fallbacks": [k for k, decision in enumerate(flight.decisions) if decision.fallback],
         "plan": {"unit": PLAN_M, "steps": _plan(flight, source)},
+        "reach": _reach(flight.scenario, source),
         "room": {kind: _series(room_m, ROOM_M, kind, source) for kind, (room_m, _) in room.items()},
         "min_height_m": flight.scenario.min_height_m,
         "no_return": list(home.no_return),
@@ -77,6 +80,21 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "summary": {
             key: outcome[key] for key in ("coverage", "steps", "energy_Wh", "all_home", "breaches")
         },
+    }
+
+
+def _reach(scenario: Scenario, source: str) -> dict[str, Any]:
+    found = reach(scenario)
+    axes = {
+        name: [round(float(values[0]), 2), round(float(values[1] - values[0]), 4), len(values)]
+        for name, values in (("north", found.north_m), ("east", found.east_m))
+    }
+    return {
+        **axes,
+        "height": found.height_m,
+        "needed": _series(found.needed_soc, SOC, "charge for the way home", source),
+        "per_m": found.per_m.tolist(),
+        "fixed": found.fixed.tolist(),
     }
 
 

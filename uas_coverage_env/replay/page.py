@@ -26,7 +26,7 @@ _PAGE = """<!doctype html>
 </head>
 <body>
 <noscript>This page draws the flight with JavaScript, which is switched off here.</noscript>
-<script type="application/json" id="flights">{data}</script>
+<script type="application/json" id="flights"{live}>{data}</script>
 <script>{script}</script>
 </body>
 </html>
@@ -50,7 +50,9 @@ def write_replay(
     return path
 
 
-def replay_page(flights: Sequence[Flight], *, sources: Sequence[str] | None = None) -> str:
+def replay_page(
+    flights: Sequence[Flight], *, sources: Sequence[str] | None = None, live: str | None = None
+) -> str:
     """One flight, or two side by side, as a page that opens from disk.
 
     The page may run its own script and style, known by their hashes, and nothing else: what a
@@ -59,6 +61,7 @@ def replay_page(flights: Sequence[Flight], *, sources: Sequence[str] | None = No
     Args:
         flights: One or two flights.
         sources: What mistakes call each flight; by default its planner.
+        live: Where the page asks its server for the rest of a flight that is still flown.
 
     Raises:
         ValueError: No flight, or more than two.
@@ -71,7 +74,8 @@ def replay_page(flights: Sequence[Flight], *, sources: Sequence[str] | None = No
     script, style = _part("viewer.js"), _part("viewer.css")
     title = " and ".join(f"{flight.scenario.name}, {flight.planner}" for flight in flights)
     return _PAGE.format(
-        policy=html.escape(_policy(script, style)),
+        policy=html.escape(_policy(script, style, live is not None)),
+        live="" if live is None else f' data-live="{html.escape(live)}"',
         title=html.escape(title),
         style=style,
         data=_embedded(data),
@@ -79,7 +83,7 @@ def replay_page(flights: Sequence[Flight], *, sources: Sequence[str] | None = No
     )
 
 
-def _policy(script: str, style: str) -> str:
+def _policy(script: str, style: str, live: bool) -> str:
     return "; ".join(
         [
             "default-src 'none'",
@@ -87,6 +91,7 @@ def _policy(script: str, style: str) -> str:
             f"style-src '{_hash(style)}'",
             "base-uri 'none'",
             "form-action 'none'",
+            *(["connect-src 'self'"] if live else []),
         ]
     )
 

@@ -1,7 +1,8 @@
-// One card per UAS: what it is doing now. A click follows it.
+// What each UAS is doing now, a card per UAS; of many also what all do, and which of them to show.
 
 import { element } from "./dom";
-import type { Flight, Moment } from "./flight";
+import type { Flight, Moment, VehicleMoment } from "./flight";
+import { Fleet } from "./fleet";
 import { shortName } from "./marks";
 import { bright, ofSpare } from "./palette";
 
@@ -17,17 +18,28 @@ interface CardParts {
 export class Cards {
   readonly element: HTMLElement;
   private readonly parts: CardParts[];
+  private readonly looked: string[] = [];
+  private readonly fleet: Fleet | null = null;
 
-  constructor(private readonly flight: Flight, follow: (i: number) => void) {
-    this.element = element("div", { class: flight.uas > FEW ? "cards many" : "cards" });
+  /** @param changed other UAS are to be shown */
+  constructor(private readonly flight: Flight, follow: (i: number) => void, changed: () => void) {
+    const many = flight.uas > FEW;
+    this.element = element("div", { class: many ? "cards many" : "cards" });
+    let list = this.element;
+    if (many) {
+      this.fleet = new Fleet(flight, follow, changed);
+      list = element("div", { class: "list" });
+      this.element.append(this.fleet.element, list);
+    }
     this.parts = flight.scene.uas.map((uas, i) => {
       const texts = [0, 1, 2, 3, 4].map(() => document.createTextNode(""));
       const level = element("i");
       const needed = element("u", { title: "Needed for the way home, with margin" });
+      const key = i < 9 ? ` (key ${i + 1})` : "";
       const card = element(
         "button",
-        { class: "card", type: "button", title: `Follow ${uas.name} (key ${i + 1})` },
-        element("b", {}, flight.uas > FEW ? shortName(uas.name) : uas.name),
+        { class: "card", type: "button", title: `Follow ${uas.name}${key}` },
+        element("b", {}, many ? shortName(uas.name) : uas.name),
         element("span", { class: "mode" }, texts[0]),
         element("span", { class: "level" }, level, needed),
         element("span", { class: "charge" }, texts[1]),
@@ -36,7 +48,7 @@ export class Cards {
         element("span", { class: "spare", title: "Beyond the way home, with margin" }, texts[4]),
       );
       card.addEventListener("click", () => follow(i));
-      this.element.append(card);
+      list.append(card);
       return { card, level, needed, texts };
     });
     this.repaint();
@@ -48,9 +60,18 @@ export class Cards {
     });
   }
 
+  /** Whether a UAS is among those that were chosen. */
+  shown(vehicle: VehicleMoment, i: number): boolean {
+    return this.fleet?.shown(vehicle, i) ?? true;
+  }
+
   draw(moment: Moment, followed: number | null): void {
+    this.fleet?.draw(moment, followed);
     this.parts.forEach(({ card, level, needed, texts }, i) => {
-      const { position, soc, spare, speed, mode } = moment.vehicles[i];
+      const vehicle = moment.vehicles[i];
+      card.hidden = !this.shown(vehicle, i);
+      if (card.hidden) return;
+      const { position, soc, spare, speed, mode } = vehicle;
       const flies = mode !== "landed" && mode !== "lost";
       const [north, east, down] = position;
       const shown = [
@@ -60,12 +81,20 @@ export class Cards {
         `N ${north.toFixed(0)} m, E ${east.toFixed(0)} m`,
         flies ? spareWords(spare) : "",
       ];
-      shown.forEach((text, n) => (texts[n].data = text));
-      level.style.width = `${100 * Math.max(0, soc)}%`;
-      level.style.background = ofSpare(spare);
-      needed.style.left = `${100 * Math.min(1, Math.max(0, soc - spare))}%`;
+      shown.forEach((text, n) => {
+        if (texts[n].data !== text) texts[n].data = text;
+      });
+      const looks = [100 * Math.max(0, soc), 100 * Math.min(1, Math.max(0, soc - spare))]
+        .map((percent) => percent.toFixed(0))
+        .concat(ofSpare(spare), String(flies), String(followed === i));
+      // what looks the same costs nothing
+      if (this.looked[i] === looks.join()) return;
+      this.looked[i] = looks.join();
+      level.style.width = `${looks[0]}%`;
+      level.style.background = looks[2];
+      needed.style.left = `${looks[1]}%`;
       needed.hidden = !flies;
-      card.setAttribute("aria-pressed", String(followed === i));
+      card.setAttribute("aria-pressed", looks[4]);
     });
   }
 }

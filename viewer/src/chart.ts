@@ -1,6 +1,7 @@
 // One small chart over time: lines that are told apart by dashes and numbers as well as colour,
 // and a cursor at the time of the page.
 
+import { bandOf, drawBand } from "./band";
 import { noReturn, stroke } from "./marks";
 import { bright, colour } from "./palette";
 import { roundStep } from "./round_step";
@@ -65,7 +66,11 @@ export abstract class TimeCanvas {
   protected height = 0;
   protected focused: number | null = null;
 
-  constructor(title: string, private readonly duration: number, seek: (time: number) => void) {
+  constructor(
+    private readonly title: string,
+    private readonly duration: number,
+    seek: (time: number) => void,
+  ) {
     this.canvas.className = "chart";
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", title);
@@ -113,8 +118,15 @@ export abstract class TimeCanvas {
     this.drawAt(time);
   }
 
+  /** Say what is to be seen at a time, for those who do not see it. */
+  describe(time: number): void {
+    this.canvas.setAttribute("aria-label", `${this.title} at ${time.toFixed(1)} s: ${this.words(time)}`);
+  }
+
   protected abstract drawStill(): void;
   protected abstract drawAt(time: number): void;
+  /** Values at a time. */
+  protected abstract words(time: number): string;
 
   protected x(time: number): number {
     return LEFT + (time / Math.max(this.duration, 1e-9)) * (this.width - LEFT - RIGHT);
@@ -191,8 +203,11 @@ export class Chart extends TimeCanvas {
       this.write(words, left + 4, y + 7, colour("--faint"));
     }
     const together = content.lines.filter((line) => line.uas !== undefined && !line.limit);
-    if (together.length > MANY && this.focused === null) this.band(together);
-    else for (const line of content.lines) this.line(line);
+    const many = together.length > MANY;
+    if (many) this.band(together);
+    for (const line of content.lines) {
+      if (!many || line.uas === undefined || line.uas === this.focused) this.line(line);
+    }
     this.names();
     for (const point of content.points ?? []) this.point(point);
     const marked = content.lines[0]?.values ?? [];
@@ -213,7 +228,7 @@ export class Chart extends TimeCanvas {
       pen.fillStyle = ink;
       pen.beginPath();
       pen.arc(this.x(k * content.dt), this.y(line.values[k]), 3, 0, 2 * Math.PI);
-      if (content.lines.length <= MANY) pen.fill();
+      if (content.lines.length <= MANY || this.focused !== null) pen.fill();
       shown.push([line.values[k], ink]);
     }
     if (content.legend) return;
@@ -229,44 +244,39 @@ export class Chart extends TimeCanvas {
     }
   }
 
+  protected words(time: number): string {
+    const { content } = this;
+    const lines = content.lines.filter((line) => !line.limit && !this.pale(line));
+    const value = (line: Line) =>
+      line.values[Math.min(line.values.length - 1, Math.floor(time / content.dt + 1e-6))];
+    if (lines.length > MANY) {
+      const sorted = lines.map(value).sort((a, b) => a - b);
+      const [least, median, greatest] = [0, 0.5, 1].map((rank) =>
+        content.show(sorted[Math.round(rank * (sorted.length - 1))]),
+      );
+      return `least ${least}, median ${median}, greatest ${greatest} of ${lines.length}`;
+    }
+    const named = lines.map((line, n) => {
+      const name = line.label || content.legend?.[n]?.[0] || "";
+      return `${name} ${line.values.length > 0 ? content.show(value(line)) : "none"}`.trim();
+    });
+    const points = (content.points ?? []).map(
+      (point) => `${point.words} at ${(point.sample * content.dt).toFixed(1)} s`,
+    );
+    return [...named, ...points].join(", ");
+  }
+
   private pale(line: Line): boolean {
     return this.focused !== null && line.uas !== undefined && line.uas !== this.focused;
   }
 
-  /** Of many lines what is between the least and the greatest, and the one in the middle. */
+  /** Of many lines their span; pale behind the one that is looked at. */
   private band(lines: Line[]): void {
     const { pen, content } = this;
-    const samples = Math.max(...lines.map((line) => line.values.length));
-    const spread = Array.from({ length: samples }, (_, k) =>
-      // what has ended stays where it ended
-      lines.map((line) => line.values[Math.min(k, line.values.length - 1)]).sort((a, b) => a - b),
-    );
-    const along = (rank: number) => {
-      spread.forEach((sorted, k) => {
-        pen.lineTo(this.x(k * content.dt), this.y(sorted[Math.round(rank * (sorted.length - 1))]));
-      });
-    };
-    pen.fillStyle = colour("--accent");
-    pen.globalAlpha = 0.2;
-    pen.beginPath();
-    along(0);
-    spread.reverse();
-    spread.forEach((sorted, n) => {
-      pen.lineTo(this.x((samples - 1 - n) * content.dt), this.y(sorted.at(-1)!));
-    });
-    spread.reverse();
-    pen.fill();
-    pen.globalAlpha = 1;
-    for (const [rank, width] of [
-      [0, 1.6],
-      [0.5, 1],
-    ]) {
-      pen.strokeStyle = colour("--accent");
-      pen.lineWidth = width;
-      pen.beginPath();
-      along(rank);
-      pen.stroke();
-    }
+    const band = bandOf(lines.map((line) => line.values));
+    const x = (k: number) => this.x(k * content.dt);
+    const ink = this.focused === null ? "--accent" : "--faint";
+    drawBand(pen, band, colour(ink), x, (value) => this.y(value));
     const words = `least and median of ${lines.length}`;
     this.write(words, this.width - RIGHT, this.height - BOTTOM - 10, colour("--faint"), "right");
   }

@@ -9,7 +9,8 @@ export class Clock {
   private before = 0;
 
   constructor(
-    readonly duration: number,
+    /** May grow, while a flight is still flown. */
+    public duration: number,
     private readonly changed: () => void,
   ) {}
 

@@ -4,6 +4,7 @@ import { type Clock, SPEEDS } from "./clock";
 import { element } from "./dom";
 import type { Flight } from "./flight";
 import { kindOf, timed } from "./panel";
+import { filmKind } from "./save";
 import { TRAILS, type TrailKind } from "./trail";
 
 export interface ViewChoice {
@@ -20,7 +21,15 @@ export interface ControlEvents {
   top(): void;
   trail(kind: TrailKind): void;
   together(on: boolean): void;
+  save(what: Saved): void;
+  /** Turn and tilt the camera [rad], and come nearer by a factor. */
+  turn(turn: number, tilt: number, nearer: number): void;
 }
+
+export type Saved = "picture" | "table" | "film";
+
+const TURN_RAD = Math.PI / 18;
+const NEARER = 1.2;
 
 const KEYS: [string, string][] = [
   ["Space", "play, pause"],
@@ -31,6 +40,8 @@ const KEYS: [string, string][] = [
   ["O", "whole area"],
   ["T", "from above"],
   ["M", "map or 3D"],
+  ["A D W S", "turn and tilt the camera"],
+  ["E Q", "nearer, farther"],
   ["C", "colour of the paths flown"],
   ["G", "two flights in one scene, or side by side"],
   ["?", "this list"],
@@ -52,6 +63,8 @@ export class Controls {
   private readonly both = button("", "Both flights in one scene, or side by side (G)");
   private readonly followed = element("select", { "aria-label": "Follow", title: "Follow (1 … 9)" });
   private readonly trails = element("select", { "aria-label": "Trails", title: "Colour of the paths flown (C)" });
+  private readonly saved = element("select", { "aria-label": "Save", title: "Save a picture, a table, a film" });
+  private readonly marks = element("div", { class: "happened" });
   private readonly help = helpDialog();
   private readonly ghosts: boolean;
 
@@ -62,7 +75,6 @@ export class Controls {
     private readonly has3d: boolean,
     private readonly events: ControlEvents,
   ) {
-    this.slider.max = String(clock.duration);
     this.speed.append(...SPEEDS.map((n) => element("option", { value: String(n) }, `${n}×`)));
     const names = flights.reduce((a, b) => (a.uas >= b.uas ? a : b)).scene.uas;
     this.followed.append(
@@ -72,6 +84,18 @@ export class Controls {
     this.trails.append(
       ...TRAILS.map(([kind, words]) => element("option", { value: kind }, `Trails ${words}`)),
     );
+    this.saved.append(
+      element("option", { value: "" }, "Save"),
+      element("option", { value: "picture" }, "Picture (PNG)"),
+      element("option", { value: "table" }, "Table (CSV)"),
+      ...(filmKind() ? [element("option", { value: "film" }, "Film, from here on")] : []),
+    );
+    this.saved.addEventListener("change", () => {
+      const what = this.saved.value as Saved;
+      this.saved.value = "";
+      this.saved.blur();
+      events.save(what);
+    });
     const overview = button("Overview", "Whole area (O)");
     this.top = button("Top", "From above (T)");
     const question = button("?", "Keys (?)");
@@ -79,10 +103,11 @@ export class Controls {
     this.element = element(
       "footer",
       { class: "controls" },
-      element("div", { class: "row" }, this.play, this.track(flights), this.clockText, this.speed),
-      element("div", { class: "row views" }, this.kind, this.both, overview, this.top, this.followed, this.trails, question),
+      element("div", { class: "row" }, this.play, element("div", { class: "track" }, this.slider, this.marks), this.clockText, this.speed),
+      element("div", { class: "row views" }, this.kind, this.both, overview, this.top, this.followed, this.trails, this.saved, question),
       this.help,
     );
+    this.renew(flights);
     this.kind.hidden = !has3d;
     this.ghosts = flights.length === 2 && flights[0].sameMission(flights[1]);
     this.both.hidden = !this.ghosts;
@@ -129,11 +154,11 @@ export class Controls {
     this.followed.value = this.choice.followed === null ? "" : String(this.choice.followed);
   }
 
-  /** The slider, with a mark at all that happened: a click leads there. */
-  private track(flights: Flight[]): HTMLElement {
-    const track = element("div", { class: "track" }, this.slider);
+  /** A mark over the slider at all that happened: a click leads there. */
+  renew(flights: Flight[]): void {
+    this.slider.max = String(this.clock.duration);
     const share = (time: number) => `${100 * Math.min(1, time / (this.clock.duration || 1))}%`;
-    for (const happened of flights.flatMap((flight) => flight.marks())) {
+    const all = flights.flatMap((flight) => flight.marks()).map((happened) => {
       const { t_s, until_s, kind } = happened;
       const mark = element("i", { class: kindOf(kind), role: "button", title: timed(happened) });
       mark.setAttribute("aria-label", timed(happened));
@@ -143,9 +168,9 @@ export class Controls {
         this.clock.playing = false;
         this.clock.seek(t_s);
       });
-      track.append(mark);
-    }
-    return track;
+      return mark;
+    });
+    this.marks.replaceChildren(...all);
   }
 
   showTrail(kind: TrailKind): void {
@@ -168,6 +193,7 @@ export class Controls {
     const target = event.target as HTMLElement;
     // lists and buttons have keys of their own
     if (target instanceof HTMLSelectElement) return;
+    if (target instanceof HTMLInputElement && target.type === "search") return;
     if (target instanceof HTMLButtonElement && [" ", "Enter"].includes(event.key)) return;
     if (this.help.open && event.key !== "?") return;
     const action = this.action(event);
@@ -193,6 +219,12 @@ export class Controls {
       "+": () => clock.faster(1),
       "=": () => clock.faster(1),
       "-": () => clock.faster(-1),
+      a: () => events.turn(TURN_RAD, 0, 1),
+      d: () => events.turn(-TURN_RAD, 0, 1),
+      w: () => events.turn(0, -TURN_RAD, 1),
+      s: () => events.turn(0, TURN_RAD, 1),
+      e: () => events.turn(0, 0, NEARER),
+      q: () => events.turn(0, 0, 1 / NEARER),
       o: () => events.overview(),
       t: () => events.top(),
       c: () => this.nextTrail(),
@@ -237,7 +269,8 @@ function helpDialog(): HTMLDialogElement {
         "covered. The ring around a UAS is as long as its charge, its notch is what the way home " +
         "takes with margin: green while more than 5 % is left beyond that, red where it is too " +
         "little. A diamond is where least was left, a red one the point of no return. Dots are " +
-        "where the planner means to fly.",
+        "where the planner means to fly. The dashed area is where a UAS that is followed can " +
+        "still fly and come home from. A click on a waypoint or a path says what it was.",
     ),
     element("p", {}, "Drag to turn, wheel or two fingers to come closer, right button to move."),
     close,

@@ -1,6 +1,8 @@
 // A flight as the page holds it (uas_coverage_env/replay/flight_data.py writes it), and what is
 // to be seen at a moment of it. Frame: NED in metres; angles in radians.
 
+import { reachable } from "./reach";
+
 export type Point2 = [number, number];
 export type Point3 = [number, number, number];
 
@@ -49,6 +51,20 @@ export interface Mark {
   text: string;
 }
 
+/** What reaching a place and coming home from it takes (reach_data.py), on a grid. */
+export interface ReachData {
+  /** Low end [m], step [m], count. */
+  north: [number, number, number];
+  east: [number, number, number];
+  /** Above the origin [m]. */
+  height: number;
+  /** Charge below which coming home is not sure: axes UAS, north, east. */
+  needed: Series;
+  /** Charge of a metre of flight there, and of slowing down, by UAS. */
+  per_m: number[];
+  fixed: number[];
+}
+
 export interface FlightData {
   planner: string;
   seed: number;
@@ -63,6 +79,7 @@ export interface FlightData {
   needed: Series;
   /** Altitude of the roof, or the ground, under each UAS. */
   floor: Series;
+  reach: ReachData;
   /** Room beyond the safe distances by kind of what is near. */
   room: Record<string, Series>;
   min_height_m: number;
@@ -115,15 +132,31 @@ const FEW = 8;
 const LITTLE_SPARE = 0.1;
 
 export class Flight {
-  readonly scene: Scene;
-  readonly uas: number;
-  readonly duration: number;
-  private readonly energies: number[] = [];
+  private energies: number[] = [];
 
-  constructor(readonly data: FlightData) {
-    this.scene = data.scene;
-    this.uas = data.scene.uas.length;
-    this.duration = (data.samples - 1) * data.dt_s;
+  constructor(public data: FlightData) {}
+
+  get scene(): Scene {
+    return this.data.scene;
+  }
+
+  get uas(): number {
+    return this.data.scene.uas.length;
+  }
+
+  get duration(): number {
+    return (this.data.samples - 1) * this.data.dt_s;
+  }
+
+  /** It has gone on. */
+  renew(data: FlightData): void {
+    this.data = data;
+    this.energies = [];
+  }
+
+  /** Whether the planner said what it predicted. */
+  get predicts(): boolean {
+    return this.data.plan.steps.some((step) => step.length > 0);
   }
 
   /** What is to be seen at a time; between samples, positions are on straight lines. */
@@ -190,6 +223,13 @@ export class Flight {
   predicted(sample: number, i: number): number[] {
     const { unit, steps } = this.data.plan;
     return (steps[sample]?.[i] ?? []).map((value) => value * unit);
+  }
+
+  /** Corners of the area that a UAS can still reach and come home from; often none. */
+  reach(moment: Moment, i: number): Point3[] {
+    const { position, soc, spare, mode } = moment.vehicles[i];
+    if (spare <= 0 || mode === "landed" || mode === "lost") return [];
+    return reachable(this.data.reach, i, position, soc);
   }
 
   /** Whether it matters where a UAS had least charge beyond the way home: is it looked at? */

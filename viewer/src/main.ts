@@ -1,25 +1,36 @@
 // The page: reads the flights it was given, and draws them when something has changed.
 
 import { Clock } from "./clock";
-import { Controls, type ViewChoice } from "./controls";
+import { Controls, type Saved, type ViewChoice } from "./controls";
 import { element } from "./dom";
 import { Flight, type FlightData } from "./flight";
+import { followLive } from "./live";
+import { Pace } from "./pace";
 import { onThemeChange } from "./palette";
 import { Panel } from "./panel";
+import { Film, savePicture, saveTable, type Shown } from "./save";
 import { Trail, TRAILS, type TrailKind } from "./trail";
 
-const data: FlightData[] = JSON.parse(document.getElementById("flights")!.textContent!);
+const source = document.getElementById("flights")!;
+const data: FlightData[] = JSON.parse(source.textContent!);
 const flights = data.map((each) => new Flight(each));
-const duration = Math.max(...flights.map((flight) => flight.duration));
+const longest = () => Math.max(...flights.map((flight) => flight.duration));
 
+let trailKind: TrailKind = "uas";
 let dirty = true;
+let described = true;
 const invalidate = () => (dirty = true);
-const clock = new Clock(duration, invalidate);
+const clock = new Clock(longest(), invalidate);
 const choice: ViewChoice = { threeD: true, followed: null, together: false };
+const pace = new Pace((coarse) => {
+  for (const panel of panels) panel.setCoarse(coarse);
+  invalidate();
+});
+const film = new Film(clock, fileName());
 
 const panels = flights.map(
   (flight) =>
-    new Panel(flight, flights, duration, {
+    new Panel(flight, flights, {
       seek: (time) => {
         clock.playing = false;
         clock.seek(time);
@@ -38,6 +49,8 @@ const controls = new Controls(clock, flights, choice, has3d, {
   top: () => frame("top"),
   trail: colourTrails,
   together,
+  save,
+  turn: (turn, tilt, nearer) => panels[0].turn(turn, tilt, nearer),
 });
 controls.sampleTime = Math.min(...data.map((each) => each.dt_s));
 
@@ -52,9 +65,7 @@ function show(threeD: boolean): void {
 }
 
 function follow(uas: number | null): void {
-  const ended = uas === null && choice.followed !== null;
   choice.followed = uas;
-  if (ended) for (const panel of panels) panel.overview();
   invalidate();
 }
 
@@ -76,8 +87,35 @@ function together(on: boolean): void {
 }
 
 function colourTrails(kind: TrailKind): void {
+  trailKind = kind;
   const trail = new Trail(kind, flights);
   for (const panel of panels) panel.setTrail(trail);
+  invalidate();
+}
+
+function seen(): Shown[] {
+  return panels.filter((panel) => !panel.element.hidden).map((panel) => panel.shown);
+}
+
+function save(what: Saved): void {
+  if (what === "table") saveTable(flights, fileName());
+  else if (what === "film") film.start(seen());
+  else savePicture(seen(), `${fileName()}-${Math.round(clock.time)}s`);
+}
+
+function fileName(): string {
+  return flights.map(({ data: each }) => `${each.scene.name}-${each.planner}`.replace(/[^\w.-]+/g, "-")).join("-");
+}
+
+/** The flight that is still flown has gone on: who looked at its end goes on with it. */
+function renew(renewed: FlightData): void {
+  const atEnd = !clock.playing && clock.time >= clock.duration - 1e-6;
+  flights[0].renew(renewed);
+  clock.duration = longest();
+  controls.renew(flights);
+  for (const panel of panels) panel.renew();
+  if (trailKind !== "uas") colourTrails(trailKind);
+  if (atEnd) clock.seek(clock.duration);
   invalidate();
 }
 
@@ -102,18 +140,27 @@ function readAddress(): void {
 
 function loop(now: number): void {
   if (clock.playing) clock.tick(now);
+  const drawn = dirty;
   if (dirty) {
-    dirty = false;
+    dirty = described = false;
     for (const panel of panels) {
       if (!panel.element.hidden) panel.draw(clock.time, choice.followed);
     }
     controls.draw();
+    film.drawn(seen());
+  } else if (!described && !clock.playing) {
+    described = true;
+    for (const panel of panels) panel.describe(clock.time);
   }
+  pace.tick(now, drawn);
   requestAnimationFrame(loop);
 }
 
 const observer = new ResizeObserver(resize);
-for (const panel of panels) observer.observe(panel.stage);
+for (const panel of panels) {
+  observer.observe(panel.stage);
+  observer.observe(panel.curveBox);
+}
 onThemeChange(() => {
   for (const panel of panels) panel.repaint();
   invalidate();
@@ -121,3 +168,9 @@ onThemeChange(() => {
 addEventListener("hashchange", readAddress);
 readAddress();
 requestAnimationFrame(loop);
+
+const live = source.dataset.live;
+if (live) {
+  document.body.classList.add("live");
+  void followLive(live, renew, () => document.body.classList.replace("live", "ended"));
+}

@@ -3,28 +3,33 @@
 
 import type { Flight, Moment, Point2, Point3 } from "./flight";
 import * as marks from "./marks";
+import { Overlay } from "./overlay";
 import { bright, colour, darker, dim } from "./palette";
 import { roundStep } from "./round_step";
 import { Trail } from "./trail";
-import type { View } from "./view";
+import type { Focus, View } from "./view";
 
 const FOLLOWED_ZOOM = 3;
+const MANY = 12;
 
 export class MapView implements View {
   private readonly pen: CanvasRenderingContext2D;
   private readonly low: Point2;
   private readonly high: Point2;
   private readonly gridStep: number;
-  private followed: number | null = null;
   private trail: Trail;
   private ghost: Flight | null = null;
   /** Size of marks: smaller on a small map. */
   private unit = 1;
   private scale = 1;
   private middle: Point2 = [0, 0];
+  private readonly overlay: Overlay;
+  readonly canvases: HTMLCanvasElement[];
 
-  constructor(readonly canvas: HTMLCanvasElement, private readonly flight: Flight) {
+  constructor(private readonly canvas: HTMLCanvasElement, private readonly flight: Flight) {
+    this.canvases = [canvas];
     this.pen = canvas.getContext("2d")!;
+    this.overlay = new Overlay(this.pen, flight, (point) => this.pixel(point));
     this.trail = new Trail("uas", [flight]);
     const { outline } = flight.scene.fence;
     const [north, east] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
@@ -43,10 +48,6 @@ export class MapView implements View {
 
   repaint(): void {}
 
-  follow(uas: number | null): void {
-    this.followed = uas;
-  }
-
   setGhost(ghost: Flight | null): void {
     this.ghost = ghost;
   }
@@ -55,16 +56,12 @@ export class MapView implements View {
     this.trail = trail;
   }
 
-  overview(): void {
-    this.followed = null;
-  }
+  overview(): void {}
 
-  top(): void {
-    this.followed = null;
-  }
+  top(): void {}
 
-  draw(moment: Moment, time: number): void {
-    this.frame(moment);
+  draw(moment: Moment, time: number, focus: Focus): void {
+    this.frame(moment, focus.uas);
     const { pen, flight } = this;
     pen.fillStyle = colour("--outside");
     pen.fillRect(0, 0, this.canvas.clientWidth, this.canvas.clientHeight);
@@ -74,45 +71,35 @@ export class MapView implements View {
       const [x, y] = this.pixel(at);
       marks.waypoint(pen, x, y, radius * this.scale, 1, heavy, covered);
     });
+    this.overlay.reach(moment, focus);
     const other = this.ghost?.moment(time);
     if (this.ghost && other) this.ghosts(this.ghost, other);
-    flight.scene.uas.forEach((_, i) => this.path(flight, moment, i));
-    this.movingObstacles(moment);
-    flight.data.violations.forEach((violation) => {
-      const [x, y] = this.pixel(flight.where(violation));
-      pen.globalAlpha = violation.t_s <= moment.time + 1e-6 ? 1 : 0.35;
-      marks.cross(pen, x, y, 9);
+    flight.scene.uas.forEach((_, i) => {
+      const looked = focus.shown(i) && (focus.uas === null || focus.uas === i);
+      pen.globalAlpha = looked ? 1 : 0.2;
+      this.path(flight, moment, i);
       pen.globalAlpha = 1;
     });
-    flight.scene.uas.forEach((_, i) => this.noReturn(moment, i));
-    flight.scene.uas.forEach((_, i) => this.vehicle(moment, i));
+    this.movingObstacles(moment);
+    const zoom = focus.uas === null ? 1 : FOLLOWED_ZOOM;
+    this.overlay.draw(moment, focus, this.unit, zoom, true);
   }
 
-  private noReturn(moment: Moment, i: number): void {
-    const passed = this.flight.data.no_return[i];
-    const sample = passed ?? this.flight.data.least_spare[i][0];
-    if (!this.flight.nearNoReturn(i, this.followed)) return;
-    const [x, y] = this.pixel(this.flight.position(sample, i));
-    this.pen.globalAlpha = sample <= moment.sample ? 1 : 0.35;
-    marks.noReturn(this.pen, x, y, 7 * this.unit, passed !== null, this.flight.scene.uas[i].colour);
-    this.pen.globalAlpha = 1;
-  }
-
-  private frame(moment: Moment): void {
+  private frame(moment: Moment, followed: number | null): void {
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     this.unit = Math.min(1, Math.max(0.65, Math.min(width, height) / 500));
     const fit = Math.min(
       (width - 28) / (this.high[1] - this.low[1]),
       (height - 28) / (this.high[0] - this.low[0]),
     );
-    const at = this.followed === null ? null : moment.vehicles[this.followed].position;
+    const at = followed === null ? null : moment.vehicles[followed].position;
     this.scale = fit * (at ? FOLLOWED_ZOOM : 1);
     this.middle = at
       ? [at[0], at[1]]
       : [(this.low[0] + this.high[0]) / 2, (this.low[1] + this.high[1]) / 2];
   }
 
-  private pixel(point: Point2 | Point3): Point2 {
+  pixel(point: Point2 | Point3): Point2 {
     return [
       this.canvas.clientWidth / 2 + this.scale * (point[1] - this.middle[1]),
       this.canvas.clientHeight / 2 - this.scale * (point[0] - this.middle[0]),
@@ -186,35 +173,38 @@ export class MapView implements View {
 
   private ghosts(ghost: Flight, moment: Moment): void {
     const { pen } = this;
-    ghost.scene.uas.forEach(({ name, colour: hex }, i) => {
-      pen.globalAlpha = 0.6;
-      pen.setLineDash([5, 4]);
-      this.path(ghost, moment, i);
-      pen.setLineDash([]);
-      const [x, y] = this.pixel(moment.vehicles[i].position);
-      marks.ghost(pen, x, y, 9 * this.unit, marks.shortName(name), hex);
-      pen.globalAlpha = 1;
-    });
+    pen.globalAlpha = 0.6;
+    pen.setLineDash([5, 4]);
+    ghost.scene.uas.forEach((_, i) => this.path(ghost, moment, i));
+    pen.setLineDash([]);
+    pen.globalAlpha = 1;
+    this.overlay.ghosts(ghost, moment, this.unit);
   }
 
   private path(flight: Flight, moment: Moment, i: number): void {
     const { pen } = this;
     const ink = bright(flight.scene.uas[i].colour);
     pen.strokeStyle = pen.fillStyle = ink;
-    pen.lineWidth = 2;
+    pen.lineWidth = flight.uas > MANY ? 1.4 : 2;
     pen.lineJoin = "round";
     const flown = Math.min(moment.sample, flight.data.last[i]);
+    // corners that lie on each other are one
+    const nearest = flight.uas > MANY ? 3 : 0;
+    let drawn: Point2 | null = null;
     for (let k = 0; k <= flown; k++) {
       // one line as long as its colour is the same
       const paint = this.trail.colour(flight, i, k) ?? ink;
-      if (k === 0 || paint !== pen.strokeStyle) {
-        if (k > 0) pen.stroke();
+      if (!drawn || paint !== pen.strokeStyle) {
+        if (drawn) pen.stroke();
         pen.strokeStyle = paint;
         pen.beginPath();
-        pen.moveTo(...this.pixel(flight.position(k, i)));
+        drawn = this.pixel(flight.position(k, i));
+        pen.moveTo(...drawn);
       }
-      const to = k < flown ? flight.position(k + 1, i) : moment.vehicles[i].position;
-      pen.lineTo(...this.pixel(to));
+      const to = this.pixel(k < flown ? flight.position(k + 1, i) : moment.vehicles[i].position);
+      if (k < flown && Math.abs(to[0] - drawn[0]) + Math.abs(to[1] - drawn[1]) < nearest) continue;
+      pen.lineTo(...to);
+      drawn = to;
     }
     pen.stroke();
     if (flight !== this.flight) return;
@@ -244,19 +234,5 @@ export class MapView implements View {
       const above = y - (radius + safe) * this.scale - 9;
       marks.words(pen, (kind || name).replaceAll("_", " "), x, above, 11 * this.unit, colour("--ink"));
     });
-  }
-
-  private vehicle(moment: Moment, i: number): void {
-    const { pen } = this;
-    const { position, attitude, soc, spare, mode } = moment.vehicles[i];
-    const { name, colour: hex } = this.flight.scene.uas[i];
-    const [x, y] = this.pixel(position);
-    const unit = this.unit * (this.followed === null ? marks.ofMany(this.flight.uas) : 1);
-    if (mode === "lost") marks.cross(pen, x, y, 10 * unit);
-    else if (mode === "landed") marks.landed(pen, x, y, 5 * unit, hex);
-    else {
-      marks.charge(pen, x, y, 14 * unit, soc, spare, marks.shortName(name), hex);
-      marks.vehicle(pen, x, y, 8 * unit, attitude[2], hex);
-    }
   }
 }

@@ -1,5 +1,5 @@
-// What stands for a waypoint, a vehicle, a violation: drawn alike on the map and, as small
-// pictures, in the 3D scene. What has a meaning has a shape, not only a colour.
+// What stands for a waypoint, a vehicle, a violation: drawn alike on the map and over the 3D
+// scene. What has a meaning has a shape, not only a colour.
 
 import { bright, colour, ofSpare } from "./palette";
 
@@ -42,7 +42,7 @@ export function waypoint(
   }
 }
 
-/** The ring that is as long as the charge, with a notch where it is needed for home; whose. */
+/** The ring that is as long as the charge, with a notch where it is needed for home. */
 export function charge(
   pen: Pen,
   x: number,
@@ -50,8 +50,6 @@ export function charge(
   radius: number,
   soc: number,
   spare: number,
-  label: string,
-  hex: string,
 ): void {
   const whole = 2 * Math.PI;
   pen.lineCap = "butt";
@@ -62,7 +60,6 @@ export function charge(
   const [dx, dy] = [Math.cos(needed), Math.sin(needed)];
   const [from, to] = [0.8 * radius, 1.25 * radius];
   stroke(pen, x + from * dx, y + from * dy, x + to * dx, y + to * dy, 0.16 * radius, colour("--ink"));
-  words(pen, label, x + 1.25 * radius, y - 1.05 * radius, 1.05 * radius, bright(hex));
 }
 
 function ring(
@@ -127,6 +124,12 @@ export function cross(pen: Pen, x: number, y: number, arm: number): void {
   }
 }
 
+/** A contact: a cross in a ring. */
+export function violation(pen: Pen, x: number, y: number, arm: number): void {
+  cross(pen, x, y, arm);
+  ring(pen, x, y, 2.1 * arm, 2 * Math.PI, 0.3 * arm, colour("--discharged"));
+}
+
 /** A diamond where least charge was left beyond the way home; filled: the point of no return. */
 export function noReturn(pen: Pen, x: number, y: number, arm: number, passed: boolean, hex: string): void {
   pen.beginPath();
@@ -181,8 +184,18 @@ export function stroke(
 }
 
 /** Marks of many UAS are smaller, so that they do not hide each other and the waypoints. */
-export function ofMany(uas: number): number {
+function ofMany(uas: number): number {
   return Math.max(0.4, Math.min(1, Math.sqrt(8 / uas)));
+}
+
+/** Of many, those beside the one that is followed stay smaller than it. */
+const BESIDE = 0.6;
+
+/** Size of the marks of a UAS that is not followed: of many smaller, and whole again from near. */
+export function crowded(uas: number, zoom: number, oneIsFollowed: boolean): number {
+  const share = ofMany(uas);
+  const most = oneIsFollowed ? Math.max(BESIDE, share) : 1;
+  return Math.min(most, share * Math.max(1, zoom));
 }
 
 /** What a UAS is called on the map: the end of its name. */

@@ -9,6 +9,7 @@ const TOP = 20;
 /** Height of a row of charts, of which a chart of many takes several. */
 const ROW_PX = 94;
 const WORDS_PX = 11;
+const MANY = 8;
 
 /** [custom property of the style, colour of words on it] */
 const PAINT: Record<string, [string, string]> = {
@@ -22,7 +23,8 @@ const PAINT: Record<string, [string, string]> = {
 export class ModeChart extends TimeCanvas {
   constructor(private readonly flight: Flight, duration: number, seek: (time: number) => void) {
     super("Operation modes", duration, seek);
-    const high = TOP + 8 + flight.uas * (flight.uas > 6 ? 7 : 15);
+    const rows = flight.uas > MANY ? 4 : flight.uas;
+    const high = TOP + 8 + rows * (rows > 6 ? 8 : 15);
     this.canvas.style.gridRow = `span ${Math.ceil(high / ROW_PX)}`;
   }
 
@@ -36,13 +38,16 @@ export class ModeChart extends TimeCanvas {
       this.pen.fillRect(right, 4, 10, 10);
       right -= 10;
     }
+    if (this.flight.uas > MANY) {
+      this.shares();
+      return;
+    }
     const height = Math.min(26, (this.height - TOP - 6) / this.flight.uas);
     this.flight.scene.uas.forEach((uas, i) => {
       const y = TOP + i * height;
-      const ink = bright(uas.colour);
-      // of many every fifth has room for its number
-      if (height >= WORDS_PX || i % 5 === 4) {
-        this.write(shortName(uas.name), 35, y + height / 2, ink, "right", 600);
+      // of rows that are low every second has room for its number
+      if (height >= WORDS_PX || i % 2 === 0) {
+        this.write(shortName(uas.name), 35, y + height / 2, bright(uas.colour), "right", 600);
       }
       const gap = height >= WORDS_PX ? 3 : 1;
       for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - gap);
@@ -50,6 +55,51 @@ export class ModeChart extends TimeCanvas {
   }
 
   protected drawAt(): void {}
+
+  /** Of many how many do what, over time; above them the one that is looked at. */
+  private shares(): void {
+    const { modes, samples, dt_s } = this.flight.data;
+    const own = this.focused === null ? 0 : 16;
+    if (this.focused !== null) {
+      const { name, colour: hex } = this.flight.scene.uas[this.focused];
+      this.write(shortName(name), 35, TOP + 6, bright(hex), "right", 600);
+      for (const [mode, from, to] of this.runs(this.focused)) this.band(mode, from, to, TOP, 13);
+    }
+    const [top, bottom] = [TOP + own, this.height - 6];
+    const unit = (bottom - top) / this.flight.uas;
+    this.write(String(this.flight.uas), 35, top + 5, colour("--faint"), "right");
+    this.write("0", 35, bottom - 4, colour("--faint"), "right");
+    for (let k = 0; k < samples - 1; k++) {
+      // whole pixels, or seams would be seen
+      const [x, end] = [k, k + 1].map((each) => Math.round(this.x(each * dt_s)));
+      let y = bottom;
+      for (const [m, mode] of modes.entries()) {
+        const high = unit * this.count(k, m);
+        this.pen.fillStyle = colour((PAINT[mode] ?? ["--landed"])[0]);
+        this.pen.fillRect(x, y - high, end - x, high);
+        y -= high;
+      }
+    }
+  }
+
+  /** How many are in a mode at a sample. */
+  private count(k: number, mode: number): number {
+    const { uas } = this.flight;
+    return this.flight.data.mode.slice(k * uas, (k + 1) * uas).filter((m) => m === mode).length;
+  }
+
+  protected words(time: number): string {
+    const k = this.flight.moment(time).sample;
+    const { modes } = this.flight.data;
+    if (this.flight.uas > MANY) {
+      return modes
+        .map((mode, m) => [this.count(k, m), mode] as const)
+        .filter(([count]) => count > 0)
+        .map(([count, mode]) => `${count} ${mode}`)
+        .join(", ");
+    }
+    return this.flight.scene.uas.map(({ name }, i) => `${name} ${this.flight.mode(k, i)}`).join(", ");
+  }
 
   private band(mode: string, from: number, to: number, y: number, height: number): void {
     const { pen } = this;

@@ -42,11 +42,12 @@ export function darker(hex: string, share: number): string {
   return mixed(hex, 0, share);
 }
 
-const LITTLE = 0.05;
+/** Charge beyond the way home below which it is said to be little. */
+export const LITTLE_SPARE = 0.05;
 
 /** Green: enough charge for the way home with margin; yellow: little more; red: not enough. */
 export function ofSpare(spare: number): string {
-  return colour(spare > LITTLE ? "--charged" : spare > 0 ? "--half" : "--discharged");
+  return colour(spare > LITTLE_SPARE ? "--charged" : spare > 0 ? "--half" : "--discharged");
 }
 
 function mixed(hex: string, towards: number, share: number): string {

@@ -5,10 +5,12 @@ import type { TimeCanvas } from "./chart";
 import { curves } from "./curves";
 import { difference } from "./difference";
 import { element } from "./dom";
-import { type Flight, type Mark, words } from "./flight";
+import { type Flight, type Mark, type Moment, words } from "./flight";
 import { MapView } from "./map";
+import { type Picked, Picker } from "./pick";
 import { ProfileChart } from "./profile";
 import { rampStops } from "./ramp";
+import type { Shown } from "./save";
 import { SceneView, webgl } from "./scene";
 import { TRAILS, type Trail } from "./trail";
 import type { Pose, View } from "./view";
@@ -23,6 +25,9 @@ export interface PanelEvents {
   lost(): void;
 }
 
+/** A hand that moves less between down and up has clicked [px]. */
+const CLICK_PX = 4;
+
 export class Panel {
   readonly element: HTMLElement;
   readonly stage = element("div", { class: "stage" });
@@ -30,19 +35,26 @@ export class Panel {
   private readonly scene: SceneView | null;
   private readonly map: MapView;
   private view: View;
-  private readonly cards: Cards;
-  private readonly charts: TimeCanvas[];
+  private cards!: Cards;
+  private charts: TimeCanvas[] = [];
   /** Another flight of the same mission. */
   readonly other: Flight | null;
+  private readonly header = element("header");
+  private readonly below = element("div", { class: "below" });
+  private readonly side = element("div", { class: "side" });
+  readonly curveBox = element("div", { class: "charts" });
   private readonly now = element("ul", { class: "now", "aria-live": "polite", "aria-label": "Now" });
   private readonly legend = element("div", { class: "legend" });
   private readonly beside = element("p", { class: "beside" });
+  private readonly told = element("button", { class: "told", type: "button", "aria-live": "polite" });
   private shownNow = "";
+  private picker: Picker;
+  private picked: Picked | null = null;
+  private moment: Moment;
 
   constructor(
     readonly flight: Flight,
-    all: Flight[],
-    duration: number,
+    private readonly all: Flight[],
     private readonly events: PanelEvents,
   ) {
     const mapCanvas = element("canvas", { class: "map", "aria-label": "Map, north up" });
@@ -56,41 +68,42 @@ export class Panel {
     this.sceneCanvas.addEventListener("webglcontextlost", () => events.lost());
     this.map = new MapView(mapCanvas, flight);
     this.view = this.scene ?? this.map;
-    this.cards = new Cards(flight, (i) => events.follow(i));
-    const profile = new ProfileChart(flight, all, duration, events.seek);
-    const beside = curves(flight, all, duration, events.seek);
-    this.charts = [profile, ...beside];
-    this.legend.hidden = true;
+    this.picker = new Picker(flight);
+    this.moment = flight.moment(0);
+    this.legend.hidden = this.told.hidden = true;
     this.other = all.find((each) => each !== flight && each.sameMission(flight)) ?? null;
     this.beside.hidden = this.other === null;
-    this.stage.append(this.sceneCanvas, mapCanvas, this.beside, this.now, this.legend);
-    this.element = element(
-      "section",
-      { class: "flight" },
-      element("header", {}, element("h1", {}, title(flight)), element("p", {}, outcome(flight))),
-      this.stage,
-      element("div", { class: "below" }, profile.canvas),
-      element(
-        "div",
-        { class: "side", "data-title": title(flight) },
-        this.cards.element,
-        ...this.violations(),
-        ...this.marks(),
-        element("div", { class: "charts" }, ...beside.map((chart) => chart.canvas)),
-      ),
-    );
+    const canvases = [...(this.scene?.canvases ?? [this.sceneCanvas]), ...this.map.canvases];
+    this.stage.append(...canvases, this.beside, this.now, this.told, this.legend);
+    this.element = element("section", { class: "flight" }, this.header, this.stage, this.below, this.side);
+    this.fill();
     this.show(this.has3d);
+    this.listen();
   }
 
   get has3d(): boolean {
     return this.scene !== null;
   }
 
+  /** What is seen now, for a picture. */
+  get shown(): Shown {
+    return { title: `${title(this.flight)} · ${this.moment.time.toFixed(1)} s`, canvases: this.view.canvases };
+  }
+
+  /** The flight has gone on. */
+  renew(): void {
+    this.picker = new Picker(this.flight);
+    this.fill();
+    this.scene?.repaint();
+    this.resize();
+  }
+
   /** The 3D scene, or the map. */
   show(threeD: boolean): void {
     this.view = threeD && this.scene ? this.scene : this.map;
     this.sceneCanvas.hidden = this.view !== this.scene;
-    this.map.canvas.hidden = this.view !== this.map;
+    for (const canvas of this.scene?.canvases ?? []) canvas.hidden = this.view !== this.scene;
+    for (const canvas of this.map.canvases) canvas.hidden = this.view !== this.map;
   }
 
   resize(): void {
@@ -104,11 +117,19 @@ export class Panel {
     for (const chart of this.charts) chart.resize();
   }
 
+  /** Fewer pixels in 3D, while pictures are due faster than they can be drawn. */
+  setCoarse(coarse: boolean): void {
+    this.scene?.setCoarse(coarse);
+  }
+
   draw(time: number, followed: number | null): void {
-    const moment = this.flight.moment(time);
+    const moment = (this.moment = this.flight.moment(time));
     const uas = followed !== null && followed < this.flight.uas ? followed : null;
-    for (const view of [this.scene, this.map]) view?.follow(uas);
-    this.view.draw(moment, time);
+    this.view.draw(moment, time, {
+      uas,
+      shown: (i) => this.cards.shown(moment.vehicles[i], i),
+      picked: this.picked?.at ?? null,
+    });
     if (this.other) this.beside.textContent = difference(this.flight, this.other, time);
     this.cards.draw(moment, uas);
     for (const chart of this.charts) {
@@ -116,6 +137,62 @@ export class Panel {
       chart.draw(moment.time);
     }
     this.say(this.flight.at(time));
+  }
+
+  /** For those who do not see the curves. */
+  describe(time: number): void {
+    for (const chart of this.charts) chart.describe(Math.min(time, this.flight.duration));
+  }
+
+  turn(turn: number, tilt: number, nearer: number): void {
+    this.scene?.camera.move(turn, tilt, nearer);
+  }
+
+  /** Header, curves, cards and lists. */
+  private fill(): void {
+    const { flight, all, events } = this;
+    const duration = Math.max(...all.map((each) => each.duration));
+    const profile = new ProfileChart(flight, all, duration, events.seek);
+    const beside = curves(flight, all, duration, events.seek);
+    this.charts = [profile, ...beside];
+    this.cards = new Cards(flight, events.follow, events.invalidate);
+    this.header.replaceChildren(element("h1", {}, title(flight)), element("p", {}, outcome(flight)));
+    this.below.replaceChildren(profile.canvas);
+    this.curveBox.replaceChildren(...beside.map((chart) => chart.canvas));
+    this.side.dataset.title = title(flight);
+    this.side.replaceChildren(
+      this.cards.element,
+      ...this.violations(),
+      ...this.marks(),
+      this.curveBox,
+    );
+  }
+
+  private listen(): void {
+    let down: [number, number] = [0, 0];
+    this.stage.addEventListener("pointerdown", (event) => (down = [event.clientX, event.clientY]));
+    this.stage.addEventListener("click", (event) => {
+      const moved = Math.hypot(event.clientX - down[0], event.clientY - down[1]);
+      if (moved <= CLICK_PX && event.target instanceof HTMLCanvasElement) this.pick(event);
+    });
+    this.told.addEventListener("click", () => {
+      const sample = this.picked?.sample;
+      if (sample !== null && sample !== undefined) this.events.seek(sample * this.flight.data.dt_s);
+    });
+  }
+
+  /** A click on a UAS follows it; one on a waypoint or a path says what it was. */
+  private pick({ offsetX, offsetY }: MouseEvent): void {
+    const found = this.picker.at(offsetX, offsetY, this.moment, (point) => this.view.pixel(point));
+    if (found && found.words === "") {
+      this.events.follow(found.uas);
+      return;
+    }
+    this.picked = found;
+    this.told.hidden = found === null;
+    this.told.textContent = found?.words ?? "";
+    this.told.title = found?.sample == null ? "" : "Go there";
+    this.events.invalidate();
   }
 
   /** What is going on now, each with its reason. */

@@ -1,5 +1,6 @@
 // The height profile under the map: UAS, roofs and the least height over them, waypoints covered.
 
+import { type Band, bandOf, drawBand } from "./band";
 import { DASHES, LEFT, RIGHT, TimeCanvas } from "./chart";
 import type { Flight } from "./flight";
 import { shortName, stroke } from "./marks";
@@ -16,6 +17,7 @@ export class ProfileChart extends TimeCanvas {
   private readonly altitudes: number[][];
   private readonly floors: number[][];
   private readonly high: number;
+  private spread: Band | null = null;
 
   constructor(private readonly flight: Flight, all: Flight[], duration: number, seek: (time: number) => void) {
     super("Height over ground, roofs and the least height", duration, seek);
@@ -40,9 +42,10 @@ export class ProfileChart extends TimeCanvas {
     const uas = flight.scene.uas.map((_, i) => i);
     const looked = this.focused === null ? (uas.length <= FEW ? uas : []) : [this.focused];
     for (const i of looked) this.below(i);
-    for (const i of uas) {
-      const usual = uas.length > MANY ? 0.5 : 1;
-      pen.globalAlpha = this.focused === null ? usual : this.focused === i ? 1 : 0.2;
+    const many = uas.length > MANY;
+    if (many) this.band();
+    for (const i of many ? looked : uas) {
+      pen.globalAlpha = this.focused === null || this.focused === i ? 1 : 0.2;
       pen.setLineDash(DASHES[i % DASHES.length]);
       this.curve(this.altitudes[i], bright(flight.scene.uas[i].colour), 1.8);
     }
@@ -65,6 +68,30 @@ export class ProfileChart extends TimeCanvas {
       const words = `${shortName(this.flight.scene.uas[i].name)}: ${height.toFixed(1)} m${over}`;
       right -= this.write(words, right, 9, ink, "right", 600) + 10;
     }
+  }
+
+  private band(): void {
+    this.spread ??= bandOf(this.altitudes);
+    const x = (k: number) => this.x(k * this.flight.data.dt_s);
+    const ink = this.focused === null ? "--accent" : "--faint";
+    drawBand(this.pen, this.spread, colour(ink), x, (height) => this.y(height));
+    const words = `least and median of ${this.flight.uas}`;
+    this.write(words, this.width - RIGHT, this.height - BOTTOM - 8, colour("--faint"), "right");
+  }
+
+  protected words(time: number): string {
+    const { dt_s } = this.flight.data;
+    const at = (values: number[]) => values[Math.min(values.length - 1, Math.floor(time / dt_s + 1e-6))];
+    const names = this.flight.scene.uas.map(({ name }) => name);
+    if (this.focused !== null) {
+      const [height, floor] = [at(this.altitudes[this.focused]), at(this.floors[this.focused])];
+      return `${names[this.focused]} ${height.toFixed(1)} m, ${(height - floor).toFixed(1)} m over what is below`;
+    }
+    if (names.length <= MANY) {
+      return names.map((name, i) => `${name} ${at(this.altitudes[i]).toFixed(1)} m`).join(", ");
+    }
+    const heights = this.altitudes.map(at);
+    return `${Math.min(...heights).toFixed(1)} to ${Math.max(...heights).toFixed(1)} m`;
   }
 
   /** What is below one UAS: roofs filled, the least height over them. */

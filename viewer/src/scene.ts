@@ -1,47 +1,76 @@
 // The 3D scene of one flight (WebGL).
 
 import { AmbientLight, Color, DirectionalLight, PCFShadowMap, Scene, WebGLRenderer } from "three";
-import type { Flight, Moment } from "./flight";
-import { ofMany } from "./marks";
+import { element } from "./dom";
+import type { Flight, Moment, Point2, Point3 } from "./flight";
+import { Overlay } from "./overlay";
 import { colour } from "./palette";
 import { Camera } from "./scene_camera";
+import { MovingObstacles } from "./scene_moving";
+import { Paths } from "./scene_paths";
 import { place } from "./scene_space";
 import { extentOf, terrain, type Extent } from "./scene_terrain";
-import { MovingObstacles, NoReturns, Violations, Waypoints } from "./scene_things";
 import { Vehicles } from "./scene_vehicles";
+import { Waypoints } from "./scene_waypoints";
 import { Trail } from "./trail";
-import type { Pose, View } from "./view";
+import { type Focus, NO_FOCUS, type Pose, type View } from "./view";
+
+/** Of the pixels in each direction, while pictures are due faster than they can be drawn. */
+const COARSE = 0.5;
+/** Rings of charge lie around the bodies of the vehicles. */
+const RINGS = 1.35;
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software/i;
 
 /** A context for a scene, or null where this browser has none. */
 export function webgl(canvas: HTMLCanvasElement): WebGL2RenderingContext | null {
-  return canvas.getContext("webgl2", { antialias: true, powerPreference: "low-power" });
+  return canvas.getContext("webgl2", {
+    // smooth edges cost a processor more than all else together
+    antialias: !drawnByProcessor(),
+    powerPreference: "low-power",
+    // for pictures and films out of the page
+    preserveDrawingBuffer: true,
+  });
+}
+
+function drawnByProcessor(): boolean {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  const named = probe?.getExtension("WEBGL_debug_renderer_info");
+  const name = named ? String(probe!.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
+  probe?.getExtension("WEBGL_lose_context")?.loseContext();
+  return SOFTWARE.test(name);
 }
 
 export class SceneView implements View {
+  readonly canvases: HTMLCanvasElement[];
+  private readonly over = element("canvas", { class: "over", "aria-hidden": "true" });
+  private readonly pen = this.over.getContext("2d")!;
+  private readonly overlay: Overlay;
   private readonly renderer: WebGLRenderer;
   private readonly extent: Extent;
-  private readonly camera: Camera;
+  readonly camera: Camera;
   private scene!: Scene;
   private vehicles!: Vehicles;
+  private paths!: Paths;
   private waypoints!: Waypoints;
   private moving!: MovingObstacles;
-  private violations!: Violations;
-  private noReturns!: NoReturns;
   private trail: Trail;
   private ghost: Flight | null = null;
-  private ghosts: Vehicles | null = null;
-  private followed: number | null = null;
+  private ghostPaths: Paths | null = null;
   private framed: "overview" | "top" | null = "overview";
+  private followed: number | null = null;
+  private coarse = false;
 
   /**
    * @param moved the camera has moved: draw again, and let the other flight's camera follow
    */
   constructor(
-    readonly canvas: HTMLCanvasElement,
+    private readonly canvas: HTMLCanvasElement,
     context: WebGL2RenderingContext,
     private readonly flight: Flight,
     moved: (pose: Pose | null) => void,
   ) {
+    this.canvases = [canvas, this.over];
+    this.overlay = new Overlay(this.pen, flight, (point) => this.pixel(point));
     this.trail = new Trail("uas", [flight]);
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.shadowMap.enabled = true;
@@ -55,30 +84,54 @@ export class SceneView implements View {
     this.repaint();
   }
 
-  draw(moment: Moment, time: number): void {
-    const positions = moment.vehicles.map(({ position }) => place(position));
-    this.camera.follow(this.followed === null ? null : positions[this.followed]);
+  draw(moment: Moment, time: number, focus: Focus): void {
+    const { uas } = focus;
+    this.follow(uas, moment);
     const { lens } = this.camera;
     const { clientWidth: width, clientHeight: height } = this.canvas;
     // marks are smaller in a small picture
     const size = Math.min(1, Math.max(0.6, Math.min(width, 1.3 * height) / 800));
     const pixel = (size * 2 * Math.tan((lens.fov * Math.PI) / 360)) / height;
-    const crowded = pixel * (this.followed === null ? ofMany(this.flight.uas) : 1);
-    this.vehicles.draw(moment, crowded, (i) => lens.position.distanceTo(positions[i]));
+    const { zoom } = this.camera;
+    this.vehicles.draw(moment, pixel, lens.position, focus, zoom);
+    this.paths.focus(focus);
+    this.paths.draw(moment);
     const other = this.ghost?.moment(time);
-    const away = (i: number) => lens.position.distanceTo(place(other!.vehicles[i].position));
-    if (other) this.ghosts?.draw(other, crowded, away);
+    if (this.ghostPaths && other) {
+      this.ghostPaths.focus({ ...NO_FOCUS, uas });
+      this.ghostPaths.draw(other);
+    }
     this.waypoints.draw(moment);
-    this.moving.draw(moment, pixel);
-    this.violations.draw(moment, pixel);
-    this.noReturns.draw(moment, pixel, this.followed);
+    this.moving.draw(moment);
     this.renderer.render(this.scene, lens);
+    this.pen.clearRect(0, 0, width, height);
+    this.overlay.reach(moment, focus);
+    this.overlay.moving(moment, size);
+    if (this.ghost && other) this.overlay.ghosts(this.ghost, other, size);
+    this.overlay.draw(moment, focus, RINGS * size, zoom, false);
+  }
+
+  pixel(point: Point3): Point2 | null {
+    const { x, y, z } = place(point).project(this.camera.lens);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return z > 1 ? null : [((x + 1) / 2) * width, ((1 - y) / 2) * height];
+  }
+
+  /** Fewer pixels, where a picture takes long and the next one is due. */
+  setCoarse(coarse: boolean): void {
+    if (coarse === this.coarse) return;
+    this.coarse = coarse;
+    this.resize();
   }
 
   resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const ratio = Math.min(devicePixelRatio, 2);
+    this.renderer.setPixelRatio(ratio * (this.coarse ? COARSE : 1));
     this.renderer.setSize(width, height, false);
+    this.over.width = Math.round(width * ratio);
+    this.over.height = Math.round(height * ratio);
+    this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.camera.lens.aspect = width / Math.max(1, height);
     this.camera.lens.updateProjectionMatrix();
     // a picture that nobody has moved by hand is framed anew
@@ -95,36 +148,36 @@ export class SceneView implements View {
     this.scene = new Scene();
     this.scene.background = new Color(colour("--outside"));
     this.vehicles = new Vehicles(this.flight, ground);
-    this.vehicles.setTrail(this.trail);
+    this.paths = new Paths(this.flight, false);
     this.waypoints = new Waypoints(this.flight, ground);
     this.moving = new MovingObstacles(this.flight);
-    this.violations = new Violations(this.flight);
-    this.noReturns = new NoReturns(this.flight);
-    this.ghosts = this.ghost && new Vehicles(this.ghost, ground, true);
-    this.ghosts?.setTrail(this.trail);
-    if (this.ghosts) this.scene.add(this.ghosts.group);
+    this.ghostPaths = this.ghost && new Paths(this.ghost, true);
+    if (this.ghostPaths) this.scene.add(this.ghostPaths.group);
+    this.setTrail(this.trail);
     this.scene.add(
       terrain(this.flight.scene, this.extent),
       this.waypoints.group,
       this.moving.group,
+      this.paths.group,
       this.vehicles.group,
-      this.violations.group,
-      this.noReturns.group,
       new AmbientLight("#ffffff", 1.65),
       sun(centre.x, ground, centre.z, half),
     );
     this.renderer.shadowMap.needsUpdate = true;
   }
 
-  follow(uas: number | null): void {
+  private follow(uas: number | null, moment: Moment): void {
+    const ended = uas === null && this.followed !== null;
     this.followed = uas;
+    this.camera.follow(uas === null ? null : place(moment.vehicles[uas].position));
     if (uas !== null) this.framed = null;
+    else if (ended && this.framed === null) this.overview();
   }
 
   setTrail(trail: Trail): void {
     this.trail = trail;
-    this.vehicles.setTrail(trail);
-    this.ghosts?.setTrail(trail);
+    this.paths.setTrail(trail);
+    this.ghostPaths?.setTrail(trail);
   }
 
   setGhost(ghost: Flight | null): void {
@@ -134,13 +187,11 @@ export class SceneView implements View {
   }
 
   overview(): void {
-    this.followed = null;
     this.framed = "overview";
     this.camera.overview();
   }
 
   top(): void {
-    this.followed = null;
     this.framed = "top";
     this.camera.top();
   }

@@ -1,6 +1,6 @@
 // Where the scene is looked at from: the whole area, straight down, or after a UAS.
 
-import { Box3, PerspectiveCamera, Vector3 } from "three";
+import { Box3, PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Extent } from "./scene_terrain";
 import type { Pose } from "./view";
@@ -11,6 +11,7 @@ export class Camera {
   readonly lens = new PerspectiveCamera(UPRIGHT_DEG, 1, 1, 1000);
   private readonly orbit: OrbitControls;
   private followed: Vector3 | null = null;
+  private whole = 1;
 
   constructor(canvas: HTMLCanvasElement, private readonly extent: Extent, moved: () => void) {
     this.lens.near = extent.half * 0.01;
@@ -23,6 +24,23 @@ export class Camera {
     this.orbit.addEventListener("change", moved);
     this.orbit.addEventListener("start", () => (this.byHand = true));
     this.orbit.addEventListener("end", () => (this.byHand = false));
+  }
+
+  /** How much nearer the eye is than where it saw the whole area. */
+  get zoom(): number {
+    return this.whole / Math.max(1e-6, this.lens.position.distanceTo(this.orbit.target));
+  }
+
+  /** Turn about what is looked at [rad], tilt [rad], and come nearer by a factor. */
+  move(turn: number, tilt: number, nearer: number): void {
+    const away = new Spherical().setFromVector3(this.lens.position.clone().sub(this.orbit.target));
+    away.theta += turn;
+    away.phi = Math.min(this.orbit.maxPolarAngle, Math.max(0.001, away.phi + tilt));
+    away.radius = Math.min(this.orbit.maxDistance, Math.max(this.orbit.minDistance, away.radius / nearer));
+    this.lens.position.copy(this.orbit.target).add(new Vector3().setFromSpherical(away));
+    this.byHand = true;
+    this.orbit.update();
+    this.byHand = false;
   }
 
   /** Whether a hand moves it just now. */
@@ -92,6 +110,7 @@ export class Camera {
     }
     this.lens.position.copy(target).addScaledVector(direction, distance);
     this.orbit.target.copy(target);
+    this.whole = distance;
     this.orbit.update();
   }
 }

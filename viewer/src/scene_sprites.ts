@@ -1,6 +1,6 @@
-// Small pictures that face the camera: waypoints, charge rings, violations, names.
+// Small pictures: signs on the ground, dots.
 
-import { CanvasTexture, Sprite, SpriteMaterial, SRGBColorSpace } from "three";
+import { CanvasTexture, SRGBColorSpace } from "three";
 
 const PX = 128;
 
@@ -10,29 +10,6 @@ export function drawn(paint: (pen: CanvasRenderingContext2D, px: number) => void
   canvas.width = canvas.height = PX;
   const texture = new CanvasTexture(canvas);
   texture.colorSpace = SRGBColorSpace;
-  redraw(texture, paint);
+  paint(canvas.getContext("2d")!, PX);
   return texture;
-}
-
-export function redraw(
-  texture: CanvasTexture,
-  paint: (pen: CanvasRenderingContext2D, px: number) => void,
-): void {
-  const pen = (texture.image as HTMLCanvasElement).getContext("2d")!;
-  pen.clearRect(0, 0, PX, PX);
-  paint(pen, PX);
-  texture.needsUpdate = true;
-}
-
-/** A sprite of fixed size on the screen, in front of everything. */
-export function badge(map: CanvasTexture): Sprite {
-  const material = new SpriteMaterial({
-    map,
-    sizeAttenuation: false,
-    depthTest: false,
-    depthWrite: false,
-  });
-  const sprite = new Sprite(material);
-  sprite.renderOrder = 10;
-  return sprite;
 }

@@ -1,181 +1,129 @@
-// The vehicles with charge rings, their past and predicted paths, and lines down to the ground.
+// The vehicles of a flight in 3D: all bodies in three draws, lines down to the ground, and what
+// their planner predicts.
 
 import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  CanvasTexture,
   Color,
   CylinderGeometry,
   DoubleSide,
   Euler,
   Group,
-  InterleavedBufferAttribute,
-  Line,
+  InstancedMesh,
   LineBasicMaterial,
   LineDashedMaterial,
-  Mesh,
+  LineSegments,
+  Matrix4,
   MeshLambertMaterial,
   Points,
   PointsMaterial,
-  Sprite,
+  Quaternion,
+  Vector3,
 } from "three";
-import { Line2 } from "three/addons/lines/Line2.js";
-import { LineGeometry } from "three/addons/lines/LineGeometry.js";
-import { LineMaterial } from "three/addons/lines/LineMaterial.js";
-import type { Flight, Moment, VehicleMoment } from "./flight";
-import { charge, cross, ghost, landed, shortName } from "./marks";
-import { bright, colour, ofSpare } from "./palette";
-import { badge, drawn, redraw } from "./scene_sprites";
+import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import type { Flight, Moment } from "./flight";
+import { crowded } from "./marks";
+import { bright, colour } from "./palette";
+import { drawn } from "./scene_sprites";
 import { place } from "./scene_space";
-import type { Trail } from "./trail";
+import type { Focus } from "./view";
 
-const MOST_PREDICTED = 256;
-const WIDTH_PX = 2.4;
-const PALE = { linewidth: 1.5, transparent: true, opacity: 0.55 };
+const MOST_PREDICTED = 128;
+const BODY_PX = 22;
+const LEAST_BODY_M = 0.5;
+/** Size of those that are not to be shown. */
+const HIDDEN = 0.5;
 
 export class Vehicles {
   readonly group = new Group();
-  private readonly parts: VehicleParts[];
+  private readonly bodies: InstancedMesh[];
+  private readonly drops: LineSegments;
+  private readonly predicted: LineSegments;
+  private readonly dots: Points;
 
-  /** @param ghosts they are of another flight: pale, and without what they mean to do */
-  constructor(flight: Flight, ground: number, ghosts = false) {
-    this.parts = flight.scene.uas.map((_, i) => new VehicleParts(flight, i, ground, ghosts));
-    for (const part of this.parts) this.group.add(part.group);
-  }
-
-  setTrail(trail: Trail): void {
-    for (const part of this.parts) part.setTrail(trail);
-  }
-
-  /** Sizes in pixels become sizes in the scene by the height of one pixel at distance 1. */
-  draw(moment: Moment, pixel: number, distanceTo: (i: number) => number): void {
-    this.parts.forEach((part, i) => part.draw(moment, pixel, distanceTo(i)));
-  }
-}
-
-class VehicleParts {
-  readonly group = new Group();
-  private readonly body: Group;
-  private readonly ring: Sprite;
-  private readonly ringTexture: CanvasTexture;
-  private ringShows = "";
-  private readonly path: Line2;
-  private readonly latest: Line2;
-  private readonly latestPaint: LineMaterial;
-  private trail: Trail | null = null;
-  private readonly drop: Line;
-  private readonly predicted: Line;
-  private readonly predictedDots: Points;
-
-  constructor(
-    private readonly flight: Flight,
-    private readonly i: number,
-    private readonly ground: number,
-    private readonly isGhost: boolean,
-  ) {
-    const ink = bright(flight.scene.uas[i].colour);
-    this.body = quadcopter(ink);
-    const look = isGhost ? PALE : { linewidth: WIDTH_PX };
-    this.ringTexture = drawn(() => undefined);
-    this.ring = badge(this.ringTexture);
-    // above the names of other things
-    this.ring.renderOrder += 1;
-    const samples = [];
-    for (let k = 0; k <= flight.data.last[i]; k++) {
-      samples.push(...place(flight.position(k, i)).toArray());
-    }
-    // a line needs two points
-    if (samples.length === 3) samples.push(...samples);
-    this.path = wide(samples, new LineMaterial({ vertexColors: true, ...look }));
-    this.latestPaint = new LineMaterial({ color: ink, ...look });
-    this.latest = wide([0, 0, 0, 0, 0, 0], this.latestPaint);
-    this.drop = new Line(points(2), new LineBasicMaterial({ color: ink }));
-    this.predicted = new Line(
-      points(MOST_PREDICTED),
-      new LineDashedMaterial({ color: ink, dashSize: 3, gapSize: 3 }),
-    );
-    this.predictedDots = new Points(
+  constructor(private readonly flight: Flight, private readonly ground: number) {
+    const inks = flight.scene.uas.map((uas) => new Color(bright(uas.colour)));
+    const frame = new MeshLambertMaterial({ color: colour("--ink") });
+    const paint = new MeshLambertMaterial();
+    const blur = new MeshLambertMaterial({ transparent: true, opacity: 0.55, side: DoubleSide });
+    this.bodies = [
+      new InstancedMesh(arms(), frame, flight.uas),
+      new InstancedMesh(nose(), paint, flight.uas),
+      new InstancedMesh(rotors(), blur, flight.uas),
+    ];
+    for (const body of this.bodies.slice(1)) inks.forEach((ink, i) => body.setColorAt(i, ink));
+    this.drops = new LineSegments(points(2 * flight.uas), new LineBasicMaterial({ vertexColors: true }));
+    colourOf(this.drops.geometry).array.set(inks.flatMap((ink) => [...ink.toArray(), ...ink.toArray()]));
+    const most = flight.predicts ? 2 * MOST_PREDICTED * flight.uas : 2;
+    const line = { vertexColors: true, dashSize: 3, gapSize: 3 };
+    this.predicted = new LineSegments(points(most), new LineDashedMaterial(line));
+    this.dots = new Points(
       this.predicted.geometry,
       new PointsMaterial({
-        color: ink,
+        vertexColors: true,
         size: 6,
         sizeAttenuation: false,
         map: drawn(disc),
         alphaTest: 0.5,
       }),
     );
-    this.group.add(this.path, this.latest, this.drop, this.body, this.ring);
-    this.group.add(this.predicted, this.predictedDots);
+    this.group.add(...this.bodies, this.drops);
+    if (flight.predicts) this.group.add(this.predicted, this.dots);
     // their extents change with every moment
     for (const part of this.group.children) part.frustumCulled = false;
   }
 
-  setTrail(trail: Trail): void {
-    this.trail = trail;
-    const ink = bright(this.flight.scene.uas[this.i].colour);
-    const colours: number[] = [];
-    for (let k = 0; k <= Math.max(1, this.flight.data.last[this.i]); k++) {
-      colours.push(...new Color(trail.colour(this.flight, this.i, k) ?? ink).toArray());
-    }
-    this.path.geometry.setColors(colours);
+  /**
+   * @param pixel height of one pixel at distance 1
+   * @param zoom how much nearer the eye is than where it sees the whole area
+   */
+  draw(moment: Moment, pixel: number, eye: Vector3, focus: Focus, zoom: number): void {
+    const among = crowded(this.flight.uas, zoom, focus.uas !== null);
+    const drops = this.drops.geometry.getAttribute("position") as BufferAttribute;
+    moment.vehicles.forEach(({ position, attitude, mode }, i) => {
+      const at = place(position);
+      const flies = mode !== "landed" && mode !== "lost";
+      const [phi, theta, psi] = attitude;
+      const share = i === focus.uas ? 1 : focus.shown(i) ? among : HIDDEN * among;
+      const wanted = BODY_PX * share * pixel * eye.distanceTo(at);
+      const size = flies ? Math.max(LEAST_BODY_M, wanted) : 0;
+      // body axes forward, right, down are -z, x, -y of the scene at heading north
+      const turned = new Quaternion().setFromEuler(new Euler(theta, -psi, -phi, "YXZ"));
+      const matrix = new Matrix4().compose(at, turned, new Vector3().setScalar(size));
+      for (const body of this.bodies) body.setMatrixAt(i, matrix);
+      drops.array.set([...at.toArray(), at.x, flies ? this.ground : at.y, at.z], 6 * i);
+    });
+    for (const body of this.bodies) body.instanceMatrix.needsUpdate = true;
+    drops.needsUpdate = true;
+    if (this.flight.predicts) this.drawPredicted(moment);
   }
 
-  draw(moment: Moment, pixel: number, distance: number): void {
-    const vehicle = moment.vehicles[this.i];
-    const at = place(vehicle.position);
-    const flies = vehicle.mode !== "landed" && vehicle.mode !== "lost";
-    this.body.visible = flies && !this.isGhost;
-    this.body.position.copy(at);
-    const [phi, theta, psi] = vehicle.attitude;
-    // body axes forward, right, down are -z, x, -y of the scene at heading north
-    this.body.rotation.copy(new Euler(theta, -psi, -phi, "YXZ"));
-    this.body.scale.setScalar(Math.max(0.5, 22 * pixel * distance));
-    this.ring.position.copy(at);
-    this.ring.scale.setScalar(84 * pixel);
-    this.drawRing(vehicle);
-    this.drawPath(moment, at.toArray());
-    setPoints(this.drop.geometry, [...at.toArray(), at.x, this.ground, at.z]);
-    this.drop.visible = flies && !this.isGhost;
-    const predicted = flies && !this.isGhost ? this.flight.predicted(moment.sample, this.i) : [];
-    const line = [];
-    for (let n = 0; n + 2 < Math.min(predicted.length, 3 * MOST_PREDICTED); n += 3) {
-      line.push(predicted[n + 1], -predicted[n + 2], -predicted[n]);
-    }
-    setPoints(this.predicted.geometry, line);
+  private drawPredicted(moment: Moment): void {
+    const { geometry } = this.predicted;
+    const corners: number[] = [];
+    const colours: number[] = [];
+    moment.vehicles.forEach(({ mode }, i) => {
+      if (mode === "landed" || mode === "lost") return;
+      const ahead = this.flight.predicted(moment.sample, i).slice(0, 3 * MOST_PREDICTED);
+      const ink = new Color(bright(this.flight.scene.uas[i].colour)).toArray();
+      for (let n = 0; n + 5 < ahead.length; n += 3) {
+        corners.push(ahead[n + 1], -ahead[n + 2], -ahead[n]);
+        corners.push(ahead[n + 4], -ahead[n + 5], -ahead[n + 3]);
+        colours.push(...ink, ...ink);
+      }
+    });
+    const position = geometry.getAttribute("position") as BufferAttribute;
+    position.array.set(corners);
+    colourOf(geometry).array.set(colours);
+    position.needsUpdate = colourOf(geometry).needsUpdate = true;
+    geometry.setDrawRange(0, corners.length / 3);
     this.predicted.computeLineDistances();
   }
+}
 
-  private drawPath(moment: Moment, at: number[]): void {
-    const flown = Math.min(moment.sample, this.flight.data.last[this.i]);
-    this.path.geometry.instanceCount = flown;
-    this.path.visible = flown > 0;
-    const from = place(this.flight.position(flown, this.i)).toArray();
-    const paint = this.trail?.colour(this.flight, this.i, flown);
-    if (paint) this.latestPaint.color.set(paint);
-    else this.latestPaint.color.set(bright(this.flight.scene.uas[this.i].colour));
-    this.latest.visible = moment.sample < this.flight.data.last[this.i];
-    // in place: new positions would be new memory of the graphics card in every picture
-    const { data } = this.latest.geometry.getAttribute("instanceStart") as InterleavedBufferAttribute;
-    data.array.set([...from, ...at]);
-    data.needsUpdate = true;
-  }
-
-  /** The ring is drawn anew only when it looks different. */
-  private drawRing(vehicle: VehicleMoment): void {
-    const { name, colour: hex } = this.flight.scene.uas[this.i];
-    const { soc, spare, mode } = vehicle;
-    const shows = `${Math.round(200 * soc)} ${Math.round(200 * spare)} ${ofSpare(spare)} ${mode}`;
-    if (shows === this.ringShows) return;
-    this.ringShows = shows;
-    redraw(this.ringTexture, (pen, px) => {
-      const middle = px / 2;
-      if (this.isGhost) ghost(pen, middle, middle, 0.2 * px, shortName(name), hex);
-      else if (vehicle.mode === "lost") cross(pen, middle, middle, 0.17 * px);
-      else if (vehicle.mode === "landed") landed(pen, middle, middle, 0.09 * px, hex);
-      else charge(pen, middle, middle, 0.27 * px, soc, spare, shortName(name), hex);
-    });
-  }
+function colourOf(geometry: BufferGeometry): BufferAttribute {
+  return geometry.getAttribute("color") as BufferAttribute;
 }
 
 function disc(pen: CanvasRenderingContext2D, px: number): void {
@@ -185,48 +133,28 @@ function disc(pen: CanvasRenderingContext2D, px: number): void {
   pen.fill();
 }
 
-/** A quadcopter of one metre, its nose to the north, in the colour of the UAS. */
-function quadcopter(ink: string): Group {
-  const group = new Group();
-  const frame = new MeshLambertMaterial({ color: colour("--ink") });
-  const paint = new MeshLambertMaterial({ color: ink });
-  const blur = new MeshLambertMaterial({
-    color: ink,
-    transparent: true,
-    opacity: 0.55,
-    side: DoubleSide,
-  });
-  for (const turned of [Math.PI / 4, -Math.PI / 4]) {
-    const arm = new Mesh(new BoxGeometry(1.1, 0.09, 0.12), frame);
-    arm.rotation.y = turned;
-    group.add(arm);
-  }
-  for (const [x, z] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
-    const rotor = new Mesh(new CylinderGeometry(0.27, 0.27, 0.04, 20), blur);
-    rotor.position.set(0.39 * x, 0.1, 0.39 * z);
-    group.add(rotor);
-  }
-  const nose = new Mesh(new BoxGeometry(0.16, 0.16, 0.5), paint);
-  nose.position.z = -0.2;
-  group.add(nose);
-  return group;
+/** A quadcopter of one metre, its nose to the north. */
+function arms(): BufferGeometry {
+  return mergeGeometries(
+    [Math.PI / 4, -Math.PI / 4].map((turned) => new BoxGeometry(1.1, 0.09, 0.12).rotateY(turned)),
+  );
 }
 
-function wide(values: number[], paint: LineMaterial): Line2 {
-  const geometry = new LineGeometry();
-  geometry.setPositions(values);
-  return new Line2(geometry, paint);
+function nose(): BufferGeometry {
+  return new BoxGeometry(0.16, 0.16, 0.5).translate(0, 0, -0.2);
+}
+
+function rotors(): BufferGeometry {
+  const places = [[1, 1], [1, -1], [-1, 1], [-1, -1]];
+  return mergeGeometries(
+    places.map(([x, z]) => new CylinderGeometry(0.27, 0.27, 0.04, 12).translate(0.39 * x, 0.1, 0.39 * z)),
+  );
 }
 
 function points(count: number): BufferGeometry {
   const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * count), 3));
+  for (const name of ["position", "color"]) {
+    geometry.setAttribute(name, new BufferAttribute(new Float32Array(3 * count), 3));
+  }
   return geometry;
-}
-
-function setPoints(geometry: BufferGeometry, values: number[]): void {
-  const attribute = geometry.getAttribute("position") as BufferAttribute;
-  attribute.array.set(values);
-  attribute.needsUpdate = true;
-  geometry.setDrawRange(0, values.length / 3);
 }

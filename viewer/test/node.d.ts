@@ -8,6 +8,7 @@ declare module "node:assert/strict" {
   interface Assert {
     equal(found: unknown, expected: unknown, message?: string): void;
     deepEqual(found: unknown, expected: unknown, message?: string): void;
+    match(text: string, pattern: RegExp, message?: string): void;
     ok(found: unknown, message?: string): void;
   }
   const assert: Assert;
