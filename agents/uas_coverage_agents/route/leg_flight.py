@@ -12,13 +12,13 @@ import numpy as np
 
 from uas_coverage_agents.route.layers import value_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
-from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
-from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
+from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, HEADROOM_M, LEAD_S, passes_over
+from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_hold_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
-from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, route
+from uas_coverage_env.world.routes import NO_WAY, ROUND_CORNER, crossing, route
 
 N_FLIGHT = 21
 """Numbers that the network reads about a state and the next three places."""
@@ -37,7 +37,9 @@ N_VELOCITIES = (_TURNS_BACK + _TURNS_ON) * len(_SPEEDS)
 _LENGTH_M, _SPEED_MPS, _TILT_RAD, _CLIMB_MPS, _RADIUS_M, _RISE_M = 50.0, 12.0, 0.44, 3.0, 15.0, 10.0
 _CORNER_M = 4.0
 _WITHIN_M = 0.15
-_TRIED = 12
+_TRIED = 16
+_HELD = 4
+_LANDING_M = 12.0
 
 
 @allocating_kernel
@@ -187,10 +189,32 @@ def towards_home(uas, x, home_m, altitude_floor_m, values):
 
 
 @allocating_kernel
-def _is_safe(arena, i, x, reference, command, path_m):
-    """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
-    n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, False, path_m)
+def _is_safe(arena, i, x, reference, command, n_held, path_m):
+    """Whether a command held for some steps, and braking after it, is clear of what is fixed."""
+    n_flown, slack_m = fly_hold_and_brake(
+        arena, i, x, reference, command, n_held, False, path_m[: path_m.shape[0] - _HELD + n_held]
+    )
     return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
+
+
+@allocating_kernel
+def _over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
+    """Altitude [m] at which a leg passes over what is low; the speed that leaves time to climb."""
+    altitude_m = -x[Z]
+    length_m = math.hypot(end_x - x[X], end_y - x[Y])
+    needed_m, speed_mps = -math.inf, uas.speed_mps
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        at, over, ends = crossing(
+            obstacle, arena.normals, arena.offsets_m, x[X], x[Y], end_x, end_y
+        )
+        if at > 1.0 or not passes_over(obstacle, over, ends, leg, max(altitude_m, end_altitude_m)):
+            continue
+        needed_m = max(needed_m, obstacle.roof_m + HEADROOM_M)
+        rise_m = obstacle.roof_m - altitude_m
+        if rise_m > 0.0:
+            speed_mps = min(speed_mps, at * length_m / (rise_m / uas.climb_mps + LEAD_S))
+    return needed_m, speed_mps
 
 
 @allocating_kernel
@@ -216,9 +240,10 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
     target = targets[0] if n_targets > 0 else arena.waypoints.shape[0] + i
     to_m = arena.waypoints[targets[0]].position_m if n_targets > 0 else uas.home_m
     end_x, end_y, _, leg = route(arena, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
-    if leg not in (CLEAR, ROUND_CORNER):
+    if leg == NO_WAY:
         return False
-    path_m = np.empty((rules.lookahead_steps + 1, 3))
+    path_m = np.empty((rules.lookahead_steps + _HELD, 3))
+    needed_m, speed_mps = _over_roofs(arena, x, end_x, end_y, -to_m[2], uas, leg)
     n = 0
     if leg == ROUND_CORNER:
         ahead[0, NORTH], ahead[0, EAST] = end_x, end_y
@@ -226,11 +251,14 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
         ahead[0, RADIUS] = _CORNER_M
         n = 1
     elif n_targets == 0:
+        if math.hypot(to_m[0] - x[X], to_m[1] - x[Y]) < _LANDING_M:
+            return False
         values = np.empty(3)
         towards_home(uas, x, to_m, rules.floor_m, values)
-        altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]))
-        write_command(command, VELOCITY, values[0], values[1], altitude_m)
-        return _is_safe(arena, i, x, reference, command, path_m)
+        altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
+        share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
+        write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)
+        return _is_safe(arena, i, x, reference, command, 1, path_m)
     for k in range(n, AHEAD):
         if k - n < n_targets:
             waypoint = arena.waypoints[targets[k - n]]
@@ -245,12 +273,18 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
         arena.vehicles[i], uas.speed_mps, x, reference, ahead, layers, aims_m, commands, costs,
         command,
     )  # fmt: skip
-    floor_m = lowest_altitude(arena, i, x[X], x[Y])
-    for _ in range(_TRIED):
-        best = costs.argmin()
-        altitude_m = min(max(commands[best, 2], floor_m), max(rules.ceiling_m, commands[best, 2]))
-        write_command(command, VELOCITY, commands[best, 0], commands[best, 1], altitude_m)
-        if _is_safe(arena, i, x, reference, command, path_m):
-            return True
-        costs[best] = np.inf
+    floor_m = max(lowest_altitude(arena, i, x[X], x[Y]), needed_m)
+    share = min(1.0, speed_mps / uas.speed_mps)
+    for n_held in (_HELD, 1):
+        left = costs.copy()
+        for _ in range(_TRIED):
+            best = left.argmin()
+            wanted_m = commands[best, 2]
+            altitude_m = min(max(wanted_m, floor_m), max(rules.ceiling_m, wanted_m))
+            write_command(
+                command, VELOCITY, share * commands[best, 0], share * commands[best, 1], altitude_m
+            )
+            if _is_safe(arena, i, x, reference, command, n_held, path_m):
+                return True
+            left[best] = np.inf
     return False

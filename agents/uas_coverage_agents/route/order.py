@@ -33,7 +33,7 @@ _TURN = np.interp(
     [0.0, 45.0, 90.0, 135.0, 180.0],
     [0.0, -0.3, -0.45, 0.1, 1.5],
 )
-"""What turning costs in times to fly a radius, over the cosine; as the search of `routing` has it."""
+"""What turning costs in times to fly a radius, over the cosine; see `routing.search`."""
 
 
 class Mission(NamedTuple):
@@ -137,7 +137,9 @@ def _outlook(mission, u, first, ready_s, place, before_m, open_, trial_ready, tr
                 j = k
         if j < 0:
             break
-        row = mission.from_s[j] if trial_place[j] == IN_THE_AIR else mission.between_s[trial_place[j]]
+        row = (
+            mission.from_s[j] if trial_place[j] == IN_THE_AIR else mission.between_s[trial_place[j]]
+        )
         at = 0
         for t in range(1, n_todo):
             if row[todo[t]] < row[todo[at]]:
@@ -245,9 +247,7 @@ def look(mission, u, ready_s, place, before_m, open_, desk):
     best, n_legal = -1, 0
     for k in range(n):
         w = candidates[k]
-        legal[k] = (
-            ready_s[u] + leg_s[k] + mission.home_s[u, w] + _SPARE_S <= mission.budget_s[u]
-        )
+        legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + _SPARE_S <= mission.budget_s[u]
         n_legal += legal[k]
         total_s[k], longest_s[k], left[k] = _outlook(
             mission, u, w, ready_s, place, before_m, open_, room_ready, room_place, room_todo
@@ -346,9 +346,7 @@ def move(mission, u, w, ready_s, place, before_m, open_):
     """UAS u takes waypoint w next (-1: flies home)."""
     if w < 0:
         stays = place[u] == IN_THE_AIR and mission.here_home_s[u] <= 0.0
-        ready_s[u] = 0.0 if stays else ready_s[u] + home_seconds(
-            mission, u, place[u], before_m[u]
-        )
+        ready_s[u] = 0.0 if stays else ready_s[u] + home_seconds(mission, u, place[u], before_m[u])
         place[u] = DONE
         return
     ready_s[u] += leg_seconds(mission, u, place[u], before_m[u], w)

@@ -14,6 +14,10 @@ SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-route"
 class LearnedRouteOptions(AssistedOptions):
     """Options of `LearnedRoute`."""
 
+    return_mode: bool = Field(
+        default=False,
+        description="let the world fly it home; else it flies home itself, by the same rule",
+    )
     samples: int = Field(
         default=SAMPLES,
         ge=1,

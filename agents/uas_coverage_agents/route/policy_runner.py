@@ -15,6 +15,7 @@ from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_netw
 from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, desk, no_record
+from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import (
     Approach,
@@ -24,15 +25,22 @@ from uas_coverage_env.mission import (
     WorldView,
     first_sight,
 )
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    FLYING,
+    LANDED,
+    Command,
+    GoTo,
+    SwarmState,
+    Velocity,
+)
 
 BoolArray = NDArray[np.bool_]
-SAMPLES = 32
+SAMPLES = 64
 """Routes that are built before the best are flown; the first without noise."""
 
 _NOISE = 1.0
 _AGAIN_STEPS = 10
-_FIELD = "covering"
 
 
 def observation() -> Observation:
@@ -85,44 +93,51 @@ class RouteRunner:
         self._built_at = -_AGAIN_STEPS
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
         self._ahead = np.full(AHEAD, -1)
+        self._returns = np.zeros(n_uas, np.bool_)
         self._act_on(first_sight(brief))
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on along the routes; build them again where they are no longer right."""
-        blocked, wanted = self._act_on(swarm)
+        blocked = self._act_on(swarm)
         targets = {
             u: int(self._routes[u, 0]) for u in range(len(swarm.names)) if self._lengths[u] > 0
         }
         flown_to = {swarm.names[u]: w for u, w in targets.items()}
         self._attempts.update(swarm, flown_to, blocked)
         return {
-            name: self._command_of(swarm, swarm.names.index(name), blocked, wanted)
-            for name in swarm.active
+            name: self._command_of(swarm, swarm.names.index(name), blocked) for name in swarm.active
         }
 
-    def _act_on(self, swarm: SwarmState) -> tuple[BoolArray, BoolArray]:
+    def _act_on(self, swarm: SwarmState) -> BoolArray:
         self._view.update(swarm)
         blocked = self._view.blocked()
         wanted = self._attempts.wanted(swarm.uncovered)
-        works = self._handover.workers(swarm) & ~swarm.returning
+        if swarm.uncovered.any():
+            # the rule of return mode, which need not be on
+            for u in np.flatnonzero((swarm.status == FLYING) & ~self._returns):
+                self._returns[u] = has_to_return(self._view.arena, self._view.state, u)
+        works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
         self._forget_covered(swarm.uncovered, works)
-        now = (wanted & blocked, works)
-        known = self._built_for
+        if self._has_to_build(swarm, wanted, blocked, works):
+            self._build(swarm, wanted, blocked, works)
+            self._built_for, self._built_at = (wanted & blocked, works), swarm.step
+        return blocked
+
+    def _has_to_build(
+        self, swarm: SwarmState, wanted: BoolArray, blocked: BoolArray, works: BoolArray
+    ) -> bool:
+        if self._built_for is None:
+            return True
+        was_blocked, worked = self._built_for
         left_out = wanted.copy()
         for u in np.flatnonzero(works):
             left_out[self._routes[u, : self._lengths[u]]] = False
+        landed = (swarm.status == LANDED) & ~left_out.any()
+        changed = (works != worked) & ~landed
+        # what is covered is no longer blocked; that changes nothing
+        turned = wanted & (blocked != was_blocked)
         late = left_out.any() and swarm.step - self._built_at >= _AGAIN_STEPS
-        changed = known is None or (known[1] & (swarm.status == FLYING) & ~works).any()
-        if known is not None:
-            # what is covered is no longer blocked; that changes nothing
-            changed = changed or bool((known[0] & wanted & ~blocked).any())
-            changed = changed or bool((now[0] & ~known[0]).any())
-            changed = changed or bool((works & ~known[1]).any()) or bool((known[1] & ~works & (
-                swarm.status != FLYING) & (self._lengths > 0)).any())
-        if changed or late:
-            self._build(swarm, wanted, blocked, works)
-            self._built_for, self._built_at = now, swarm.step
-        return blocked, wanted
+        return bool(changed.any() or turned.any() or late)
 
     def _forget_covered(self, uncovered: BoolArray, works: BoolArray) -> None:
         for u in range(len(self._lengths)):
@@ -147,10 +162,8 @@ class RouteRunner:
                 best_s = cost_s
                 self._routes[:], self._lengths[:] = routes, lengths
 
-    def _command_of(
-        self, swarm: SwarmState, u: int, blocked: BoolArray, wanted: BoolArray
-    ) -> Command:
-        if swarm.returning[u]:
+    def _command_of(self, swarm: SwarmState, u: int, blocked: BoolArray) -> Command:
+        if swarm.returning[u] or self._returns[u]:
             return GoTo(None)
         n = int(self._lengths[u])
         if n == 0 and not swarm.departed[u]:
