@@ -166,8 +166,9 @@ def learn_flight(
     rng = np.random.default_rng(seed)
     courses, unseen = courses_of(train), courses_of(validation)
     network = _network(N_FLIGHT)
-    nn.init.zeros_(network[-1].weight)
-    nn.init.zeros_(network[-1].bias)
+    with torch.no_grad():  # straight on at full speed at first
+        for parameter in list(network.parameters())[-2:]:
+            parameter.zero_()
     rows, beyond_s = np.zeros((0, N_FLIGHT), np.float32), np.zeros(0, np.float32)
     for number in range(FLIGHT_ROUNDS + 1):
         _, share = flown(unseen, _layers(network), 0.0, rng)
