@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
+from uas_coverage_agents.policy.route_networks import RouteNetworks
+from uas_coverage_agents.route.layers import layers_of, value_of
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, desk, no_record
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
-from uas_coverage_agents.route.policy_runner import RouteRunner
 
 from uas_coverage_env import generate_scenario, rollout
-from uas_coverage_env.flight import Assistants, coverage, energy_Wh, home
+from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, first_sight
 
 
@@ -20,7 +21,11 @@ def town():
 
 def _built(scenario, wanted, late=None, works=None):
     brief = MissionBrief.of(scenario)
-    runner = RouteRunner(load_policy(SHIPPED), Assistants(), 1)
+    policy = load_policy(SHIPPED)
+    network = policy.description.network
+    assert isinstance(network, RouteNetworks)
+    score = layers_of(network.order, policy.tensors, "order.")
+    home_score = layers_of(network.home, policy.tensors, "home.")
     late = np.zeros(len(brief.waypoints), np.bool_) if late is None else late
     works = np.ones(len(brief.uas), np.bool_) if works is None else works
     mission = MissionMaker(brief).mission(first_sight(brief), works, late)
@@ -28,7 +33,7 @@ def _built(scenario, wanted, late=None, works=None):
     lengths = np.zeros(len(brief.uas), np.int64)
     rng = np.random.default_rng(0)
     cost_s = build(
-        mission, runner._score, runner._home_score, wanted, 0.0, rng, desk(), no_record(), routes,
+        mission, score, home_score, wanted, 0.0, rng, desk(), no_record(), routes,
         lengths,
     )  # fmt: skip
     return [routes[u, :n].tolist() for u, n in enumerate(lengths)], cost_s
@@ -73,10 +78,9 @@ def test_the_same_seed_flies_the_same_mission(town):
 
 
 def test_the_networks_of_the_file_are_those_that_are_compiled():
-    from uas_coverage_agents.route.layers import layers_of, value_of
-
     policy = load_policy(SHIPPED)
     network = policy.description.network
+    assert isinstance(network, RouteNetworks)
     rows = np.random.default_rng(0).normal(size=network.inputs)
     layers = layers_of(network.order, policy.tensors, "order.")
     expected = policy.forward(rows)[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_agents.route.order import Mission
+from uas_coverage_agents.route.clock import Mission
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD, VX, VY
 from uas_coverage_env.world import FLYING, SwarmState, build_arena

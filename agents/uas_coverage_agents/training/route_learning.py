@@ -24,17 +24,15 @@ from uas_coverage_agents.policy import (
     Training,
     save_policy,
 )
+from uas_coverage_agents.route.clock import DONE, IN_THE_AIR, Mission
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.layout import route_networks
 from uas_coverage_agents.route.leg_flight import N_FLIGHT
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import (
-    DONE,
-    IN_THE_AIR,
     N_ORDER,
     Desk,
     K,
-    Mission,
     desk,
     look,
     move,
