@@ -29,6 +29,7 @@ class PolicyRunner(Protocol):
 
 
 RUNNERS = {
+    "route": "uas_coverage_agents.route.policy_runner:RouteRunner",
     "velocity": "uas_coverage_agents.velocity.policy_runner:VelocityRunner",
     "waypoint": "uas_coverage_agents.waypoint.policy_runner:WaypointRunner",
 }

@@ -1,0 +1,383 @@
+"""The routes of all UAS, built together: whoever is free first takes its next waypoint.
+
+The clock runs in estimated leg times, not in flights, so that whole routes are built in about a
+millisecond. All UAS share it: each choice sees where the others will be, and what they have left.
+A network scores each of the nearest waypoints, and home. `trajectory`'s routes, replayed by the
+same clock, are what it was trained on.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_agents.route.clock import DONE, IN_THE_AIR, home_seconds, leg_seconds
+from uas_coverage_agents.route.layers import value_of
+from uas_coverage_env.compiled.kernels import allocating_kernel
+
+K = 12
+"""Nearest open waypoints that are scored; the last choice is home."""
+
+HOME_CHOICE = K
+N_ORDER = 30
+"""Numbers that are read about each choice."""
+
+_SPARE_S = 8.0
+_LEFT_OUT_S = 300.0
+
+
+@allocating_kernel
+def _outlook(mission, u, first, ready_s, place, before_m, open_, trial_ready, trial_place, todo):
+    """(total, longest, left) if UAS u flies to `first` (-1: home), and all go on to the nearest."""
+    n_uas = ready_s.shape[0]
+    total_s, longest_s = 0.0, 0.0
+    n_todo = 0
+    for w in range(open_.shape[0]):
+        if open_[w] and w != first:
+            todo[n_todo] = w
+            n_todo += 1
+    for j in range(n_uas):
+        trial_ready[j] = ready_s[j]
+        trial_place[j] = place[j]
+        if place[j] == DONE:
+            total_s += ready_s[j]
+            longest_s = max(longest_s, ready_s[j])
+    if first < 0:
+        at_home_s = ready_s[u] + home_seconds(mission, u, place[u], before_m[u])
+        total_s += at_home_s
+        longest_s = max(longest_s, at_home_s)
+        trial_place[u] = DONE
+    else:
+        trial_ready[u] += leg_seconds(mission, u, place[u], before_m[u], first)
+        trial_place[u] = first
+    while n_todo > 0:
+        j = -1
+        for k in range(n_uas):
+            if trial_place[k] != DONE and (j < 0 or trial_ready[k] < trial_ready[j]):
+                j = k
+        if j < 0:
+            break
+        row = (
+            mission.from_s[j] if trial_place[j] == IN_THE_AIR else mission.between_s[trial_place[j]]
+        )
+        at = 0
+        for t in range(1, n_todo):
+            if row[todo[t]] < row[todo[at]]:
+                at = t
+        w = todo[at]
+        if trial_ready[j] + row[w] + mission.home_s[j, w] + _SPARE_S > mission.budget_s[j]:
+            home_s = mission.here_home_s[j]
+            if trial_place[j] != IN_THE_AIR:
+                home_s = mission.home_s[j, trial_place[j]]
+            total_s += trial_ready[j] + home_s
+            longest_s = max(longest_s, trial_ready[j] + home_s)
+            trial_place[j] = DONE
+            continue
+        trial_ready[j] += row[w]
+        trial_place[j] = w
+        n_todo -= 1
+        todo[at] = todo[n_todo]
+    for j in range(n_uas):
+        if trial_place[j] >= 0 or (trial_place[j] == IN_THE_AIR and trial_ready[j] > 0.0):
+            at_home_s = trial_ready[j] + mission.home_s[j, trial_place[j]]
+            total_s += at_home_s
+            longest_s = max(longest_s, at_home_s)
+    return total_s, longest_s, n_todo
+
+
+@allocating_kernel
+def _nearest(mission, u, place, before_m, open_, candidates, leg_s):
+    """The nearest open waypoints in order; how many."""
+    n = 0
+    for w in range(open_.shape[0]):
+        if not open_[w]:
+            continue
+        seconds = leg_seconds(mission, u, place, before_m, w)
+        if n == K and seconds >= leg_s[K - 1]:
+            continue
+        n = min(n + 1, K)
+        at = n - 1
+        while at > 0 and leg_s[at - 1] > seconds:
+            leg_s[at] = leg_s[at - 1]
+            candidates[at] = candidates[at - 1]
+            at -= 1
+        leg_s[at] = seconds
+        candidates[at] = w
+    return n
+
+
+class Desk(NamedTuple):
+    """Room for building routes.
+
+    Attributes:
+        candidates: (K,) waypoints of the choice.
+        rows: (K+1, N_ORDER) what is read about each.
+        legal: (K+1,).
+    """
+
+    candidates: NDArray[np.int64]
+    rows: NDArray[np.float64]
+    legal: NDArray[np.bool_]
+
+
+def desk() -> Desk:
+    """An empty one."""
+    return Desk(np.full(K, -1), np.zeros((K + 1, N_ORDER)), np.zeros(K + 1, np.bool_))
+
+
+@allocating_kernel
+def look(mission, u, ready_s, place, before_m, open_, desk):
+    """Write what UAS u may choose and what is read about each choice.
+
+    Returns:
+        How many waypoints there are to choose from.
+    """
+    candidates, rows, legal = desk.candidates, desk.rows, desk.legal
+    n_uas, unit = ready_s.shape[0], mission.unit_s
+    leg_s = np.empty(K)
+    n = _nearest(mission, u, place[u], before_m[u], open_, candidates, leg_s)
+    candidates[n:] = -1
+    rows[:] = 0.0
+    legal[:] = False
+    room_ready, room_place = np.empty(n_uas), np.empty(n_uas, np.int64)
+    room_todo = np.empty(open_.shape[0], np.int64)
+    n_open, cx, cy = 0, 0.0, 0.0
+    for w in range(open_.shape[0]):
+        if open_[w]:
+            n_open += 1
+            cx += mission.place_m[w, 0]
+            cy += mission.place_m[w, 1]
+    cx /= max(n_open, 1)
+    cy /= max(n_open, 1)
+    mates, others_s, ahead_s = 0, 0.0, 1e9
+    for j in range(n_uas):
+        if j != u and place[j] != DONE:
+            mates += 1
+            others_s += ready_s[j]
+            ahead_s = min(ahead_s, ready_s[j])
+    px, py = mission.here_m[u, 0], mission.here_m[u, 1]
+    if place[u] >= 0:
+        px, py = mission.place_m[place[u], 0], mission.place_m[place[u], 1]
+    vx, vy = mission.velocity[u, 0], mission.velocity[u, 1]
+    if place[u] >= 0:
+        vx, vy = px - before_m[u, 0], py - before_m[u, 1]
+        length = math.hypot(vx, vy) + 1e-9
+        vx, vy = vx / length, vy / length
+    total_s, longest_s, left = np.zeros(K + 1), np.zeros(K + 1), np.zeros(K + 1)
+    best, n_legal = -1, 0
+    for k in range(n):
+        w = candidates[k]
+        legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + _SPARE_S <= mission.budget_s[u]
+        n_legal += legal[k]
+        total_s[k], longest_s[k], left[k] = _outlook(
+            mission, u, w, ready_s, place, before_m, open_, room_ready, room_place, room_todo
+        )
+        cost = longest_s[k] + mission.weight * total_s[k] + 60.0 * left[k]
+        if best < 0 or cost < longest_s[best] + mission.weight * total_s[best] + 60.0 * left[best]:
+            best = k
+    total_s[K], longest_s[K], left[K] = _outlook(
+        mission, u, -1, ready_s, place, before_m, open_, room_ready, room_place, room_todo
+    )
+    legal[K] = n_legal == 0 or (mates > 0 and left[K] <= (left[best] if best >= 0 else 0.0))
+    share = n_open / (mates + 1.0)
+    for k in range(n + 1):
+        r = rows[k] if k < n else rows[K]
+        c = k if k < n else K
+        r[0] = n_open / 25.0
+        r[1] = share / 15.0
+        r[2] = min(mates, 4) / 4.0
+        r[3] = mates == 0
+        r[4] = (others_s / max(mates, 1) - ready_s[u]) / (5.0 * unit) if mates > 0 else 0.0
+        r[5] = place[u] == IN_THE_AIR
+        r[6] = (total_s[c] - total_s[best]) / (2.0 * unit) if best >= 0 else 0.0
+        r[7] = (longest_s[c] - longest_s[best]) / (2.0 * unit) if best >= 0 else 0.0
+        r[8] = (leg_s[0] if n > 0 else 0.0) / (2.0 * unit)
+        r[9] = math.hypot(px - cx, py - cy) / 100.0
+    home = rows[K]
+    home[10] = home_seconds(mission, u, place[u], before_m[u]) / (10.0 * unit)
+    home[11] = min(ahead_s, 1e3) / (20.0 * unit) if mates > 0 else 0.0
+    home[12] = (mission.budget_s[u] - ready_s[u]) / 300.0
+    home[13] = n_open <= mates
+    for k in range(n):
+        r, w = rows[k], candidates[k]
+        r[10] = leg_s[k] / (2.0 * unit)
+        r[11] = (leg_s[k] - leg_s[0]) / unit
+        dx, dy = mission.place_m[w, 0] - px, mission.place_m[w, 1] - py
+        length = math.hypot(dx, dy) + 1e-9
+        r[12] = (vx * dx + vy * dy) / length
+        r[13] = abs(vx * dy - vy * dx) / length
+        r[14] = mission.home_s[u, w] / (10.0 * unit)
+        lead_s = 1e6
+        for j in range(n_uas):
+            if j != u and place[j] != DONE:
+                row = mission.from_s[j] if place[j] == IN_THE_AIR else mission.between_s[place[j]]
+                lead_s = min(lead_s, ready_s[j] + row[w])
+        r[15] = (min(lead_s, 1e4) - ready_s[u] - leg_s[k]) / (3.0 * unit) if mates > 0 else 3.0
+        nearest, second = 1e3, 1e3
+        near, around, side, sides, behind = 0, 0, 0.0, 0.0, 0
+        for v in range(open_.shape[0]):
+            if not open_[v] or v == w:
+                continue
+            on_s = mission.between_s[w, v]
+            near += on_s < 1.6 * unit
+            around += on_s < 3.0 * unit
+            if on_s < nearest:
+                nearest, second = on_s, nearest
+            elif on_s < second:
+                second = on_s
+            if on_s < 4.0 * unit:
+                ex, ey = mission.place_m[v, 0] - px, mission.place_m[v, 1] - py
+                side += 1.0 if dx * ey - dy * ex > 0.0 else -1.0
+                sides += 1.0
+                behind += (ex - dx) * dx + (ey - dy) * dy < 0.0
+        r[16] = nearest / unit
+        r[17] = second / unit
+        r[18] = near / 6.0
+        r[19] = around / 15.0
+        r[20] = abs(side) / max(sides, 1.0)
+        r[21] = math.hypot(mission.place_m[w, 0] - cx, mission.place_m[w, 1] - cy) / 100.0
+        r[22] = behind / max(sides, 1.0)
+        r[23] = k == 0
+        r[24] = k == best
+        r[25] = k / K
+        # is it nearest to where it would be taken from, and by whom
+        r[26] = (leg_s[k] + nearest) / (3.0 * unit)
+        r[27] = lead_s < ready_s[u] + leg_s[k]
+        r[28] = left[k] - (left[best] if best >= 0 else 0.0)
+        r[29] = home[10] - r[14]
+    for k in range(K + 1):
+        for f in range(N_ORDER):
+            rows[k, f] = min(max(rows[k, f], -3.0), 3.0)
+    return n
+
+
+@allocating_kernel
+def next_free(place, ready_s):
+    """The UAS that is free first; -1 where none covers any more."""
+    j = -1
+    for k in range(place.shape[0]):
+        if place[k] != DONE and (j < 0 or ready_s[k] < ready_s[j]):
+            j = k
+    return j
+
+
+@allocating_kernel
+def move(mission, u, w, ready_s, place, before_m, open_):
+    """UAS u takes waypoint w next (-1: flies home)."""
+    if w < 0:
+        stays = place[u] == IN_THE_AIR and mission.here_home_s[u] <= 0.0
+        ready_s[u] = 0.0 if stays else ready_s[u] + home_seconds(mission, u, place[u], before_m[u])
+        place[u] = DONE
+        return
+    ready_s[u] += leg_seconds(mission, u, place[u], before_m[u], w)
+    if place[u] == IN_THE_AIR:
+        before_m[u, 0], before_m[u, 1] = mission.here_m[u, 0], mission.here_m[u, 1]
+    else:
+        before_m[u, 0] = mission.place_m[place[u], 0]
+        before_m[u, 1] = mission.place_m[place[u], 1]
+    place[u] = w
+    open_[w] = False
+
+
+class Record(NamedTuple):
+    """What was decided while routes were built, for learning; rows beyond `n` mean nothing.
+
+    Attributes:
+        rows: (N, K+1, N_ORDER) what was read.
+        legal: (N, K+1).
+        choice: (N,).
+        n: (1,) how many; only choices among several count.
+    """
+
+    rows: NDArray[np.float32]
+    legal: NDArray[np.bool_]
+    choice: NDArray[np.int64]
+    n: NDArray[np.int64]
+
+
+def no_record(size: int = 0) -> Record:
+    """Room for so many decisions."""
+    return Record(
+        np.zeros((size, K + 1, N_ORDER), np.float32),
+        np.zeros((size, K + 1), np.bool_),
+        np.zeros(size, np.int64),
+        np.zeros(1, np.int64),
+    )
+
+
+@allocating_kernel
+def note(record, desk, choice):
+    """Note a decision, if there is room and there was a choice."""
+    n = record.n[0]
+    if n < record.choice.shape[0] and desk.legal.sum() > 1:
+        record.rows[n] = desk.rows
+        record.legal[n] = desk.legal
+        record.choice[n] = choice
+        record.n[0] = n + 1
+
+
+@allocating_kernel
+def build(mission, score, home_score, wanted, noise, rng, desk, record, routes, lengths):
+    """Build the routes of all UAS.
+
+    Args:
+        mission: `Mission`.
+        score: `Layers` that score a waypoint.
+        home_score: `Layers` that score home.
+        wanted: (W,) waypoints to be visited.
+        noise: Scale of Gumbel noise on scores; 0: always the best.
+        rng: Of the noise.
+        desk: `Desk`.
+        record: `Record`, written.
+        routes: (U, W) written.
+        lengths: (U,) written.
+
+    Returns:
+        Estimated cost [s]: the longest flight and the weighted sum, and what is left out.
+    """
+    n_uas = routes.shape[0]
+    ready_s, place = np.zeros(n_uas), np.full(n_uas, IN_THE_AIR)
+    before_m = mission.here_m.copy()
+    lengths[:] = 0
+    left = 0
+    for j in range(n_uas):
+        if not mission.may[j]:
+            place[j] = DONE
+    for stage in range(2):
+        open_ = wanted & (mission.late == (stage == 1))
+        while open_.any():
+            u = next_free(place, ready_s)
+            if u < 0:
+                break
+            look(mission, u, ready_s, place, before_m, open_, desk)
+            best, best_score = -1, -np.inf
+            for k in range(K + 1):
+                if not desk.legal[k]:
+                    continue
+                if k < K:
+                    value = value_of(score, desk.rows[k])
+                else:
+                    value = value_of(home_score, desk.rows[K])
+                if noise > 0.0:
+                    value -= noise * math.log(-math.log(rng.random() + 1e-300) + 1e-300)
+                if value > best_score:
+                    best, best_score = k, value
+            note(record, desk, best)
+            if best == K or best < 0:
+                move(mission, u, -1, ready_s, place, before_m, open_)
+                continue
+            w = desk.candidates[best]
+            routes[u, lengths[u]] = w
+            lengths[u] += 1
+            move(mission, u, w, ready_s, place, before_m, open_)
+        left += open_.sum()
+    total_s, longest_s = 0.0, 0.0
+    for j in range(n_uas):
+        if place[j] != DONE and lengths[j] > 0:
+            ready_s[j] += home_seconds(mission, j, place[j], before_m[j])
+        elif place[j] != DONE:
+            ready_s[j] = mission.here_home_s[j]
+        total_s += ready_s[j]
+        longest_s = max(longest_s, ready_s[j])
+    return longest_s + mission.weight * total_s + _LEFT_OUT_S * left

@@ -1,0 +1,40 @@
+"""The shipped policy that plans routes, as a planner: `learned-route`."""
+
+from pathlib import Path
+
+from pydantic import Field
+
+from uas_coverage_agents.policy.planner import PolicyPlanner
+from uas_coverage_agents.route.policy_runner import SAMPLES, RouteRunner
+from uas_coverage_env.flight import AssistedOptions
+
+SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-route"
+
+
+class LearnedRouteOptions(AssistedOptions):
+    """Options of `LearnedRoute`."""
+
+    return_mode: bool = Field(
+        default=False,
+        description="let the world fly it home; else it flies home itself, by the same rule",
+    )
+    samples: int = Field(
+        default=SAMPLES,
+        ge=1,
+        le=100_000,
+        description="routes built before the best are flown; 1: the network's first choices alone",
+    )
+
+
+class LearnedRoute(PolicyPlanner):
+    """Builds the routes of the whole fleet with trained networks, and flies along them fast."""
+
+    Options = LearnedRouteOptions
+
+    def __init__(self, options: LearnedRouteOptions | None = None) -> None:
+        options = options or LearnedRouteOptions()
+        self._samples = options.samples
+        super().__init__(options, SHIPPED)
+
+    def _runner(self) -> RouteRunner:
+        return RouteRunner(self.policy, self.assistants, self._samples)

@@ -1,0 +1,87 @@
+"""`learned-route`: routes of the whole fleet, and flights along them."""
+
+import numpy as np
+import pytest
+from uas_coverage_agents.policy import load_policy
+from uas_coverage_agents.policy.route_networks import RouteNetworks
+from uas_coverage_agents.route.layers import layers_of, value_of
+from uas_coverage_agents.route.mission import MissionMaker
+from uas_coverage_agents.route.order import build, desk, no_record
+from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
+
+from uas_coverage_env import generate_scenario, rollout
+from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.mission import MissionBrief, first_sight
+
+
+@pytest.fixture(scope="module")
+def town():
+    return generate_scenario(seed=5, n_uas=2, n_waypoints=8, n_obstacles=2)
+
+
+def _built(scenario, wanted, late=None, works=None):
+    brief = MissionBrief.of(scenario)
+    policy = load_policy(SHIPPED)
+    network = policy.description.network
+    assert isinstance(network, RouteNetworks)
+    score = layers_of(network.order, policy.tensors, "order.")
+    home_score = layers_of(network.home, policy.tensors, "home.")
+    late = np.zeros(len(brief.waypoints), np.bool_) if late is None else late
+    works = np.ones(len(brief.uas), np.bool_) if works is None else works
+    mission = MissionMaker(brief).mission(first_sight(brief), works, late)
+    routes = np.full((len(brief.uas), len(brief.waypoints)), -1)
+    lengths = np.zeros(len(brief.uas), np.int64)
+    rng = np.random.default_rng(0)
+    cost_s = build(
+        mission, score, home_score, wanted, 0.0, rng, desk(), no_record(), routes,
+        lengths,
+    )  # fmt: skip
+    return [routes[u, :n].tolist() for u, n in enumerate(lengths)], cost_s
+
+
+@pytest.mark.parametrize("n_uas", [1, 3, 32])
+def test_one_set_of_weights_gives_every_waypoint_to_exactly_one_uas(n_uas):
+    scenario = generate_scenario(seed=1, n_uas=n_uas, n_waypoints=40, n_obstacles=0)
+    routes, cost_s = _built(scenario, np.ones(40, np.bool_))
+    assert sorted(w for route in routes for w in route) == list(range(40))
+    assert np.isfinite(cost_s)
+
+
+def test_what_a_moving_obstacle_covers_comes_after_everything_else(town):
+    late = np.zeros(8, np.bool_)
+    late[3] = True
+    routes, _ = _built(town, np.ones(8, np.bool_), late=late)
+    assert any(route and route[-1] == 3 for route in routes)
+
+
+def test_a_uas_that_may_not_work_gets_no_waypoint_and_covered_ones_are_left_out(town):
+    wanted = np.ones(8, np.bool_)
+    wanted[[0, 5]] = False
+    routes, _ = _built(town, wanted, works=np.array([True, False]))
+    assert routes[1] == []
+    assert sorted(routes[0]) == [1, 2, 3, 4, 6, 7]
+
+
+def test_a_mission_is_accomplished_with_less_energy_than_by_the_nearest_waypoint(town):
+    flight = rollout(town, LearnedRoute(LearnedRouteOptions(samples=4)))
+    nearest = rollout(town, "nearest-waypoint")
+    assert coverage(flight) == 1.0
+    assert home(flight).all()
+    assert not flight.violations
+    assert energy_Wh(flight).sum() < energy_Wh(nearest).sum()
+
+
+def test_the_same_seed_flies_the_same_mission(town):
+    first = rollout(town, LearnedRoute(LearnedRouteOptions(samples=3)), max_steps=20)
+    again = rollout(town, LearnedRoute(LearnedRouteOptions(samples=3)), max_steps=20)
+    np.testing.assert_array_equal(first.x, again.x)
+
+
+def test_the_networks_of_the_file_are_those_that_are_compiled():
+    policy = load_policy(SHIPPED)
+    network = policy.description.network
+    assert isinstance(network, RouteNetworks)
+    rows = np.random.default_rng(0).normal(size=network.inputs)
+    layers = layers_of(network.order, policy.tensors, "order.")
+    expected = policy.forward(rows)[0]
+    assert value_of(layers, rows[: network.order.inputs]) == pytest.approx(expected)
