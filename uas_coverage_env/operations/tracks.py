@@ -217,9 +217,7 @@ class _Builder:
         self._centres = centres
         self._radii = np.array([w.radius_m for w in flight.scenario.waypoints])
         for w, sample in enumerate(first_at):
-            if sample < len(path) and (
-                covering_samples(flight.scenario, w, flight.x[sample])[uas]
-            ):
+            if sample < len(path) and (covering_samples(flight.scenario, w, flight.x[sample])[uas]):
                 self.waypoints.append(w)
                 self._covered.setdefault(int(sample), []).append(w)
 
