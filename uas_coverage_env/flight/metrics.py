@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, EventRecord, FlightRecord, Violation
+from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH
 from uas_coverage_env.world.coverage import covering_samples
@@ -137,6 +138,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
     """The fields of `summary.json`, in their order."""
     return {
         "coverage": coverage(flight),
+        # without cameras the file is as it was before there were any
+        **({"seen_ground": shares} if (shares := seen_shares(flight)) else {}),
         "steps": flight.steps,
         "energy_Wh": float(energy_Wh(flight).sum()),
         **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
