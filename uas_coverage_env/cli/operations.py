@@ -17,6 +17,7 @@ from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import Place, warnings
 
+_HEIGHT_M = 40.0
 _LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink"}
 
 
@@ -53,7 +54,24 @@ def import_area(
     camera: Annotated[
         str, typer.Option(help="Name of a camera (see the docs), or a .toml file with one.")
     ] = "sony-a6000",
-    height: Annotated[float, typer.Option(help="Of the waypoints above the ground, m.")] = 40.0,
+    height: Annotated[
+        float | None,
+        typer.Option(help="Of the waypoints above the ground, m; default: 40.", show_default=False),
+    ] = None,
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            help="Instead of --height: the most that a pixel may show, cm; waypoints then ask "
+            "for the camera."
+        ),
+    ] = None,
+    max_speed: Annotated[
+        float | None,
+        typer.Option(
+            help="At which a waypoint is covered, as the exposure allows, m/s; waypoints then "
+            "ask for the camera."
+        ),
+    ] = None,
     radius: Annotated[float, typer.Option(help="Of a waypoint's sphere, m.")] = 6.0,
     overlap: Annotated[
         float, typer.Option(help="Share of a picture that the next one shows again.")
@@ -74,17 +92,29 @@ def import_area(
 ) -> None:
     """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
     with extra():
-        from uas_coverage_env.operations import ImportOptions, make_scenario, read_drawings
+        from uas_coverage_env.operations import (
+            ImportOptions,
+            load_camera,
+            make_scenario,
+            read_drawings,
+        )
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:
         raise InputError(f"{out}: exists; give another --out or add --overwrite")
+    if resolution is not None and height is not None:
+        raise InputError("--resolution says how high waypoints lie: leave out --height")
+    if resolution is not None:
+        height = load_camera(camera).height_m(resolution, radius)
+    height = _HEIGHT_M if height is None else height
     options = ImportOptions(
         fleet=fleet,
         camera=camera,
         height_m=height,
         radius_m=radius,
         overlap=overlap,
+        asks=resolution is not None,
+        max_speed_mps=max_speed,
         ceiling_m=height + 30.0 if ceiling is None else ceiling,
         homes=tuple(place_of("--home", text) for text in home or ()),
         town=town,

@@ -11,8 +11,8 @@ from shapely.geometry import Point, Polygon
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
-from uas_coverage_env.operations.cameras import load_camera
-from uas_coverage_env.operations.convex import polygons_of
+from uas_coverage_env.operations.cameras import Camera, named_camera
+from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.operations.drawing import Drawn
 from uas_coverage_env.operations.fleet import fleet_tables, parse_fleet
 from uas_coverage_env.operations.layout import MOST_WAYPOINTS, lay_waypoints
@@ -46,6 +46,8 @@ class ImportOptions:
         height_m: Of the waypoints above the ground [m].
         radius_m: Of a waypoint's sphere [m].
         overlap: Share of a cell that the next picture shows again [-].
+        asks: Whether waypoints ask for the camera; with a speed they do in any case.
+        max_speed_mps: At which a waypoint is covered, as the exposure allows; None: at any [m/s].
         ceiling_m: Top of the fence above the ground [m].
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
         town: GeoJSON of buildings.
@@ -56,6 +58,8 @@ class ImportOptions:
     height_m: float = 40.0
     radius_m: float = 6.0
     overlap: float = 0.1
+    asks: bool = False
+    max_speed_mps: float | None = None
     ceiling_m: float = 70.0
     homes: tuple[tuple[float, float], ...] = ()
     town: Path | None = None
@@ -89,7 +93,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     """
     _check(options)
     fleet = parse_fleet(options.fleet)
-    camera = load_camera(options.camera)
+    camera_name, camera = named_camera(options.camera)
     pitch_m = camera.pitch_m(options.height_m, options.radius_m, options.overlap)
     site = make_site(things, options.homes, options.ceiling_m)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
@@ -116,8 +120,11 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
             }
             for n, wall in enumerate(walls)
         ],
-        "uas": fleet_tables(fleet, site.homes_m, UAS_SAFE_DISTANCE_M),
-        "waypoints": waypoints,
+        "uas": [
+            uas | {"sensors": [_sensor(camera_name, camera)]}
+            for uas in fleet_tables(fleet, site.homes_m, UAS_SAFE_DISTANCE_M)
+        ],
+        "waypoints": [waypoint | _asked(camera_name, options) for waypoint in waypoints],
         "decorations": _decorations(site),
         "place": site.frame.place.model_dump(),
     }
@@ -130,10 +137,35 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         f"fence of {site.fence.area / 1e4:.1f} ha, {options.ceiling_m:g} m high; "
         f"{len(walls)} obstacles",
         *_town_notes(town),
+        *_raised_notes(waypoints, camera, options),
     ]
     if left_out_m2 >= 0.5:
         notes.append(f"left out: {left_out_m2:.0f} m² that are seen from no place a UAS may take")
     return Imported(scenario, tuple(notes), town.credit if town.buildings else "")
+
+
+def _sensor(name: str, camera: Camera) -> dict[str, Any]:
+    """The table of a camera on a UAS."""
+    return {"name": name, "field_of_view_deg": list(camera.field_of_view_deg())}
+
+
+def _asked(name: str, options: ImportOptions) -> dict[str, Any]:
+    """What waypoints ask for."""
+    if options.max_speed_mps is not None:
+        return {"sensor": name, "max_speed_mps": options.max_speed_mps}
+    return {"sensor": name} if options.asks else {}
+
+
+def _raised_notes(
+    waypoints: Sequence[dict[str, Any]], camera: Camera, options: ImportOptions
+) -> list[str]:
+    """What waypoints over roofs show less sharply."""
+    heights_m = [-waypoint["position_m"][2] for waypoint in waypoints]
+    raised = sum(height > options.height_m + 1e-3 for height in heights_m)
+    if not raised:
+        return []
+    worst_cm = 100.0 * camera.ground_sample_m(max(heights_m))
+    return [f"{raised} waypoints lie higher, over roofs: up to {worst_cm:.1f} cm per pixel there"]
 
 
 def _check(options: ImportOptions) -> None:
@@ -143,6 +175,8 @@ def _check(options: ImportOptions) -> None:
         "--overlap": (options.overlap, 0.0, 0.9),
         "--ceiling": (options.ceiling_m, options.height_m + options.radius_m, 2_000.0),
     }
+    if options.max_speed_mps is not None:
+        allowed["--max-speed"] = (options.max_speed_mps, 0.5, 100.0)
     for name, (value, least, most) in allowed.items():
         if not least <= value <= most:
             raise InputError(f"{name} {value:g}: should be between {least:g} and {most:g}")
@@ -209,7 +243,8 @@ def _decorations(site: Site) -> list[dict[str, Any]]:
         outline
         for _, area in site.areas
         for part in polygons_of(area)
-        for outline in polygons_of(part.simplify(_OUTLINE_DETAIL_M))
+        for whole in polygons_of(part.simplify(_OUTLINE_DETAIL_M))
+        for outline in without_holes(whole)
     ]
     return [
         {
