@@ -15,10 +15,18 @@ import pytest
 pytest.importorskip("shapely")
 pytest.importorskip("shapefile")
 import shapefile
+import shapely
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
+from uas_coverage_env.flight import load_planner, rollout, seen_ground
+from uas_coverage_env.operations import (
+    DrawnPolygon,
+    LocalFrame,
+    TakeOff,
+    load_camera,
+    read_drawings,
+)
 from uas_coverage_env.operations.drawing import MOST_CORNERS
 from uas_coverage_env.operations.town import GUESSED_OTHER_M, STOREY_M, height_m
 from uas_coverage_env.scenario import load_scenario, warnings
@@ -343,6 +351,44 @@ def test_circles_and_fences_of_a_plan_are_read(tmp_path):
     assert np.hypot(*middles.T).min() == pytest.approx(20.0, abs=0.01)
 
 
+def test_what_is_called_covered_has_been_seen_by_the_camera_at_the_resolution_asked_for():
+    hole = [[10.001, 50.0005], [10.0015, 50.0005], [10.0015, 50.001], [10.001, 50.0005]]
+    area = collection(feature(SQUARE, hole))
+    options = ("--resolution", "2", "--max-speed", "6", "--out", "sharp.toml")
+    assert main(["import", str(area), *HOME, *options]) == 0
+    scenario = load_scenario("sharp.toml")
+    (sensor,) = scenario.uas[0].sensors
+    assert sensor.name == "sony-a6000"
+    assert sensor.field_of_view_deg == pytest.approx((72.58, 51.98), abs=0.01)
+    for asking in scenario.waypoints:
+        assert (asking.sensor, asking.max_speed_mps) == ("sony-a6000", 6.0)
+        highest_m = asking.radius_m - asking.position_m[2]
+        assert 100.0 * load_camera(sensor.name).ground_sample_m(highest_m) <= 2.0
+    flight = rollout(scenario, load_planner("lawnmower"))
+    assert flight.covered[-1] == len(scenario.waypoints)
+    (ground,) = seen_ground(flight)
+    assert ground.share > 0.999
+
+
+def test_without_a_resolution_or_speed_any_planner_flies_what_is_imported():
+    scenario = imported("karhula")
+    assert all(waypoint.sensor is None for waypoint in scenario.waypoints)
+    assert all(uas.sensors[0].name == "sony-a6000" for uas in scenario.uas)
+
+
+def test_an_area_with_a_hole_is_drawn_as_areas_without():
+    hole = [[10.001, 50.0005], [10.0015, 50.0005], [10.0015, 50.001], [10.001, 50.001]]
+    scenario = imported(collection(feature(SQUARE, [*hole, hole[0]])), *HOME)
+    whole = imported(collection(feature(SQUARE)), *HOME)
+
+    def drawn_m2(of):
+        rings = [[corner[::-1] for corner in d.polygon_m] for d in of.decorations]
+        return sum(shapely.Polygon(ring).area for ring in rings)
+
+    share = (0.0005 * 0.0005) / (0.003 * 0.002)
+    assert drawn_m2(scenario) == pytest.approx((1.0 - share) * drawn_m2(whole), rel=1e-3)
+
+
 MISTAKES = {
     "no take-off place": ((), "no take-off place"),
     "a take-off place far away": (("--home", "10.0,50.0"), "swapped"),
@@ -354,6 +400,9 @@ MISTAKES = {
     "an unknown camera": ((*HOME, "--camera", "eye"), "unknown camera"),
     "too low": ((*HOME, "--height", "10"), "fly higher than"),
     "a ceiling below the waypoints": ((*HOME, "--ceiling", "30"), "--ceiling 30"),
+    "height and resolution": ((*HOME, "--height", "60", "--resolution", "2"), "leave out --height"),
+    "too sharp": ((*HOME, "--resolution", "0.2"), "--resolution 0.2: needs a height below"),
+    "no speed": ((*HOME, "--max-speed", "0"), "--max-speed 0"),
     "no height": ((*HOME, "--height", "nan"), "--height nan"),
     "no town": ((*HOME, "--town", "town.geojson"), "no such file"),
     "the town of another place": ((*HOME, "--town", "karhula"), "km from the area"),

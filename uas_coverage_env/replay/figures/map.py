@@ -94,14 +94,14 @@ def _terrain(axes: Axes, flight: Flight) -> None:
 def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
     """The ground that cameras have seen, under waypoints and paths; darker where several have."""
     for ground, tint in zip(seen, _SEEN_TINTS, strict=False):
-        half_m = 0.5 * float(ground.north_m[1] - ground.north_m[0])
-        sides = (ground.east_m[0], ground.east_m[-1], ground.north_m[0], ground.north_m[-1])
-        low_high = [side + (half_m if k % 2 else -half_m) for k, side in enumerate(sides)]
-        pixels = np.zeros((*ground.seen.shape, 4))
-        pixels[ground.seen] = (*shade(tint), _SEEN_ALPHA)
-        axes.imshow(
-            pixels, extent=tuple(low_high), origin="lower", interpolation="nearest", zorder=1
-        )
+        if ground.seen.any():
+            axes.contourf(
+                *(ground.east_m, ground.north_m, ground.seen.astype(float)),
+                levels=(0.5, 1.5),
+                colors=[shade(tint)],
+                alpha=_SEEN_ALPHA,
+                zorder=1,
+            )
 
 
 def _waypoints(axes: Axes, flight: Flight, now: int) -> None:
