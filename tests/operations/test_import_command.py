@@ -370,6 +370,20 @@ def test_what_is_called_covered_has_been_seen_by_the_camera_at_the_resolution_as
     assert ground.share > 0.999
 
 
+def test_areas_for_different_cameras_are_flown_by_those_who_carry_them():
+    part = [[10.001, 50.0005], [10.0015, 50.0005], [10.0015, 50.001], [10.001, 50.001]]
+    hot = feature([*part, part[0]], camera="h20t-thermal", weight=3)
+    area = collection(feature(SQUARE), hot)
+    fleet = ("--fleet", "s500_v2:1,hexacopter+h20t-thermal:1")
+    scenario = imported(area, *HOME, *fleet)
+    asked = [waypoint.sensor for waypoint in scenario.waypoints]
+    assert set(asked) == {"sony-a6000", "h20t-thermal"}
+    assert [uas.sensors[0].name for uas in scenario.uas] == ["sony-a6000", "h20t-thermal"]
+    flight = rollout(scenario, load_planner("nearest-waypoint"))
+    assert flight.covered[-1] == len(asked)
+    assert min(ground.share for ground in seen_ground(flight)) > 0.999
+
+
 def test_without_a_resolution_or_speed_any_planner_flies_what_is_imported():
     scenario = imported("karhula")
     assert all(waypoint.sensor is None for waypoint in scenario.waypoints)
@@ -397,6 +411,8 @@ MISTAKES = {
     "an unknown vehicle": ((*HOME, "--fleet", "kite:2"), "kite"),
     "a fleet of none": ((*HOME, "--fleet", "s500_v2:0"), "--fleet"),
     "too large a fleet": ((*HOME, "--fleet", "s500_v2:99"), "99 UAS"),
+    "a camera without a name": ((*HOME, "--fleet", "s500_v2+:1"), "VEHICLE+CAMERA:COUNT"),
+    "an unknown camera of a UAS": ((*HOME, "--fleet", "s500_v2+eye:1"), "unknown camera"),
     "an unknown camera": ((*HOME, "--camera", "eye"), "unknown camera"),
     "too low": ((*HOME, "--height", "10"), "fly higher than"),
     "a ceiling below the waypoints": ((*HOME, "--ceiling", "30"), "--ceiling 30"),
@@ -416,6 +432,15 @@ def test_a_mistake_in_an_option_is_refused_in_one_line(case, capsys):
     zone = [[10.0009, 50.0009], [10.0012, 50.0009], [10.0012, 50.0012], [10.0009, 50.0009]]
     path = collection(feature(SQUARE), feature(zone, name="no-fly zone"))
     assert said in refused(capsys, path, *arguments)
+
+
+def test_a_camera_that_nobody_carries_is_refused_with_what_to_do(capsys):
+    path = collection(feature(SQUARE, camera="mavic3e"))
+    assert "seen by 'mavic3e', which no UAS carries (they carry sony-a6000)" in refused(
+        capsys, path, *HOME
+    )
+    zone = collection(feature(SQUARE, role="no_fly", camera="mavic3e"))
+    assert "no area to be seen" in refused(capsys, zone, *HOME)
 
 
 def test_the_town_with_swapped_degrees_is_told(capsys):

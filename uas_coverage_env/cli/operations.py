@@ -49,7 +49,11 @@ def import_area(
         Path | None, typer.Option(help="Buildings of OpenStreetMap as .geojson; or `karhula`.")
     ] = None,
     fleet: Annotated[
-        str, typer.Option(metavar="VEHICLE:COUNT,...", help="Shipped vehicles or vehicle files.")
+        str,
+        typer.Option(
+            metavar="VEHICLE:COUNT,...",
+            help="Shipped vehicles or vehicle files; VEHICLE+CAMERA:COUNT for another camera.",
+        ),
     ] = "s500_v2:2",
     camera: Annotated[
         str, typer.Option(help="Name of a camera (see the docs), or a .toml file with one.")
@@ -78,7 +82,9 @@ def import_area(
     ] = 0.1,
     ceiling: Annotated[
         float | None,
-        typer.Option(help="Top of the fence, m; default: 30 m above --height.", show_default=False),
+        typer.Option(
+            help="Top of the fence, m; default: 30 m above the waypoints.", show_default=False
+        ),
     ] = None,
     home: Annotated[
         list[str] | None,
@@ -92,30 +98,22 @@ def import_area(
 ) -> None:
     """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
     with extra():
-        from uas_coverage_env.operations import (
-            ImportOptions,
-            load_camera,
-            make_scenario,
-            read_drawings,
-        )
+        from uas_coverage_env.operations import ImportOptions, make_scenario, read_drawings
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:
         raise InputError(f"{out}: exists; give another --out or add --overwrite")
     if resolution is not None and height is not None:
         raise InputError("--resolution says how high waypoints lie: leave out --height")
-    if resolution is not None:
-        height = load_camera(camera).height_m(resolution, radius)
-    height = _HEIGHT_M if height is None else height
     options = ImportOptions(
         fleet=fleet,
         camera=camera,
-        height_m=height,
+        height_m=_HEIGHT_M if height is None else height,
+        resolution_cm=resolution,
         radius_m=radius,
         overlap=overlap,
-        asks=resolution is not None,
         max_speed_mps=max_speed,
-        ceiling_m=height + 30.0 if ceiling is None else ceiling,
+        ceiling_m=ceiling,
         homes=tuple(place_of("--home", text) for text in home or ()),
         town=town,
     )

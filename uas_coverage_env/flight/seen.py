@@ -21,7 +21,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 SEARCH_AREA = "search_area"
-"""The kind of the decorations that are the ground to be seen, as `import` writes them."""
+"""The kind of the decorations that are the ground to be seen, as `import` writes them; with `_` and
+the name of a sensor, by that one."""
 
 _CELLS = 250_000
 _FINEST_M = 0.5
@@ -161,7 +162,8 @@ def _ground(scenario: Scenario, name: str) -> tuple[FloatArray, FloatArray, Bool
     cell_m = max(math.sqrt(float(np.prod(high - low)) / _CELLS), _FINEST_M)
     north_m, east_m = (np.arange(low[k] + 0.5 * cell_m, high[k], cell_m) for k in range(2))
     asked = np.zeros((len(north_m), len(east_m)), np.bool_)
-    areas = [np.array(d.polygon_m) for d in scenario.decorations if d.kind == SEARCH_AREA]
+    kinds = (SEARCH_AREA, f"{SEARCH_AREA}_{name}")
+    areas = [np.array(d.polygon_m) for d in scenario.decorations if d.kind in kinds]
     for area in areas:
         asked |= _inside(area, north_m, east_m)
     asking = [w for w in scenario.waypoints if w.sensor == name] or scenario.waypoints
