@@ -186,13 +186,14 @@ def _compare_smallest(summary: dict[str, Any], smallest: dict[str, float], repor
 
 
 def _judge_coverage(record: FlightRecord, report: Report) -> None:
-    """Covered counts from the first sample at which a flying UAS is within the radius."""
+    """Covered counts from the first sample at which a flying UAS is within the radius, as asked."""
     first = np.full(len(record.scenario["waypoints"]), np.inf)
     for track in record.tracks:
         flying = track.position_m[: track.steps if track.end == "lost" else None]
         for w, waypoint in enumerate(record.scenario["waypoints"]):
             away = np.linalg.norm(flying - np.array(waypoint["position_m"], float), axis=1)
-            reached = np.flatnonzero(away <= waypoint["radius_m"] + _ROUNDING)
+            near = away <= waypoint["radius_m"] + _ROUNDING
+            reached = np.flatnonzero(near & _as_asked(record, track, waypoint)[: len(near)])
             if len(reached):
                 first[w] = min(first[w], reached[0])
     report.coverage = float(np.isfinite(first).mean())
@@ -205,6 +206,19 @@ def _judge_coverage(record: FlightRecord, report: Report) -> None:
                 f"{track.name}: {counted[step]} waypoints are covered at {step * record.dt_s:g} s, "
                 f"its row says {track.columns['covered'][step]:g}"
             )
+
+
+def _as_asked(record: FlightRecord, track: Track, waypoint: dict[str, Any]) -> NDArray[np.bool_]:
+    """Where a UAS has the sensor, the height and the speed that a waypoint asks for."""
+    own = next(uas for uas in record.scenario["uas"] if uas["name"] == track.name)
+    carried = {sensor["name"] for sensor in own.get("sensors", ())}
+    wanted = waypoint.get("sensor")
+    lowest, highest = waypoint.get("heights_m", (-np.inf, np.inf))
+    speed = np.linalg.norm([track.columns[f"v{axis}_mps"] for axis in "xyz"], axis=0)
+    height = -track.position_m[:, 2]
+    fits = (height >= lowest - _ROUNDING) & (height <= highest + _ROUNDING)
+    fits &= speed <= waypoint.get("max_speed_mps", np.inf) + _ROUNDING
+    return fits & (wanted is None or wanted in carried)
 
 
 def _judge_tracks(record: FlightRecord, report: Report) -> None:

@@ -191,6 +191,7 @@ def scenario_fields() -> str:
             title = f"`[[{name}]]`" if "items" in entry else f"`[{name}]`"
             tables.append((title, schema["$defs"][reference]))
     nested = {
+        "`[[uas.sensors]]`": "Sensor",
         "`[[moving_obstacles.schedule]]`": "ScheduledVelocity",
         "`[[wind.gusts]]`": "Gust",
         "`[wind.random_gusts]`": "RandomGusts",

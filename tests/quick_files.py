@@ -92,6 +92,7 @@ QUICK = {
     "replay/test_replay_page.py": "",
     "replay/test_viewer_bundle.py": "",
     "scenario/test_event_tables.py": "",
+    "scenario/test_payload.py": "",
     "scenario/test_families.py": "but test_nearest_waypoint_covers_a_draw_and_comes_home",
     "scenario/test_flood_village.py": "",
     "scenario/test_scenario_checks.py": "",
@@ -113,6 +114,7 @@ QUICK = {
     "world/test_commands.py": "",
     "world/test_contacts.py": "",
     "world/test_coverage_and_landing.py": "",
+    "world/test_what_waypoints_ask.py": "",
 }
 
 

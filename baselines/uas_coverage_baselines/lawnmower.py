@@ -29,7 +29,16 @@ class Lawnmower:
         """Order the waypoints and cut the order into runs of about equal time."""
         self._targets = Targets(brief)
         waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
-        self._runs = plan_runs(brief, back_and_forth(waypoints_m))
+        self._runs: list[list[int]] = [[] for _ in brief.uas]
+        kinds = np.unique(brief.can_cover, axis=1)
+        for who in kinds.T:
+            # waypoints that the same UAS can cover, cut among these
+            what = np.flatnonzero((brief.can_cover == who[:, None]).all(axis=0))
+            order = what[back_and_forth(waypoints_m[what])].tolist()
+            team = np.flatnonzero(who).tolist()
+            if team:
+                for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
+                    self._runs[u] += run
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly each run in order; a UAS that has finished helps with the nearest waypoints."""
@@ -38,6 +47,18 @@ class Lawnmower:
     def _next(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         own = [waypoint for waypoint in self._runs[uas] if candidates[waypoint]]
         return own[0] if own else self._targets.nearest(swarm, uas, candidates)
+
+
+def _brief_of(brief: MissionBrief, team: Sequence[int]) -> MissionBrief:
+    """The mission of some of its UAS."""
+    if len(team) == len(brief.uas):
+        return brief
+    fleet = {
+        "uas": tuple(brief.uas[u] for u in team),
+        "vehicles": tuple(brief.vehicles[u] for u in team),
+    }
+    known = {name: getattr(brief, name) for name in type(brief).model_fields}
+    return MissionBrief.model_construct(**known | fleet)
 
 
 def back_and_forth(waypoints_m: NDArray[np.float64]) -> list[int]:

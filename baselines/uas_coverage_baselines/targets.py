@@ -21,37 +21,39 @@ class Targets:
         self._view = WorldView(brief)
         self._attempts, self._approach = Attempts(brief), Approach(brief)
         self._handover = Handover(brief)
+        self._can_cover = brief.can_cover
         self._target: dict[str, int] = {}
 
     def commands(
         self, swarm: SwarmState, choose: Callable[[SwarmState, int, NDArray[np.bool_]], int]
     ) -> Mapping[str, Command]:
-        """A command for each active UAS: to its target, or home when everything is covered.
+        """A command for each active UAS: to its target, or home when it has nothing to cover.
 
         Args:
             swarm: What the planner sees.
-            choose: (swarm, index of the UAS, (W,) candidates) -> one of the candidates.
+            choose: (swarm, index of the UAS, (W,) candidates, which it can cover) -> one of them.
         """
         works = self._handover.workers(swarm)
-        wanted = self._attempts.wanted(swarm.uncovered)
-        if not wanted.any():
+        if not self._attempts.wanted(swarm.uncovered).any():
             return {name: GoTo(None) for name in swarm.active}
         self._view.update(swarm)
         blocked = self._view.blocked()
-        free = wanted & ~blocked
-        reached = [swarm.names[u] for u in np.flatnonzero(works)]
+        wanted = {
+            swarm.names[u]: self._attempts.wanted_of(swarm.uncovered, self._can_cover[u])
+            for u in np.flatnonzero(works)
+        }
         self._target = {
             name: target
             for name, target in self._target.items()
-            if name in reached and free[target]
+            if name in wanted and wanted[name][target] and not blocked[target]
         }
-        for name in reached:
-            if name not in self._target:
-                candidates = self._candidates(wanted, free)
+        for name, mine in wanted.items():
+            if name not in self._target and mine.any():
+                candidates = self._candidates(mine, mine & ~blocked)
                 self._target[name] = choose(swarm, swarm.names.index(name), candidates)
         self._attempts.update(swarm, self._target, blocked)
         commands = {name: GoTo(None) for name in swarm.active}
-        return commands | {name: self._command(swarm, name) for name in reached}
+        return commands | {name: self._command(swarm, name) for name in self._target}
 
     def nearest(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         """The candidate nearest to a UAS."""

@@ -6,6 +6,7 @@ from uas_coverage_env.scenario import (
     Obstacle,
     Scenario,
     ScheduledVelocity,
+    Sensor,
     Uas,
     Waypoint,
 )
@@ -76,3 +77,15 @@ def practice_ground(
         uas=fleet,
         waypoints=points,
     )
+
+
+def with_roles(scenario: Scenario) -> Scenario:
+    """The same, every second waypoint for what the last UAS carries, low and slow."""
+    fleet = list(scenario.uas)
+    fleet[-1] = fleet[-1].model_copy(update={"sensors": (Sensor(name="thermal"),)})
+    asked = {"sensor": "thermal", "heights_m": (5.0, 15.0), "max_speed_mps": 4.0}
+    waypoints = [
+        waypoint.model_copy(update=asked if w % 2 == 0 else {})
+        for w, waypoint in enumerate(scenario.waypoints)
+    ]
+    return scenario.model_copy(update={"uas": tuple(fleet), "waypoints": tuple(waypoints)})

@@ -6,7 +6,7 @@ Run as a program, with NUMBA_ENABLE_CUDASIM=1.
 import json
 
 import numpy as np
-from practice_grounds import practice_ground
+from practice_grounds import practice_ground, with_roles
 
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
@@ -73,6 +73,6 @@ def limits_exceeded():
 if __name__ == "__main__":
     still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
-    high = still.model_copy(update={"min_height_m": 6.0})
+    high = with_roles(still.model_copy(update={"min_height_m": 6.0}))
     flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}
     print(json.dumps(flown))

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from practice_grounds import practice_ground
+from practice_grounds import practice_ground, with_roles
 
 from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
 from uas_coverage_env.env.batch_kernel import ABSENT, drawn
@@ -20,9 +20,11 @@ MIXED = (
     practice_ground(n_uas=3, tower=True, n_moving=2, max_steps=25),
     practice_ground(n_uas=1, n_moving=0, max_steps=18),
     generate_scenario(1_000_000, n_uas=2, n_waypoints=12, n_obstacles=4),
-    practice_ground(
-        n_uas=2, weights=(1.0, 2.0, 0.5), n_moving=1, vehicles=("hexacopter",)
-    ).model_copy(update={"min_height_m": 8.0, "from_ground": True}),
+    with_roles(
+        practice_ground(
+            n_uas=2, weights=(1.0, 2.0, 0.5), n_moving=1, vehicles=("hexacopter",)
+        ).model_copy(update={"min_height_m": 8.0, "from_ground": True})
+    ),
 )
 
 

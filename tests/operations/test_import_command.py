@@ -15,48 +15,21 @@ import pytest
 pytest.importorskip("shapely")
 pytest.importorskip("shapefile")
 import shapefile
+from drawings import HOME, SQUARE, collection, feature, imported, refused
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
 from uas_coverage_env.operations.drawing import MOST_CORNERS
 from uas_coverage_env.operations.town import GUESSED_OTHER_M, STOREY_M, height_m
-from uas_coverage_env.scenario import load_scenario, warnings
+from uas_coverage_env.scenario import warnings
 
 EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
-HIGH = ("--height", "60")  # few waypoints
-SQUARE = [[10.0, 50.0], [10.003, 50.0], [10.003, 50.002], [10.0, 50.002], [10.0, 50.0]]
-HOME = ("--home", "50.0005,10.0005")
 
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-
-def imported(*arguments):
-    """The scenario that a command writes."""
-    assert main(["import", *map(str, arguments), *HIGH, "--out", "out.toml", "--overwrite"]) == 0
-    return load_scenario("out.toml")
-
-
-def refused(capsys, *arguments):
-    assert main(["import", *map(str, arguments), "--out", "no.toml"]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert not Path("no.toml").exists()
-    return err
-
-
-def collection(*features):
-    text = json.dumps({"type": "FeatureCollection", "features": list(features)})
-    Path("area.geojson").write_text(text)
-    return Path("area.geojson")
-
-
-def feature(ring, *holes, **properties):
-    geometry = {"type": "Polygon", "coordinates": [ring, *holes]}
-    return {"type": "Feature", "properties": properties, "geometry": geometry}
 
 
 def point(longitude, latitude):
@@ -351,9 +324,14 @@ MISTAKES = {
     "an unknown vehicle": ((*HOME, "--fleet", "kite:2"), "kite"),
     "a fleet of none": ((*HOME, "--fleet", "s500_v2:0"), "--fleet"),
     "too large a fleet": ((*HOME, "--fleet", "s500_v2:99"), "99 UAS"),
+    "a camera without a name": ((*HOME, "--fleet", "s500_v2+:1"), "VEHICLE+CAMERA:COUNT"),
+    "an unknown camera of a UAS": ((*HOME, "--fleet", "s500_v2+eye:1"), "unknown camera"),
     "an unknown camera": ((*HOME, "--camera", "eye"), "unknown camera"),
     "too low": ((*HOME, "--height", "10"), "fly higher than"),
     "a ceiling below the waypoints": ((*HOME, "--ceiling", "30"), "--ceiling 30"),
+    "height and resolution": ((*HOME, "--height", "60", "--resolution", "2"), "leave out --height"),
+    "too sharp": ((*HOME, "--resolution", "0.2"), "--resolution 0.2: needs a height below"),
+    "no speed": ((*HOME, "--max-speed", "0"), "--max-speed 0"),
     "no height": ((*HOME, "--height", "nan"), "--height nan"),
     "no town": ((*HOME, "--town", "town.geojson"), "no such file"),
     "the town of another place": ((*HOME, "--town", "karhula"), "km from the area"),

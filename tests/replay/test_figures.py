@@ -21,6 +21,7 @@ from uas_coverage_env.replay.figures import (
     training_figure,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
+from uas_coverage_env.scenario import Sensor
 
 
 def lines(axes) -> list[np.ndarray]:
@@ -61,6 +62,18 @@ def test_the_map_shows_what_was_flown_and_predicted_until_a_step(flight):
 def test_the_map_shows_the_last_sample_by_default(flight):
     (axes,) = map_figure(flight).axes
     assert f"{flight.time_s[-1]:g} s" in axes.get_title()
+
+
+def test_the_map_shows_the_ground_that_a_camera_has_seen(flight):
+    assert "seen by" not in str([text.get_text() for text in map_figure(flight).legends[0].texts])
+    camera = Sensor(name="camera", field_of_view_deg=(60.0, 45.0))
+    fleet = tuple(
+        uas.model_copy(update={"sensors": (camera,)} if i == 0 else {})
+        for i, uas in enumerate(flight.scenario.uas)
+    )
+    seen = dataclasses.replace(flight, scenario=flight.scenario.model_copy(update={"uas": fleet}))
+    texts = [text.get_text() for text in map_figure(seen).legends[0].texts]
+    assert any(text.startswith("seen by camera, ") for text in texts)
 
 
 def test_a_step_that_was_not_flown_is_refused(flight):

@@ -33,7 +33,7 @@ def mistake_in(tmp_path, text):
 
 
 def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
-    assert scenario_names() == ("corridor", "gasche2025", "open_field", "village")
+    assert scenario_names() == ("corridor", "gasche2025", "mixed_fleet", "open_field", "village")
     for name in scenario_names():
         scenario = load_scenario(name)
         assert scenario.name == name

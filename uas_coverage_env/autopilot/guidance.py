@@ -47,6 +47,16 @@ def path_length_home_m(arena, i, x):
 
 
 @inlined_kernel
+def comes_to_rest(arena, state, target):
+    """Whether guidance stops at a target, as it does at home, and does not fly by.
+
+    At what is covered there is nothing to fly by for; and at rest in its centre a waypoint that
+    asks for heights or a speed is covered for sure.
+    """
+    return target < 0 or not state.uncovered[target] or arena.waypoints[target].asks
+
+
+@inlined_kernel
 def passes_over(obstacle, over, ends, leg, highest_m):
     """Whether a leg that crosses an obstacle has to pass over it; `over`, `ends`: see `crossing`.
 
@@ -225,7 +235,7 @@ def steer(arena, state, nonlinear, outcome):
         outcome[i].returning = command.returning
         if command.kind == GO_TO:
             target = int(command.values[0])
-            stop = target < 0 or not state.uncovered[target]
+            stop = comes_to_rest(arena, state, target)
             guide(
                 arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command,
                 state.belief[i],

@@ -5,6 +5,7 @@ from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.vehicle.range import RETURN_MODE, Speeds, flight_seconds
+from uas_coverage_env.world.coverage import can_cover
 from uas_coverage_env.world.state import CONSUMPTION, FLYING
 
 _CLOCK_RESERVE_S = 30.0
@@ -52,10 +53,17 @@ def seconds_to_keep(arena, i, x, left_s, belief=None):
 
 @kernel
 def has_to_return(arena, state, i):
-    """Whether UAS i has to fly home now: nothing is left to do, or battery or clock demand it."""
+    """Whether UAS i has to fly home now: nothing is left to do, or battery or clock demand it.
+
+    What other UAS alone can cover is nothing left to do.
+    """
     left = 0
     for w in range(state.uncovered.shape[0]):
         left += state.uncovered[w]
+    if arena.rules[0].asks:
+        left = 0
+        for w in range(state.uncovered.shape[0]):
+            left += state.uncovered[w] and can_cover(arena, i, w)
     if left == 0:
         return True
     x = state.x[i]

@@ -35,6 +35,7 @@ def figures(flight: Flight) -> dict[str, str]:
     result = summary(flight)
     times = result["decision_time_s"]
     reasons = ", ".join(f"{n} {reason}" for reason, n in fallback_reasons(flight).items())
+    seen: dict[str, float] = result.get("seen_ground", {})
     rows = {
         "scenario": flight.scenario.name,
         "planner": flight.planner,
@@ -43,6 +44,7 @@ def figures(flight: Flight) -> dict[str, str]:
         "accomplished": "yes" if accomplished(flight) else "no",
         "ended": _ENDED[flight.ended] or "complete",
         "covered": f"{result['coverage']:.0%}",
+        "ground seen": ", ".join(f"{name} {share:.1%}" for name, share in seen.items()) or NONE,
         "all home": "yes" if result["all_home"] else f"not {', '.join(_not_home(flight))}",
         "steps": str(flight.steps),
         "energy, Wh": f"{result['energy_Wh']:.2f}",

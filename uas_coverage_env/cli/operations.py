@@ -17,6 +17,7 @@ from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import Place, warnings
 
+_HEIGHT_M = 40.0
 _LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink"}
 
 
@@ -48,19 +49,42 @@ def import_area(
         Path | None, typer.Option(help="Buildings of OpenStreetMap as .geojson; or `karhula`.")
     ] = None,
     fleet: Annotated[
-        str, typer.Option(metavar="VEHICLE:COUNT,...", help="Shipped vehicles or vehicle files.")
+        str,
+        typer.Option(
+            metavar="VEHICLE:COUNT,...",
+            help="Shipped vehicles or vehicle files; VEHICLE+CAMERA:COUNT for another camera.",
+        ),
     ] = "s500_v2:2",
     camera: Annotated[
         str, typer.Option(help="Name of a camera (see the docs), or a .toml file with one.")
     ] = "sony-a6000",
-    height: Annotated[float, typer.Option(help="Of the waypoints above the ground, m.")] = 40.0,
+    height: Annotated[
+        float | None,
+        typer.Option(help="Of the waypoints above the ground, m; default: 40.", show_default=False),
+    ] = None,
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            help="Instead of --height: the most that a pixel may show, cm; waypoints then ask "
+            "for the camera."
+        ),
+    ] = None,
+    max_speed: Annotated[
+        float | None,
+        typer.Option(
+            help="At which a waypoint is covered, as the exposure allows, m/s; waypoints then "
+            "ask for the camera."
+        ),
+    ] = None,
     radius: Annotated[float, typer.Option(help="Of a waypoint's sphere, m.")] = 6.0,
     overlap: Annotated[
         float, typer.Option(help="Share of a picture that the next one shows again.")
     ] = 0.1,
     ceiling: Annotated[
         float | None,
-        typer.Option(help="Top of the fence, m; default: 30 m above --height.", show_default=False),
+        typer.Option(
+            help="Top of the fence, m; default: 30 m above the waypoints.", show_default=False
+        ),
     ] = None,
     home: Annotated[
         list[str] | None,
@@ -79,13 +103,17 @@ def import_area(
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:
         raise InputError(f"{out}: exists; give another --out or add --overwrite")
+    if resolution is not None and height is not None:
+        raise InputError("--resolution says how high waypoints lie: leave out --height")
     options = ImportOptions(
         fleet=fleet,
         camera=camera,
-        height_m=height,
+        height_m=_HEIGHT_M if height is None else height,
+        resolution_cm=resolution,
         radius_m=radius,
         overlap=overlap,
-        ceiling_m=height + 30.0 if ceiling is None else ceiling,
+        max_speed_mps=max_speed,
+        ceiling_m=ceiling,
         homes=tuple(place_of("--home", text) for text in home or ()),
         town=town,
     )

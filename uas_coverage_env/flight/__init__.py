@@ -36,6 +36,7 @@ from uas_coverage_env.flight.registry import (
 )
 from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.flight.rollout import Progress, rollout
+from uas_coverage_env.flight.seen import SeenGround, footprints_m, seen_ground
 from uas_coverage_env.flight.sorties import fly_sorties, sorties_summary
 
 __all__ = [
@@ -55,6 +56,7 @@ __all__ = [
     "PlannerOptions",
     "Policy",
     "Progress",
+    "SeenGround",
     "Violation",
     "accomplished",
     "as_planner",
@@ -72,12 +74,14 @@ __all__ = [
     "flight_picture",
     "flight_pictures",
     "fly_sorties",
+    "footprints_m",
     "home",
     "load_planner",
     "planner_names",
     "rest_of",
     "reward_sums",
     "rollout",
+    "seen_ground",
     "sorties_summary",
     "summary",
 ]

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, EventRecord, FlightRecord, Violation
+from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH
+from uas_coverage_env.world.coverage import covering_samples
 
 _J_PER_WH = 3600.0
 
@@ -33,12 +35,10 @@ def open_waypoints(flight: FlightRecord) -> int:
 
 def covered_at(flight: FlightRecord) -> NDArray[np.int64]:
     """(W,) the sample in which each waypoint was covered; T (one past the last) where never."""
-    positions_m = flight.x[:, :, 0:3]
     alive = flight.mode < LOST
-    result = np.full(len(flight.scenario.waypoints), len(positions_m))
-    for w, waypoint in enumerate(flight.scenario.waypoints):
-        away_m = np.linalg.norm(positions_m - np.array(waypoint.position_m), axis=2)
-        within = ((away_m <= waypoint.radius_m) & alive).any(axis=1)
+    result = np.full(len(flight.scenario.waypoints), len(flight.x))
+    for w in range(len(result)):
+        within = (covering_samples(flight.scenario, w, flight.x) & alive).any(axis=1)
         if within.any():
             result[w] = within.argmax()
     return result
@@ -138,6 +138,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
     """The fields of `summary.json`, in their order."""
     return {
         "coverage": coverage(flight),
+        # without cameras the file is as it was before there were any
+        **({"seen_ground": shares} if (shares := seen_shares(flight)) else {}),
         "steps": flight.steps,
         "energy_Wh": float(energy_Wh(flight).sum()),
         **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),

@@ -9,6 +9,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord
 from uas_coverage_env.scenario import MovingObstacle, NoFlyZone, Scenario
+from uas_coverage_env.world.coverage import covering_samples
 
 _LONGEST_NAME = 64
 
@@ -110,8 +111,8 @@ def _scene(flight: FlightRecord) -> tuple[Scenario, NDArray[np.bool_]]:
     centres_m = np.array([waypoint.position_m for waypoint in known.waypoints])
     open_ = np.array(
         [
-            w not in dropped and not _covered(flight, centre_m, waypoint.radius_m, since[w])
-            for w, (waypoint, centre_m) in enumerate(zip(known.waypoints, centres_m, strict=True))
+            w not in dropped and not _covered(flight, known, w, since[w])
+            for w in range(len(known.waypoints))
         ]
     )
     for obstacle, hull in zip(known.obstacles, known.hulls, strict=True):
@@ -120,8 +121,6 @@ def _scene(flight: FlightRecord) -> tuple[Scenario, NDArray[np.bool_]]:
     return known, open_
 
 
-def _covered(
-    flight: FlightRecord, centre_m: NDArray[np.float64], radius_m: float, since: int
-) -> bool:
-    away_m = np.linalg.norm(flight.x[since:, :, :3] - centre_m, axis=2)
-    return bool(((away_m <= radius_m) & (flight.mode[since:] < LOST)).any())
+def _covered(flight: FlightRecord, known: Scenario, w: int, since: int) -> bool:
+    covers = covering_samples(known, w, flight.x[since:])
+    return bool((covers & (flight.mode[since:] < LOST)).any())

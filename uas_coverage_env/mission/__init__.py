@@ -7,6 +7,7 @@ from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
+from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.mission.views import WorldView, first_sight
 from uas_coverage_env.mission.ways import Way, Ways
 
@@ -25,6 +26,7 @@ __all__ = [
     "carefully",
     "find_blocked",
     "first_sight",
+    "refuse_what_asks",
     "seconds_home",
     "with_free_aims",
     "without",

@@ -39,6 +39,7 @@ def free_aims_m(brief: MissionBrief) -> FloatArray:
 def _free_aim_m(brief: MissionBrief, waypoint: int) -> FloatArray:
     centre_m = np.array(brief.waypoints[waypoint].position_m, float)
     most_m = _WITHIN * brief.waypoints[waypoint].radius_m
+    heights_m = brief.waypoints[waypoint].heights_m
     uas_m = max(uas.radius_m for uas in brief.uas)
     fence_m = brief.geofence.margin_m + _SPARE_M
     aim_m = centre_m.copy()
@@ -46,6 +47,8 @@ def _free_aim_m(brief: MissionBrief, waypoint: int) -> FloatArray:
         before_m = aim_m.copy()
         if brief.min_height_m:
             aim_m[2] = min(aim_m[2], -brief.min_height_m - _SPARE_M)
+        if heights_m is not None:
+            aim_m[2] = min(max(aim_m[2], -heights_m[1]), -heights_m[0])
         for obstacle, hull in zip(brief.obstacles, brief.kept_hulls, strict=True):
             away_m = hull.face_distances(aim_m)
             face = int(away_m.argmax())

@@ -95,6 +95,16 @@ class Attempts:
             self._later = self._failed >= _GIVEN_UP_FOR_GOOD
         return uncovered & ~self._later
 
+    def wanted_of(self, uncovered: BoolArray, mine: BoolArray) -> BoolArray:
+        """(W,) the same of a UAS that can cover some of them only.
+
+        Args:
+            uncovered: (W,) the open ones.
+            mine: (W,) those that it can cover.
+        """
+        now = uncovered & mine & ~self._later
+        return now if now.any() else uncovered & mine & (self._failed < _GIVEN_UP_FOR_GOOD)
+
     def _fail(self, uas: int, target: int) -> None:
         self._nearest_s[:, target] = math.inf
         self._waited_s[:, target] = 0.0

@@ -5,6 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import (
@@ -18,6 +21,7 @@ from uas_coverage_env.scenario import (
     Uas,
     Waypoint,
 )
+from uas_coverage_env.scenario.payload import who_covers
 from uas_coverage_env.vehicle import VehicleParams
 
 
@@ -118,6 +122,11 @@ class MissionBrief(StrictModel):
     def hulls(self) -> tuple[ConvexPolytope, ...]:
         """One hull per fixed obstacle, in their order."""
         return tuple(obstacle.hull for obstacle in self.obstacles)
+
+    @cached_property
+    def can_cover(self) -> NDArray[np.bool_]:
+        """(U, W) whether each UAS carries the sensor that each waypoint asks for."""
+        return who_covers(self.uas, self.waypoints)
 
     @property
     def kept_hulls(self) -> tuple[ConvexPolytope, ...]:

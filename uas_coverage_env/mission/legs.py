@@ -37,8 +37,10 @@ _OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi 
 class Legs:
     """The leg times of a mission; what does not change during a mission is computed once.
 
+    To a waypoint that a UAS cannot cover there is no leg: it takes for ever, inf.
+
     Attributes:
-        between_s: (V, W, W) between waypoints, for each kind of vehicle.
+        between_s: (V, W, W) between waypoints, for each kind of vehicle, and of what it carries.
         waypoints_m: (W, 3).
         starts_m: (U, 3).
         home_s: (U, W) from a waypoint to each UAS's start.
@@ -53,9 +55,12 @@ class Legs:
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self._credit_m = np.array([0.5 * w.radius_m for w in brief.waypoints])
         self._arena = build_arena(brief.as_scenario())
-        kinds = list(dict.fromkeys(brief.vehicles))
-        self.kind = np.array([kinds.index(vehicle) for vehicle in brief.vehicles])
-        self._speeds = [speeds_of(vehicle) for vehicle in kinds]
+        self._can_cover = brief.can_cover
+        carried = map(tuple, self._can_cover.tolist())
+        of_each = list(zip(brief.vehicles, carried, strict=True))
+        kinds = list(dict.fromkeys(of_each))
+        self.kind = np.array([kinds.index(one) for one in of_each])
+        self._speeds = [speeds_of(vehicle) for vehicle, _ in kinds]
         limits = [vehicle.limits for vehicle in brief.vehicles]
         gravity = [vehicle.airframe.gravity_mps2 for vehicle in brief.vehicles]
         self.speed_mps = np.array([limit.v_xy_max_mps for limit in limits])
@@ -68,7 +73,13 @@ class Legs:
         nearest = min(_NEIGHBOURS, n - 1)
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]
         self.neighbours = _without_self(np.reshape(found, (n, nearest + 1)))
-        self.between_s = np.array([self._between(speeds) for speeds in self._speeds])
+        between_s = {speeds: self._between(speeds) for speeds in dict.fromkeys(self._speeds)}
+        self.between_s = np.array(
+            [
+                np.where(covers, between_s[speeds], np.inf)
+                for speeds, (_, covers) in zip(self._speeds, kinds, strict=True)
+            ]
+        )
         self.starts_m = np.array([uas.start_m for uas in brief.uas], float)
         self.home_s = np.array(
             [self._towards_home(u, start) for u, start in enumerate(self.starts_m)]
@@ -89,7 +100,7 @@ class Legs:
             speeds,
             _OCTAGON,
         )
-        return result
+        return np.where(self._can_cover[uas], result, np.inf)
 
     def way_home_s(self, uas: int, position_m: FloatArray) -> float:
         """Leg time from a position of a UAS to its start."""

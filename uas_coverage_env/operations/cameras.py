@@ -1,5 +1,6 @@
 """Cameras: what they show of the ground, and how far apart pictures may be."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -36,6 +37,38 @@ class Camera(StrictModel):
     def ground_sample_m(self, height_m: float) -> float:
         """Size of a pixel on the ground [m]."""
         return self.footprint_m(height_m)[0] / self.picture_px[0]
+
+    def field_of_view_deg(self) -> tuple[float, float]:
+        """Opening angles of a picture, across its width and its height [degrees]."""
+        width_mm, height_mm = self.sensor_mm
+        across, along = (
+            round(math.degrees(2.0 * math.atan(0.5 * side / self.focal_mm)), 3)
+            for side in (width_mm, height_mm)
+        )
+        return across, along
+
+    def height_m(self, resolution_cm: float, radius_m: float) -> float:
+        """Height of waypoints from anywhere in whose spheres a pixel shows so little ground [m].
+
+        Args:
+            resolution_cm: The most that a pixel may show [cm].
+            radius_m: Of the spheres [m].
+
+        Raises:
+            InputError: There is no such height.
+        """
+        if not 0.01 <= resolution_cm <= 1_000.0:
+            raise InputError(f"--resolution {resolution_cm:g}: should be between 0.01 and 1000 cm")
+        highest_m = 0.01 * resolution_cm / self.ground_sample_m(1.0)
+        height_m = math.floor(10.0 * (highest_m - radius_m)) / 10.0
+        if height_m <= radius_m:
+            least_cm = 100.0 * self.ground_sample_m(2.0 * radius_m + 0.1)
+            raise InputError(
+                f"--resolution {resolution_cm:g}: needs a height below {highest_m:.1f} m, too low "
+                f"for a sphere of {radius_m:g} m; take {least_cm:.2f} or more, or a smaller "
+                f"--radius"
+            )
+        return height_m
 
     def pitch_m(self, height_m: float, radius_m: float, overlap: float) -> tuple[float, float]:
         """How far apart waypoints may be so that all between them is seen; (east, north) [m].
@@ -78,14 +111,19 @@ def load_camera(name_or_path: str) -> Camera:
     Raises:
         InputError: There is no such camera, or its file is wrong.
     """
+    return named_camera(name_or_path)[1]
+
+
+def named_camera(name_or_path: str) -> tuple[str, Camera]:
+    """The same and its name; see `load_camera`."""
     shipped = read_toml(_SHIPPED, _Cameras).root
     if name_or_path in shipped:
-        return shipped[name_or_path]
+        return name_or_path, shipped[name_or_path]
     if not name_or_path.endswith(".toml"):
         take = f"take {', '.join(shipped)} or the path of a .toml file"
         instead = did_you_mean(name_or_path, shipped, take)
         raise InputError(f"unknown camera {name_or_path[:80]!r}; {instead}")
-    own = list(read_toml(name_or_path, _Cameras).root.values())
+    own = list(read_toml(name_or_path, _Cameras).root.items())
     if len(own) != 1:
         raise InputError(f"{name_or_path}: has {len(own)} cameras; keep one table [NAME]")
     return own[0]

@@ -18,6 +18,17 @@ def polygons_of(shape: BaseGeometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
 
 
+def without_holes(polygon: Polygon) -> list[Polygon]:
+    """Polygons that have no holes and are together the given one; it, where it has none."""
+    if not polygon.interiors:
+        return [polygon]
+    west, south, east, north = polygon.bounds
+    cut = Polygon(polygon.interiors[0]).centroid.x
+    halves = (shapely.box(west, south, cut, north), shapely.box(cut, south, east, north))
+    parts = [part for half in halves for part in polygons_of(polygon.intersection(half))]
+    return [piece for part in parts for piece in without_holes(part)]
+
+
 def hull_of(shape: BaseGeometry) -> Polygon:
     """The convex hull of something that has an area."""
     hull = shape.convex_hull

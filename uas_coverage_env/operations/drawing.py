@@ -38,6 +38,7 @@ class DrawnPolygon:
         weight: Of the waypoints in it [-].
         outer: (N, 2) latitude and longitude of the corners [degrees].
         holes: The same of each hole.
+        camera: Name of the one that is to see it; None: the usual one.
     """
 
     source: str
@@ -46,6 +47,7 @@ class DrawnPolygon:
     weight: float
     outer: NDArray[np.float64]
     holes: tuple[NDArray[np.float64], ...] = ()
+    camera: str | None = None
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def polygon(
     Args:
         source: The file.
         rings: Outer ring and holes, each a list of (longitude, latitude, ...).
-        attributes: `name`, `role` and `weight`, where the file has them.
+        attributes: `name`, `role`, `weight` and `camera`, where the file has them.
         fallback_name: Where it has no name.
 
     Raises:
@@ -88,9 +90,11 @@ def polygon(
     if role == "home":
         raise InputError(f"{source} is a take-off place but drawn as a polygon; draw a point")
     outer, *holes = (_ring(source, ring) for ring in rings)
-    return DrawnPolygon(
-        source, name, role, _weight(source, attributes.get("weight")), outer, tuple(holes)
-    )
+    weight, camera = _weight(source, attributes.get("weight")), attributes.get("camera")
+    camera = str(camera).strip()[:80] or None if camera is not None else None
+    if camera and role != "search":
+        raise InputError(f"{source} is no area to be seen, but names the camera {camera!r}")
+    return DrawnPolygon(source, name, role, weight, outer, tuple(holes), camera)
 
 
 def take_off(source: str, position: Any, attributes: Mapping[str, Any]) -> TakeOff:

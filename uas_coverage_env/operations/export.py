@@ -189,6 +189,8 @@ def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
     notes = []
     if scenario.moving_obstacles:
         notes.append("files of legs carry no time: moving obstacles are not avoided")
+    if any(waypoint.max_speed_mps is not None for waypoint in scenario.waypoints):
+        notes.append("files keep the path, not the speeds that waypoints ask for")
     if scenario.wind is not None or scenario.uncertainty is not None or scenario.disturbances:
         notes.append("the report holds for still air, and for the vehicles as their files say")
     for one in exports:

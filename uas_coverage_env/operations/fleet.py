@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle, vehicle_names
@@ -16,21 +16,38 @@ _SPARE_M = 1.0
 """Between two UAS that share a take-off place, beyond what they keep from each other."""
 
 
-def parse_fleet(text: str) -> list[str]:
-    """`s500_v2:2,mine.toml:1` as one vehicle per UAS; files as absolute paths.
+class Member(NamedTuple):
+    """One UAS of a fleet.
+
+    Attributes:
+        vehicle: A shipped vehicle, or a file.
+        camera: A camera, or a file; None: the usual one.
+    """
+
+    vehicle: str
+    camera: str | None = None
+
+
+def parse_fleet(text: str) -> list[Member]:
+    """`s500_v2:2,mine.toml+mavic3e:1` as one entry per UAS; vehicle files as absolute paths.
 
     Raises:
         InputError: It is no fleet, or a vehicle is wrong.
     """
-    fleet: list[str] = []
+    fleet: list[Member] = []
     for part in text.split(","):
-        name, _, count = part.strip().partition(":")
-        if not name or (count and not count.isdecimal()) or (count and int(count[:4]) < 1):
-            raise InputError(f"--fleet {text[:80]!r}: should be VEHICLE:COUNT,... as in s500_v2:2")
+        carrier, _, count = part.strip().partition(":")
+        name, plus, camera = carrier.partition("+")
+        wrong = not name or (plus and not camera)
+        if wrong or (count and not count.isdecimal()) or (count and int(count[:4]) < 1):
+            raise InputError(
+                f"--fleet {text[:80]!r}: should be VEHICLE:COUNT,... as in s500_v2:2, or "
+                f"VEHICLE+CAMERA:COUNT"
+            )
         if name not in vehicle_names() and name.endswith(".toml"):
             name = str(Path(name).resolve())
         load_vehicle(name)
-        fleet += [name] * int(count[:4] or 1)
+        fleet += [Member(name, camera or None)] * int(count[:4] or 1)
     if len(fleet) > MOST_UAS:
         raise InputError(f"--fleet: {len(fleet)} UAS, more than {MOST_UAS}; take fewer")
     return fleet

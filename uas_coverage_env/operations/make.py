@@ -1,7 +1,7 @@
 """A scenario from what was drawn: fence, obstacles, waypoints and fleet in local metres."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,17 @@ from shapely.geometry import Point, Polygon
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
-from uas_coverage_env.operations.cameras import load_camera
-from uas_coverage_env.operations.convex import polygons_of
+from uas_coverage_env.flight.seen import SEARCH_AREA
+from uas_coverage_env.operations.cameras import named_camera
+from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.operations.drawing import Drawn
-from uas_coverage_env.operations.fleet import fleet_tables, parse_fleet
+from uas_coverage_env.operations.fleet import Member, fleet_tables, parse_fleet
 from uas_coverage_env.operations.layout import MOST_WAYPOINTS, lay_waypoints
+from uas_coverage_env.operations.looks import Look, look_at, look_of
 from uas_coverage_env.operations.site import (
     FENCE_MARGIN_M,
     LARGEST_UAS_M,
+    Area,
     Site,
     Wall,
     building_walls,
@@ -32,6 +35,9 @@ UAS_SAFE_DISTANCE_M = 5.0
 _SPARE_M = 1.0
 """Between a waypoint and the nearest place that a UAS may take."""
 
+_ABOVE_WAYPOINTS_M = 30.0
+"""Top of the fence above the waypoints, unless it is given."""
+
 _MOST_STEPS = 100_000
 _OUTLINE_DETAIL_M = 0.5
 
@@ -41,12 +47,16 @@ class ImportOptions:
     """How an area is flown.
 
     Attributes:
-        fleet: `VEHICLE:COUNT,...`.
-        camera: Name of a shipped camera, or a file.
+        fleet: `VEHICLE:COUNT,...`, or `VEHICLE+CAMERA:COUNT` for another camera.
+        camera: The usual one: name of a shipped camera, or a file.
         height_m: Of the waypoints above the ground [m].
+        resolution_cm: Instead: the most that a pixel may show; waypoints then ask for the camera,
+            as they do where there are several [cm].
         radius_m: Of a waypoint's sphere [m].
         overlap: Share of a cell that the next picture shows again [-].
-        ceiling_m: Top of the fence above the ground [m].
+        max_speed_mps: At which a waypoint is covered, as the exposure allows; it then asks for the
+            camera, too; None: at any [m/s].
+        ceiling_m: Top of the fence above the ground; None: 30 m above the waypoints [m].
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
         town: GeoJSON of buildings.
     """
@@ -54,9 +64,11 @@ class ImportOptions:
     fleet: str = "s500_v2:2"
     camera: str = "sony-a6000"
     height_m: float = 40.0
+    resolution_cm: float | None = None
     radius_m: float = 6.0
     overlap: float = 0.1
-    ceiling_m: float = 70.0
+    max_speed_mps: float | None = None
+    ceiling_m: float | None = None
     homes: tuple[tuple[float, float], ...] = ()
     town: Path | None = None
 
@@ -89,12 +101,13 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     """
     _check(options)
     fleet = parse_fleet(options.fleet)
-    camera = load_camera(options.camera)
-    pitch_m = camera.pitch_m(options.height_m, options.radius_m, options.overlap)
-    site = make_site(things, options.homes, options.ceiling_m)
+    looks = _looks(fleet, options)
+    ceiling_m = _ceiling_m(looks, options)
+    site = make_site(things, options.homes, ceiling_m)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
     walls = [*site.no_fly, *building_walls(town.buildings, site.fence)]
-    waypoints, left_out_m2 = _waypoints(site, walls, pitch_m, options)
+    seen = [(area, look_at(looks, area.camera, area.source)) for area in site.areas]
+    waypoints, left_out_m2 = _waypoints(site, walls, seen, ceiling_m, options)
     tables = {
         "schema": 1,
         "name": name,
@@ -105,7 +118,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         "uas_safe_distance_m": UAS_SAFE_DISTANCE_M,
         "geofence": {
             "margin_m": FENCE_MARGIN_M,
-            "vertices_m": _prism(site.fence, options.ceiling_m),
+            "vertices_m": _prism(site.fence, ceiling_m),
         },
         "obstacles": [
             {
@@ -116,19 +129,15 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
             }
             for n, wall in enumerate(walls)
         ],
-        "uas": fleet_tables(fleet, site.homes_m, UAS_SAFE_DISTANCE_M),
-        "waypoints": waypoints,
-        "decorations": _decorations(site),
+        "uas": _fleet_tables(fleet, looks, site),
+        "waypoints": [table for tables in waypoints.values() for table in tables],
+        "decorations": _decorations(seen, several=len(looks) > 1),
         "place": site.frame.place.model_dump(),
     }
     scenario = _finite(parse(tables, Scenario, name))
-    hectares = sum(area.area for _, area in site.areas) / 1e4
     notes = [
-        f"{hectares:.1f} ha in {len(waypoints)} waypoints, at most {pitch_m[0]:.1f} m apart from "
-        f"west to east and {pitch_m[1]:.1f} m from south to north; "
-        f"{100.0 * camera.ground_sample_m(options.height_m):.1f} cm per pixel",
-        f"fence of {site.fence.area / 1e4:.1f} ha, {options.ceiling_m:g} m high; "
-        f"{len(walls)} obstacles",
+        *_look_notes(looks, seen, waypoints),
+        f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} obstacles",
         *_town_notes(town),
     ]
     if left_out_m2 >= 0.5:
@@ -136,26 +145,72 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     return Imported(scenario, tuple(notes), town.credit if town.buildings else "")
 
 
+def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
+    """How each camera of the fleet looks at the ground, the usual one first where it is carried."""
+    how = options.height_m, options.resolution_cm, options.radius_m, options.overlap
+    carried = dict.fromkeys(member.camera or options.camera for member in fleet)
+    names = sorted(carried, key=lambda name: name != options.camera)
+    return tuple(look_of(name, *how) for name in names)
+
+
+def _ceiling_m(looks: Sequence[Look], options: ImportOptions) -> float:
+    highest_m = max(look.height_m for look in looks)
+    if options.ceiling_m is None:
+        return highest_m + _ABOVE_WAYPOINTS_M
+    _within("--ceiling", options.ceiling_m, highest_m + options.radius_m, 2_000.0)
+    return options.ceiling_m
+
+
+def _fleet_tables(
+    fleet: Sequence[Member], looks: Sequence[Look], site: Site
+) -> list[dict[str, Any]]:
+    """The tables `[[uas]]`, each with its camera."""
+    tables = fleet_tables([one.vehicle for one in fleet], site.homes_m, UAS_SAFE_DISTANCE_M)
+    for table, member in zip(tables, fleet, strict=True):
+        name = named_camera(member.camera)[0] if member.camera else None
+        table["sensors"] = [look_at(looks, name, "--fleet").sensor()]
+    return tables
+
+
+def _look_notes(
+    looks: Sequence[Look],
+    seen: Sequence[tuple[Area, Look]],
+    waypoints: Mapping[str, Sequence[dict[str, Any]]],
+) -> list[str]:
+    notes = []
+    for look in looks:
+        hectares = sum(area.shape.area for area, by in seen if by is look) / 1e4
+        heights_m = [-table["position_m"][2] for table in waypoints.get(look.name, ())]
+        named = f"{look.name}: " if len(looks) > 1 else ""
+        notes.append(named + look.note(hectares, heights_m))
+    return notes
+
+
 def _check(options: ImportOptions) -> None:
-    allowed = {
-        "--height": (options.height_m, 1.0, 1_000.0),
-        "--radius": (options.radius_m, 0.5, 1_000.0),
-        "--overlap": (options.overlap, 0.0, 0.9),
-        "--ceiling": (options.ceiling_m, options.height_m + options.radius_m, 2_000.0),
-    }
-    for name, (value, least, most) in allowed.items():
-        if not least <= value <= most:
-            raise InputError(f"{name} {value:g}: should be between {least:g} and {most:g}")
+    _within("--height", options.height_m, 1.0, 1_000.0)
+    _within("--radius", options.radius_m, 0.5, 1_000.0)
+    _within("--overlap", options.overlap, 0.0, 0.9)
+    if options.max_speed_mps is not None:
+        _within("--max-speed", options.max_speed_mps, 0.5, 100.0)
+
+
+def _within(name: str, value: float, least: float, most: float) -> None:
+    if not least <= value <= most:
+        raise InputError(f"{name} {value:g}: should be between {least:g} and {most:g}")
 
 
 def _waypoints(
-    site: Site, walls: Sequence[Wall], pitch_m: tuple[float, float], options: ImportOptions
-) -> tuple[list[dict[str, Any]], float]:
-    """The tables `[[waypoints]]`, and the area that is left out [m²]."""
+    site: Site,
+    walls: Sequence[Wall],
+    seen: Sequence[tuple[Area, Look]],
+    ceiling_m: float,
+    options: ImportOptions,
+) -> tuple[dict[str, list[dict[str, Any]]], float]:
+    """The tables `[[waypoints]]` of each camera, and the area that is left out [m²]."""
     keep_m = LARGEST_UAS_M + _SPARE_M
     low, high = [], []
     for wall in walls:
-        fits = wall.top_m + wall.safe_distance_m + keep_m <= options.ceiling_m - FENCE_MARGIN_M
+        fits = wall.top_m + wall.safe_distance_m + keep_m <= ceiling_m - FENCE_MARGIN_M
         (low if fits else high).append(wall)
     allowed = site.fence.buffer(-(FENCE_MARGIN_M + keep_m)).difference(
         shapely.union_all([wall.footprint.buffer(wall.safe_distance_m + keep_m) for wall in high])
@@ -163,31 +218,41 @@ def _waypoints(
     if allowed.is_empty:
         raise InputError("no waypoint has room in the fence; enlarge the fence")
     roofs = shapely.STRtree([w.footprint.buffer(w.safe_distance_m + keep_m) for w in low])
-    tables: list[dict[str, Any]] = []
+    asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
+    tables: dict[str, list[dict[str, Any]]] = {}
     left_out_m2 = 0.0
-    for number, (weight, area) in enumerate(site.areas):
-        layout = lay_waypoints(area, pitch_m, allowed, f"area {number + 1}")
+    for number, (area, look) in enumerate(seen):
+        layout = lay_waypoints(area.shape, look.pitch_m, allowed, f"area {number + 1}")
         left_out_m2 += layout.left_out_m2
         for east_m, north_m in layout.places_m:
             under = roofs.query(Point(east_m, north_m), "intersects")
             tops = [low[k].top_m + low[k].safe_distance_m + keep_m for k in under]
-            position_m = (north_m, east_m, -max(options.height_m, *tops, 0.0))
-            tables.append(
+            position_m = (north_m, east_m, -max(look.height_m, *tops, 0.0))
+            tables.setdefault(look.name, []).append(
                 {
                     "kind": "search",
                     "position_m": [round(value, 3) for value in position_m],
                     "radius_m": options.radius_m,
-                    "weight": weight,
+                    "weight": area.weight,
+                    **_asked(look, options, asks=asks),
                 }
             )
-    if len(tables) > MOST_WAYPOINTS:
+    count = sum(map(len, tables.values()))
+    if count > MOST_WAYPOINTS:
         raise InputError(
-            f"the areas need {len(tables)} waypoints, more than {MOST_WAYPOINTS}; fly higher "
+            f"the areas need {count} waypoints, more than {MOST_WAYPOINTS}; fly higher "
             f"(--height), or divide them into missions"
         )
     if not tables:
         raise InputError("nothing of the areas is seen from any place that a UAS may take")
     return tables, left_out_m2
+
+
+def _asked(look: Look, options: ImportOptions, *, asks: bool) -> dict[str, Any]:
+    """What a waypoint asks for."""
+    if options.max_speed_mps is not None:
+        return {"sensor": look.name, "max_speed_mps": options.max_speed_mps}
+    return {"sensor": look.name} if asks else {}
 
 
 def _finite(scenario: Scenario) -> Scenario:
@@ -203,23 +268,24 @@ def _prism(footprint: Polygon, top_m: float) -> list[list[float]]:
     return [[*corner, down] for down in (0.0, -round(top_m, 3)) for corner in corners]
 
 
-def _decorations(site: Site) -> list[dict[str, Any]]:
-    """Outlines of the searched areas, to be drawn."""
+def _decorations(seen: Sequence[tuple[Area, Look]], *, several: bool) -> list[dict[str, Any]]:
+    """Outlines of the searched areas, to be drawn; where there are several cameras, of each."""
     parts = [
-        outline
-        for _, area in site.areas
-        for part in polygons_of(area)
-        for outline in polygons_of(part.simplify(_OUTLINE_DETAIL_M))
+        (f"{SEARCH_AREA}_{look.name}" if several else SEARCH_AREA, outline)
+        for area, look in seen
+        for part in polygons_of(area.shape)
+        for whole in polygons_of(part.simplify(_OUTLINE_DETAIL_M))
+        for outline in without_holes(whole)
     ]
     return [
         {
             "name": f"area_{n + 1}",
-            "kind": "search_area",
+            "kind": kind,
             "polygon_m": [
                 [round(north, 2), round(east, 2)] for east, north in part.exterior.coords[:-1]
             ],
         }
-        for n, part in enumerate(parts)
+        for n, (kind, part) in enumerate(parts)
     ]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import shapely
 from shapely.geometry import Point, Polygon
@@ -47,20 +48,36 @@ class Wall:
     safe_distance_m: float
 
 
+class Area(NamedTuple):
+    """What is searched.
+
+    Attributes:
+        weight: Of the waypoints in it [-].
+        shape: Polygons (x east, y north) [m].
+        camera: Name of the one that is to see it; None: the usual one.
+        source: File and name, for messages.
+    """
+
+    weight: float
+    shape: BaseGeometry
+    camera: str | None
+    source: str
+
+
 @dataclass(frozen=True, eq=False)
 class Site:
     """A site in local metres, x east, y north.
 
     Attributes:
         frame: Where on the Earth it is.
-        areas: What is searched, each with its weight; they do not overlap.
+        areas: What is searched; those for the same camera do not overlap.
         homes_m: East and north of the take-off places.
         fence: Convex; what lies in it but outside the drawn fence is walled off.
         no_fly: Walls that reach beyond the ceiling.
     """
 
     frame: LocalFrame
-    areas: tuple[tuple[float, BaseGeometry], ...]
+    areas: tuple[Area, ...]
     homes_m: tuple[tuple[float, float], ...]
     fence: Polygon
     no_fly: tuple[Wall, ...]
@@ -84,7 +101,9 @@ def make_site(
         (thing, local_polygon(frame, thing)) for thing in things if isinstance(thing, DrawnPolygon)
     ]
     homes_m = _homes_m(frame, things, homes)
-    areas = _apart([(t.weight, area) for t, area in polygons if t.role == "search"])
+    areas = _apart(
+        [Area(t.weight, a, t.camera, t.source) for t, a in polygons if t.role == "search"]
+    )
     drawn_fence = shapely.union_all([area for t, area in polygons if t.role == "fence"])
     fence = _fence(drawn_fence, areas, homes_m)
     for thing, area in polygons:
@@ -139,28 +158,28 @@ def _homes_m(
     return tuple(local_place(frame, place) for place in places)
 
 
-def _apart(
-    areas: list[tuple[float, Polygon]],
-) -> tuple[tuple[float, BaseGeometry], ...]:
-    """The areas without what a heavier one holds already."""
-    result: list[tuple[float, BaseGeometry]] = []
-    taken: BaseGeometry = Polygon()
-    for weight, area in sorted(areas, key=lambda entry: -entry[0]):
-        left = area if taken.is_empty else area.difference(taken)
-        if left is not area:  # what is thinner than can be drawn is where two edges nearly agree
+def _apart(areas: list[Area]) -> tuple[Area, ...]:
+    """The areas without what a heavier one for the same camera holds already."""
+    result: list[Area] = []
+    taken_by: dict[str | None, BaseGeometry] = {}
+    for area in sorted(areas, key=lambda entry: -entry.weight):
+        taken, left = taken_by.get(area.camera, Polygon()), area.shape
+        if not taken.is_empty:
+            left = left.difference(taken)
+            # what is thinner than can be drawn is where two edges nearly agree
             left = left.buffer(-_EDGE_M, join_style="mitre").buffer(_EDGE_M, join_style="mitre")
-        result.append((weight, left))
-        taken = taken.union(area)
+        result.append(area._replace(shape=left))
+        taken_by[area.camera] = taken.union(area.shape)
     return tuple(result)
 
 
 def _fence(
     drawn: BaseGeometry,
-    areas: tuple[tuple[float, BaseGeometry], ...],
+    areas: tuple[Area, ...],
     homes_m: tuple[tuple[float, float], ...],
 ) -> Polygon:
     if drawn.is_empty:
-        around = shapely.union_all([*(area for _, area in areas), *map(Point, homes_m)])
+        around = shapely.union_all([*(area.shape for area in areas), *map(Point, homes_m)])
         hull = around.convex_hull.buffer(FENCE_AROUND_M, quad_segs=2)
     else:
         hull = drawn.convex_hull

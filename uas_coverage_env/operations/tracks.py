@@ -21,6 +21,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
 from uas_coverage_env.flight.record import LANDED
 from uas_coverage_env.operations.room import Room, Surroundings
+from uas_coverage_env.world.coverage import covering_samples
 
 FloatArray = NDArray[np.float64]
 
@@ -210,16 +211,13 @@ class _Builder:
         self.around = Surroundings(flight.scenario, uas)
         self.steps = [self.around.room(a, b) for a, b in pairwise(path)]
         first_at = covered_at(flight)
-        x = flight.x[:, :, 0:3]
         self.waypoints: list[int] = []
         self._covered: dict[int, list[int]] = {}
         centres = np.array([w.position_m for w in flight.scenario.waypoints])
         self._centres = centres
         self._radii = np.array([w.radius_m for w in flight.scenario.waypoints])
         for w, sample in enumerate(first_at):
-            if sample < len(path) and (
-                np.linalg.norm(x[sample, uas] - centres[w]) <= self._radii[w]
-            ):
+            if sample < len(path) and (covering_samples(flight.scenario, w, flight.x[sample])[uas]):
                 self.waypoints.append(w)
                 self._covered.setdefault(int(sample), []).append(w)
 

@@ -18,6 +18,7 @@ from uas_coverage_env.scenario.fields import (
     Obstacle,
     Place,
     ScheduledVelocity,
+    Sensor,
     Uas,
     Waypoint,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "ScenarioLike",
     "ScheduledVelocity",
     "Sensing",
+    "Sensor",
     "Size",
     "Sorties",
     "Uas",

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.scenario.endurance import back_and_forth
 from uas_coverage_env.scenario.fields import Geofence, NoFlyZone, Obstacle
 from uas_coverage_env.scenario.unchecked import UncheckedScenario
@@ -44,7 +45,11 @@ def problems(scenario: UncheckedScenario) -> list[str]:
 
 def warnings(scenario: UncheckedScenario) -> list[str]:
     """What is allowed but probably not meant; one line each."""
-    return [*_waypoints_out_of_reach(scenario), *_mission_too_long(scenario)]
+    return [
+        *_waypoints_nobody_covers(scenario),
+        *_waypoints_out_of_reach(scenario),
+        *_mission_too_long(scenario),
+    ]
 
 
 def _names_used_twice(scenario: UncheckedScenario) -> Iterator[str]:
@@ -203,10 +208,28 @@ def _scene(scenario: UncheckedScenario) -> list[str]:
     ]
 
 
+def _waypoints_nobody_covers(scenario: UncheckedScenario) -> Iterator[str]:
+    """One line for each sensor that is asked for and nowhere carried."""
+    nobody = ~scenario.can_cover.any(axis=0)
+    carried = sorted({sensor.name for uas in scenario.uas for sensor in uas.sensors})
+    wanted = [waypoint.sensor or "" for waypoint in scenario.waypoints]
+    for name in dict.fromkeys(wanted[index] for index in np.flatnonzero(nobody)):
+        indices = [index for index in np.flatnonzero(nobody) if wanted[index] == name]
+        more = f" (+{len(indices) - 1} more)" if len(indices) > 1 else ""
+        instead = did_you_mean(name, carried, f"they carry {', '.join(carried) or 'no sensor'}")
+        yield (
+            f"waypoints[{indices[0]}].sensor{more}: no UAS carries {name!r}, so none covers it; "
+            f"add it to uas.sensors ({instead})"
+        )
+
+
 def _waypoints_out_of_reach(scenario: UncheckedScenario) -> Iterator[str]:
     radius_m = min(uas.radius_m for uas in scenario.uas)
     for index, waypoint in enumerate(scenario.waypoints):
         points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
+        if waypoint.heights_m is not None:
+            lowest_m, highest_m = waypoint.heights_m
+            points = points[(lowest_m <= -points[:, 2]) & (-points[:, 2] <= highest_m)]
         free = scenario.fence.signed_distance(points) <= -scenario.geofence.margin_m
         high = _is_high_enough(scenario, points)
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):

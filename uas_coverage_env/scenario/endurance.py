@@ -55,8 +55,38 @@ def back_and_forth(scenario: UncheckedScenario, spare: float = 0.0) -> RoughPlan
 
     Returns:
         The quickest of the plans tried that the batteries allow; where they allow none, the plan
-        of a fleet with endless batteries, marked as not complete.
+        of a fleet with endless batteries, marked as not complete. Waypoints that the same UAS can
+        cover are shared out among these; a UAS then flies all its runs one after the other.
     """
+    if scenario.can_cover.all():
+        return _shared_among_all(scenario, spare)
+    n_uas = len(scenario.uas)
+    flight_s, air_time_s, complete = np.zeros(n_uas), np.zeros(n_uas), True
+    for who in np.unique(scenario.can_cover, axis=1).T:
+        what = np.flatnonzero((scenario.can_cover == who[:, None]).all(axis=0))
+        if who.any():  # the others are warned of elsewhere
+            plan = _shared_among_all(_part_of(scenario, np.flatnonzero(who), what), spare)
+            flight_s[who] += plan.flight_s
+            air_time_s[who] = plan.air_time_s
+            complete = complete and plan.complete
+    complete = complete and bool((flight_s <= air_time_s * (1.0 - spare)).all())
+    return RoughPlan(flight_s, air_time_s, complete)
+
+
+def _part_of(
+    scenario: UncheckedScenario, uas: NDArray[np.intp], waypoints: NDArray[np.intp]
+) -> UncheckedScenario:
+    """The mission of some UAS and waypoints."""
+    known = {name: getattr(scenario, name) for name in UncheckedScenario.model_fields}
+    known["uas"] = tuple(scenario.uas[u] for u in uas)
+    known["waypoints"] = tuple(scenario.waypoints[w] for w in waypoints)
+    part = UncheckedScenario.model_construct(**known)
+    vars(part)["vehicles"] = tuple(scenario.vehicles[u] for u in uas)
+    return part
+
+
+def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
+    """The plan of UAS that can cover all waypoints."""
     waypoints = np.array([waypoint.position_m for waypoint in scenario.waypoints])
     starts = np.array([uas.start_m for uas in scenario.uas])
     air_time_s = np.array(

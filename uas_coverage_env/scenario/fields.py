@@ -7,16 +7,19 @@ scenario files; see `village.toml`.
 import itertools
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    SerializerFunctionWrapHandler,
     Strict,
     ValidationInfo,
     field_validator,
+    model_serializer,
+    model_validator,
 )
 
 from uas_coverage_env.files.strict_toml import StrictModel
@@ -57,6 +60,7 @@ Points_m = Annotated[
     BeforeValidator(_as_tuple),
     Field(min_length=4, max_length=1000),
 ]
+_Angle_deg = Annotated[float, Field(gt=0.0, lt=170.0)]
 Outline_m = Annotated[
     tuple[tuple[Coordinate_m, Coordinate_m], ...],
     BeforeValidator(_as_tuple),
@@ -166,12 +170,71 @@ class Waypoint(StrictModel):
         position_m: Centre of the sphere [m].
         radius_m: Radius of the sphere, δ_WP [m].
         weight: How much earlier coverage is worth [-].
+        sensor: Only a UAS that carries a sensor of this name covers it; without it, any does.
+        heights_m: It is covered only from a height above the ground (z = 0) between these two,
+            its centre among them; without it, from any [m].
+        max_speed_mps: It is covered only by a UAS that is no faster, as its exposure allows;
+            without it, at any speed [m/s].
     """
 
     kind: Label | None = None
     position_m: Position_m
     radius_m: Length_m
     weight: Annotated[float, Field(gt=0.0, le=1e6)]
+    sensor: Name | None = None
+    heights_m: Annotated[tuple[Distance_m, Distance_m], BeforeValidator(_as_tuple)] | None = None
+    max_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+
+    @model_validator(mode="after")
+    def _lies_between_its_heights(self) -> Self:
+        if self.heights_m is not None:
+            lowest_m, highest_m = self.heights_m
+            height_m = -self.position_m[2]
+            if not lowest_m <= height_m <= highest_m:
+                raise ValueError(
+                    f"heights_m from {lowest_m:g} to {highest_m:g} do not hold the height "
+                    f"{height_m:g} of position_m; change one of them"
+                )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_asked(self, serialise: SerializerFunctionWrapHandler) -> Any:
+        # files, and what is computed from them, are those of scenarios before the fields
+        data = serialise(self)
+        for name in ("sensor", "heights_m", "max_speed_mps"):
+            if getattr(self, name) is None:
+                data.pop(name, None)
+        return data
+
+
+class Sensor(StrictModel):
+    """What a UAS carries to cover waypoints that ask for it; with a field of view, a camera.
+
+    Attributes:
+        name: What waypoints ask for, such as `camera`, `thermal`, `gas`; unique on its UAS.
+        field_of_view_deg: Opening angles of the picture, from side to side and from front to back
+            of a UAS that faces north: from west to east, and from south to north; without it, the
+            sensor shows no ground [degrees].
+        stabilised: Whether it looks straight down however the UAS tilts; if not, it tilts with it.
+        max_tilt_deg: Pictures at more tilt of the UAS than this show nothing of use; without it,
+            all do [degrees].
+    """
+
+    name: Name
+    field_of_view_deg: (
+        Annotated[tuple[_Angle_deg, _Angle_deg], BeforeValidator(_as_tuple)] | None
+    ) = None
+    stabilised: bool = True
+    max_tilt_deg: Annotated[float, Field(gt=0.0, lt=90.0)] | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_absent(self, serialise: SerializerFunctionWrapHandler) -> Any:
+        # of what is no camera, nothing but the name
+        data = serialise(self)
+        for name in ("field_of_view_deg", "max_tilt_deg"):
+            if getattr(self, name) is None:
+                data.pop(name, None)
+        return data
 
 
 class Uas(StrictModel):
@@ -185,6 +248,7 @@ class Uas(StrictModel):
         soc_0: State of charge at t = 0 [-].
         radius_m: Radius of the sphere that holds the machine, δ_UAV [m].
         dod_max: Depth of discharge beyond which the UAS is lost [-].
+        sensors: What it carries; without it, nothing that a waypoint could ask for.
     """
 
     name: Name
@@ -193,6 +257,23 @@ class Uas(StrictModel):
     soc_0: Annotated[float, Field(gt=0.0, le=1.0)]
     radius_m: Annotated[float, Field(gt=0.0, le=100.0)]
     dod_max: Annotated[float, Field(gt=0.0, lt=1.0)]
+    sensors: Annotated[tuple[Sensor, ...], Strict(False), Field(max_length=16)] = ()
+
+    @field_validator("sensors")
+    @classmethod
+    def _names_are_unique(cls, sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
+        names = [sensor.name for sensor in sensors]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"{name!r} is carried twice; give each sensor its own name")
+        return sensors
+
+    @model_serializer(mode="wrap")
+    def _without_sensors_where_none(self, serialise: SerializerFunctionWrapHandler) -> Any:
+        data = serialise(self)
+        if not self.sensors:
+            data.pop("sensors", None)
+        return data
 
     @field_validator("vehicle")
     @classmethod

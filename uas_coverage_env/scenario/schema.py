@@ -17,6 +17,7 @@ from uas_coverage_env.scenario.fields import (
     Obstacle,
     Place,
     ScheduledVelocity,
+    Sensor,
     Uas,
     Waypoint,
 )
@@ -26,7 +27,7 @@ from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 _TABLES = (
-    *(Geofence, Uas, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
+    *(Geofence, Uas, Sensor, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
     *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties),
     *EVENT_KINDS,
 )

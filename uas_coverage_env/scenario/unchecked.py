@@ -3,6 +3,8 @@
 from functools import cached_property
 from typing import Annotated, Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_serializer
 
 from uas_coverage_env.files.strict_toml import StrictModel
@@ -23,6 +25,7 @@ from uas_coverage_env.scenario.fields import (
     Waypoint,
 )
 from uas_coverage_env.scenario.packs import Sorties
+from uas_coverage_env.scenario.payload import who_covers
 from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.uncertainty import Uncertainty
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
@@ -113,6 +116,11 @@ class UncheckedScenario(StrictModel):
         revised = type(self).model_construct(**known)
         vars(revised)["vehicles"] = self.vehicles
         return revised
+
+    @cached_property
+    def can_cover(self) -> NDArray[np.bool_]:
+        """(U, W) whether each UAS carries the sensor that each waypoint asks for."""
+        return who_covers(self.uas, self.waypoints)
 
     @cached_property
     def vehicles(self) -> tuple[VehicleParams, ...]:

@@ -32,6 +32,7 @@ from uas_coverage_env.world.routes import node_distances
 from uas_coverage_env.world.waypoints import (
     N_WAYPOINT_COLUMNS,
     WAYPOINT_DTYPE,
+    sensors_of,
     unit_m_of,
     waypoint_columns,
     waypoint_records,
@@ -68,6 +69,8 @@ UAS_DTYPE = _record(
         ("climb_mps", "f8"),
         ("descent_mps", "f8"),
         ("dod_per_s", "f8"),
+        # bits, see `WAYPOINT_DTYPE`
+        ("sensors", "i8"),
     ]
 )
 
@@ -142,6 +145,8 @@ RULES_DTYPE = _record(
         ("overhangs", "?"),
         # whether any event may happen, or anything is sensed otherwise than it is
         ("eventful", "?"),
+        # whether any waypoint asks for more than that a UAS comes near
+        ("asks", "?"),
         # of `waypoint_columns`
         ("unit_m", "f8"),
         # the command to stop and hold still
@@ -232,6 +237,7 @@ def build_arena(
     rules["disturbed"] = blocks["acts"].any()
     rules["overhangs"] = obstacles["overhangs"].any()
     rules["eventful"] = is_eventful(scenario)
+    rules["asks"] = waypoints["asks"].any()
     nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
@@ -291,6 +297,7 @@ def _uas(scenario: Scenario) -> NDArray[np.void]:
                 limits.v_up_max_mps,
                 limits.v_down_max_mps,
                 dod_per_s(vehicle, entry.dod_max),  # the battery is nearly empty then
+                sensors_of(scenario, entry),
             )
         )
     return np.array(rows, dtype=UAS_DTYPE)

@@ -2,7 +2,11 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.outcome import NONE
 from uas_coverage_env.world.state import FLYING, LANDED
@@ -18,8 +22,50 @@ def _reaches(columns, w, x, y, z):
 
 
 @inlined_kernel
+def can_cover(arena, i, w):
+    """Whether UAS i carries the sensor that waypoint w asks for."""
+    return arena.waypoints[w].sensor & ~arena.uas[i].sensors == 0
+
+
+@inlined_kernel
+def _is_as_asked(arena, i, w, x):
+    """Whether UAS i covers waypoint w from where it is: with its sensor, height and speed."""
+    waypoint = arena.waypoints[w]
+    if not waypoint.asks:
+        return True
+    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
+    return (
+        can_cover(arena, i, w)
+        and waypoint.lowest_m <= -x[Z] <= waypoint.highest_m
+        and speed_mps <= waypoint.max_speed_mps
+    )
+
+
+def covering_samples(scenario: Scenario, w: int, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where a record of states covers a waypoint, by the rule of `cover`.
+
+    Args:
+        scenario: The mission.
+        w: Index of the waypoint.
+        x: (T, U, 14) states; whether a UAS was flying is left to the caller.
+
+    Returns:
+        (T, U).
+    """
+    waypoint = scenario.waypoints[w]
+    away_m = np.linalg.norm(x[..., :3] - np.array(waypoint.position_m), axis=-1)
+    covers = (away_m <= waypoint.radius_m) & scenario.can_cover[:, w]
+    if waypoint.heights_m is not None:
+        lowest_m, highest_m = waypoint.heights_m
+        covers &= (lowest_m <= -x[..., Z]) & (-x[..., Z] <= highest_m)
+    if waypoint.max_speed_mps is not None:
+        covers &= np.linalg.norm(x[..., VX : VZ + 1], axis=-1) <= waypoint.max_speed_mps
+    return covers
+
+
+@inlined_kernel
 def cover(arena, state, outcome):
-    """Cover the waypoints within reach of a flying UAS at its position now.
+    """Cover the waypoints within reach of a flying UAS as it is now, see `_is_as_asked`.
 
     A lost UAS covers nothing at the sample of its loss. Where several UAS reach a waypoint at
     the same sample, it counts for the first of them.
@@ -39,6 +85,8 @@ def cover(arena, state, outcome):
             continue
         for w in range(state.uncovered.shape[0]):
             if _reaches(columns, w, x, y, z) & state.uncovered[w]:
+                if not _is_as_asked(arena, i, w, state.x[i]):
+                    continue
                 state.uncovered[w] = False
                 event.newly_covered += 1
                 event.newly_covered_weight += columns[4, w]

@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import Scenario, Uas
+from uas_coverage_env.scenario.payload import asks
 
 ALL_SHARES = 2.0**30
 """The weight of all waypoints, as a whole number. With it and positions of at most 2²², every sum
@@ -13,18 +14,56 @@ of `Arena.waypoint_columns` stays below 2⁵³, up to where floats hold all whol
 
 N_WAYPOINT_COLUMNS = 8
 
+_NOBODY_HAS = 1 << 62
+
 WAYPOINT_DTYPE = np.dtype(
     (
         np.record,
-        np.dtype([("position_m", "f8", (3,)), ("radius_m", "f8"), ("weight", "f8")], align=True),
+        np.dtype(
+            [
+                ("position_m", "f8", (3,)),
+                ("radius_m", "f8"),
+                ("weight", "f8"),
+                # whether more is asked than to come near, and what: the bit of a sensor, or none;
+                # heights above the ground, and a speed
+                ("asks", "?"),
+                ("sensor", "i8"),
+                ("lowest_m", "f8"),
+                ("highest_m", "f8"),
+                ("max_speed_mps", "f8"),
+            ],
+            align=True,
+        ),
     )
 )
 
 
 def waypoint_records(scenario: Scenario) -> NDArray[np.void]:
     """(W,) of WAYPOINT_DTYPE."""
-    rows = [(w.position_m, w.radius_m, w.weight) for w in scenario.waypoints]
+    bits = _sensor_bits(scenario)
+    rows = [
+        (
+            *(w.position_m, w.radius_m, w.weight, asks(w)),
+            0 if w.sensor is None else bits.get(w.sensor, _NOBODY_HAS),
+            *(w.heights_m or (-math.inf, math.inf)),
+            math.inf if w.max_speed_mps is None else w.max_speed_mps,
+        )
+        for w in scenario.waypoints
+    ]
     return np.array(rows, dtype=WAYPOINT_DTYPE)
+
+
+def sensors_of(scenario: Scenario, uas: Uas) -> int:
+    """The bits of the sensors that a UAS carries and a waypoint asks for."""
+    bits = _sensor_bits(scenario)
+    return sum(bits.get(sensor.name, 0) for sensor in uas.sensors)
+
+
+def _sensor_bits(scenario: Scenario) -> dict[str, int]:
+    """A bit for each sensor that is asked for and carried."""
+    carried = {sensor.name for uas in scenario.uas for sensor in uas.sensors}
+    asked = {waypoint.sensor for waypoint in scenario.waypoints}
+    return {name: 1 << n for n, name in enumerate(sorted(carried & asked))}
 
 
 def unit_m_of(positions_m: NDArray[np.float64]) -> float:

@@ -8,7 +8,7 @@ from typing import Protocol
 from uas_coverage_agents.policy.directory import Policy, load_policy
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, refuse_what_asks
 from uas_coverage_env.world import Command, SwarmState
 
 
@@ -81,10 +81,12 @@ class PolicyPlanner:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what needs compiling."""
+        refuse_what_asks(brief)
         self._pilot.warm_up(brief)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission."""
+        refuse_what_asks(brief)
         self._pilot.reset(brief, seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:

@@ -24,7 +24,14 @@ from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.unheard import Unheard
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import Attempts, Handover, MissionBrief, first_sight, without
+from uas_coverage_env.mission import (
+    Attempts,
+    Handover,
+    MissionBrief,
+    first_sight,
+    refuse_what_asks,
+    without,
+)
 from uas_coverage_env.world import FLYING, HOME, Command, GoTo, Mode, SwarmState
 
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
@@ -81,6 +88,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission."""
+        refuse_what_asks(brief)
         self.dt_s = brief.dt_s
         self.plan = self._backup = None
         self._round_robin = RoundRobin()

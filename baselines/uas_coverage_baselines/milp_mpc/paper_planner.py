@@ -31,7 +31,7 @@ from uas_coverage_baselines.milp_mpc.solvers import (
     solver_named,
 )
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, first_sight, refuse_what_asks
 from uas_coverage_env.world import Command, Mode, SwarmState
 
 _ROUNDING_M = 1e-5  # a solution keeps its rows to 2e-6, and a breach is one by any amount
@@ -172,10 +172,12 @@ class MilpMpcPaper:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what the first decision compiles, without solving it."""
+        refuse_what_asks(brief)
         ModeProblems(brief, self.options).problem(first_sight(brief), None)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
+        refuse_what_asks(brief)
         self._by_modes = ModeProblems(brief, self.options)
         self.plan = self.last_decision = self.last_program = None
 

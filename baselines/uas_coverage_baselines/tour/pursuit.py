@@ -18,7 +18,7 @@ from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target
 from uas_coverage_env.autopilot.lookahead import fly_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import CLIMB, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
@@ -31,6 +31,11 @@ LEGS = 6
 
 _LAG_S = 1.6  # the inner loop follows a velocity with about this delay
 _AIM_SHARE = 0.8  # of the radius, at most, for the first aim
+_SPEED_SHARE = 0.97  # of the speed at which a waypoint may be covered, in plans
+_SLOW_SHARE = 0.85  # and in what is pursued
+_HEIGHT_SPARE_M = 0.3  # within the heights that are asked for, in plans
+_SLOW_BRAKING = 0.6  # share of the acceleration that slows down in time
+_SLOW_WITHIN = 0.7  # share of the radius within which that holds
 
 
 class PursuitTask(NamedTuple):
@@ -124,6 +129,17 @@ def begin(plan, x, reference):
 
 
 @allocating_kernel
+def _is_as_asked(waypoint, x):
+    """Whether height and speed are those that a waypoint asks for, with some to spare."""
+    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
+    spare_m = min(_HEIGHT_SPARE_M, 0.25 * (waypoint.highest_m - waypoint.lowest_m))
+    return (
+        waypoint.lowest_m + spare_m <= -x[Z] <= waypoint.highest_m - spare_m
+        and speed_mps <= _SPEED_SHARE * waypoint.max_speed_mps
+    )
+
+
+@allocating_kernel
 def _write_step(arena, i, task, plan, k, command):
     """Simulate step k of a plan."""
     x, reference = plan.x[k + 1], plan.reference[k + 1]
@@ -138,9 +154,12 @@ def _write_step(arena, i, task, plan, k, command):
     plan.path_m[k + 1, 2] = x[Z]
     done = plan.covered[k]
     while done < len(task.route):
-        at_m = arena.waypoints[task.route[done]].position_m
+        waypoint = arena.waypoints[task.route[done]]
+        at_m = waypoint.position_m
         dx, dy, dz = x[X] - at_m[0], x[Y] - at_m[1], x[Z] - at_m[2]
         if math.sqrt(dx * dx + dy * dy + dz * dz) > task.cover_m[done]:
+            break
+        if waypoint.asks and not _is_as_asked(waypoint, x):
             break
         done += 1
     plan.covered[k + 1] = done
@@ -181,6 +200,12 @@ def _pursue(arena, i, task, plan, k):
     end_x, end_y, way_m, kind = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
     altitude_m = -z1
     lead_s = 0.0
+    if target >= 0 and arena.waypoints[target].max_speed_mps < speed_mps:
+        slow_mps = _SLOW_SHARE * arena.waypoints[target].max_speed_mps
+        left_m = way_m - _SLOW_WITHIN * arena.waypoints[target].radius_m
+        left_m = max(left_m - _LAG_S * math.hypot(x[VX], x[VY]), 0.0)
+        braking_mps2 = 2.0 * _SLOW_BRAKING * task.acceleration_mps2
+        speed_mps = min(speed_mps, math.sqrt(slow_mps * slow_mps + braking_mps2 * left_m))
     if target == HOME_TARGET or task.cover_m[leg] < 0.0:
         left_m = max(way_m - (task.near_m[leg] if target >= 0 else 0.0), 0.0)
         lead_s = min(_LAG_S, left_m / (2.0 * math.hypot(x[VX], x[VY]) + 1e-9))
@@ -233,7 +258,8 @@ def push_to_guidance(arena, i, task, plan, command):
         x, done = plan.x[k], plan.covered[k]
         target, stop = HOME_TARGET, True
         if done < len(task.route):
-            target, stop = task.route[done], task.cover_m[done] < 0.0
+            target = task.route[done]
+            stop = task.cover_m[done] < 0.0 or arena.waypoints[target].asks
         guide(arena, i, x, plan.reference[k], target, stop, False, command)
         altitude_m = command.values[2] if command.kind == VELOCITY else -x[Z]
         plan.push[k, 0] = command.values[0] - plan.commands[k, 0]
@@ -262,6 +288,8 @@ def aim(arena, i, task, plan, leg):
     plan.aim_m[leg, 1] = at_m[1] + aside_m * ((ay - at_m[1]) / a + (by - at_m[1]) / b)
     off_m = 0.5 * waypoint.radius_m
     plan.aim_m[leg, 2] = min(max(0.5 * (az + bz), at_m[2] - off_m), at_m[2] + off_m)
+    if waypoint.asks:
+        plan.aim_m[leg, 2] = at_m[2]
     plan.early_m[leg] = 0.0
     pull_clear(arena, i, task, plan, leg)
 

@@ -61,7 +61,7 @@ class Schedule:
 
     def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
         self.legs = Legs(brief)
-        self._arena = arena
+        self._arena, self._can_cover = arena, brief.can_cover
         self._moves = moves
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
@@ -191,8 +191,11 @@ class Schedule:
         # enough to be thought of while there is other work near it
         work_s = self._legs_left(view)[view.may_work]
         opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0
+        open_ = view.uncovered.copy()
+        if view.may_work.any():  # what nobody can cover is no reason to search again
+            open_ &= self._can_cover[view.may_work].any(axis=0)
         return RoutingTask(
-            open_waypoints=np.flatnonzero(view.uncovered),
+            open_waypoints=np.flatnonzero(open_),
             first_s=first_s,
             between_s=legs.between_s,
             kind=legs.kind,

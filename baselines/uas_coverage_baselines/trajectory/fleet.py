@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import RoutingTask
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
-from uas_coverage_baselines.trajectory.program import Flight, FlightProgram, Landing
+from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
 from uas_coverage_baselines.trajectory.retiming import quickest, retimed, shifted, stretches
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.terrain import Terrain
@@ -72,6 +72,7 @@ class Fleet:
                 ),
                 self.waypoints_m,
                 self.radius_m,
+                _asked(brief),
             )
             for u, uas in enumerate(brief.uas)
         ]
@@ -185,6 +186,15 @@ class Fleet:
             program = self.program(u, paths_m, movers[u], earliest)
             flights[u] = make_way(program, reduced_state(moment.x[u]), routes[u], alone[u])
         return flights
+
+
+def _asked(brief: MissionBrief) -> Asked | None:
+    """What waypoints ask for beside that a UAS comes near; None: nothing."""
+    waypoints, anything = brief.waypoints, (-np.inf, np.inf)
+    heights_m = np.array([w.heights_m or anything for w in waypoints], float)
+    speeds_mps = np.array([w.max_speed_mps or np.inf for w in waypoints], float)
+    nothing = np.isinf(heights_m).all() and np.isinf(speeds_mps).all()
+    return None if nothing else Asked(heights_m, speeds_mps)
 
 
 def make_way(program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight) -> Flight:

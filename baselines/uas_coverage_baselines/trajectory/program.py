@@ -31,6 +31,9 @@ _NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
 _FENCE_NEAR_M = 25.0
 _INSIDE_M = 0.05  # of a waypoint's radius, or a fiftieth of it
 _FORGIVEN = 0.8  # share of that by which a visit may miss: it is inside the radius still
+_SLOW_SHARE = 0.97  # of the speed at which a waypoint may be covered
+_SLOW_WEIGHT = 2.0  # of 1 m/s too much
+_HEIGHT_SPARE_M = 0.2  # within the heights from which a waypoint may be covered
 _LANDING_SHARE = 0.9, 0.85  # of landing distance and speed
 _LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
 _CLEAR_WEIGHT = 2.0  # of 1 m too near
@@ -44,6 +47,19 @@ class Landing:
     home_m: FloatArray
     distance_m: float
     speed_mps: float
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What waypoints ask for beside that a UAS comes near.
+
+    Attributes:
+        heights_m: (W, 2) above the ground, from and to; infinite where none are asked for.
+        max_speed_mps: (W,) infinite where none is.
+    """
+
+    heights_m: FloatArray
+    max_speed_mps: FloatArray
 
 
 @dataclass(frozen=True)
@@ -93,6 +109,7 @@ class FlightProgram:
         landing: Where it ends.
         waypoints_m: (W, 3).
         radius_m: (W,).
+        asked: What is asked beside; None: nothing of any waypoint.
         bodies: On known paths from step 0.
         earliest: (W,) steps before which a waypoint is not to be visited.
         loose: Factors on the limits of the first stages, for a start beyond them.
@@ -104,6 +121,7 @@ class FlightProgram:
     landing: Landing
     waypoints_m: FloatArray
     radius_m: FloatArray
+    asked: Asked | None = None
     bodies: Sequence[Body] = ()
     earliest: IntArray | None = None
     loose: FloatArray | None = None
@@ -211,6 +229,8 @@ class FlightProgram:
                 _LANDING_WEIGHT,
             ),
         ]
+        if self.asked is not None:
+            made += _as_asked(self.asked, route, visits)
         if len(self.space.keep_m):
             stage, normal, bound = separating_rows(self.space, path_m, _NEAR_M)
             made.append(_planes(stage, normal, bound))
@@ -251,6 +271,22 @@ def _balls(
     m = len(stage)
     rows = np.broadcast_to(states, (m, 3))
     return SoftRows(stage, np.ones(m, bool), rows, centre, radius, np.full(m, weight))
+
+
+def _as_asked(asked: Asked, route: IntArray, visits: IntArray) -> list[SoftRows]:
+    """Rows that keep visits slow and high enough, but for those of which nothing is asked."""
+    speed_mps = asked.max_speed_mps[route]
+    slow = np.isfinite(speed_mps)
+    most_mps = _SLOW_SHARE * speed_mps[slow]
+    made = [_balls(visits[slow], VELOCITY, np.zeros((slow.sum(), 3)), most_mps, _SLOW_WEIGHT)]
+    for end, up in ((0, 1.0), (1, -1.0)):  # z is down: at least is z ≤ -height
+        height_m = asked.heights_m[route, end]
+        bound = np.isfinite(height_m)
+        low_m, high_m = asked.heights_m[route[bound]].T
+        spare_m = np.minimum(_HEIGHT_SPARE_M, 0.25 * (high_m - low_m))
+        normal = np.broadcast_to(np.array([0.0, 0.0, up]), (int(bound.sum()), 3))
+        made.append(_planes(visits[bound], normal, -up * height_m[bound] - spare_m))
+    return made
 
 
 def _planes(stage: IntArray, normal: FloatArray, bound: FloatArray) -> SoftRows:

@@ -9,6 +9,7 @@ from uas_coverage_env.env.observation.nearest import NO_TARGET
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY, GoTo
+from uas_coverage_env.world.coverage import can_cover
 
 HOME_CHOICE = K_WAYPOINTS
 """The waypoint action that flies home."""
@@ -48,6 +49,8 @@ def _express(arena, state, tables, learners, i, parameters, command):
     if not choices.size:
         if not state.uncovered[command.waypoint]:
             raise ValueError(f"waypoint {command.waypoint} is covered already")
+        if not can_cover(arena, i, command.waypoint):
+            raise ValueError(f"waypoint {command.waypoint} asks for a sensor that it lacks")
         raise ValueError(
             f"waypoint {command.waypoint} is not among the {K_WAYPOINTS} nearest open ones"
         )
@@ -57,9 +60,9 @@ def _express(arena, state, tables, learners, i, parameters, command):
 WAYPOINT = ActionKind(
     name="waypoint",
     meaning=(
-        "Fly to that one of the nearest open waypoints, in the order of the observation; the last "
-        "choice is home. A choice that does not exist now keeps the former target; before the "
-        "first, and with none, a UAS stays where it is."
+        "Fly to that one of the nearest open waypoints that it can cover, in the order of the "
+        "observation; the last choice is home. A choice that does not exist now keeps the former "
+        "target; before the first, and with none, a UAS stays where it is."
     ),
     write=write,
     choices=HOME_CHOICE + 1,

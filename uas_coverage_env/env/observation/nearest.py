@@ -13,6 +13,7 @@ from uas_coverage_env.env.observation.scales import CROWD, CROWD_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.world.coverage import can_cover
 
 NO_TARGET = -2
 """Target of a UAS that has none; home is world's HOME, waypoints are their indices."""
@@ -77,6 +78,8 @@ def _open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
 def nearest_waypoints(arena, state, i, candidates):
     """The open waypoints nearest to UAS i; of two equally near, the first of the scenario.
 
+    Those that ask for a sensor which it does not carry are none of them.
+
     Args:
         arena: The arena.
         state: The state of the world.
@@ -91,11 +94,12 @@ def nearest_waypoints(arena, state, i, candidates):
     columns = arena.waypoint_columns
     uncovered = state.uncovered
     n_waypoints = uncovered.shape[0]
+    asks = arena.rules[0].asks
     away_m2 = stack_array(K_WAYPOINTS)
     found = 0
     for c in range(K_WAYPOINTS):
         w = candidates[c]
-        if 0 <= w < n_waypoints and uncovered[w]:
+        if 0 <= w < n_waypoints and uncovered[w] and (not asks or can_cover(arena, i, w)):
             m2 = _away_m2(columns, w, x, y, z)
             found = insert(candidates, away_m2, found, w, m2)
     for first in range(0, n_waypoints, _WORD):
@@ -114,6 +118,8 @@ def nearest_waypoints(arena, state, i, candidates):
         while bits != 0:
             w = first + lowest_bit(bits)
             bits &= bits - 1
+            if asks and not can_cover(arena, i, w):
+                continue
             m2 = _away_m2(columns, w, x, y, z)
             found = insert(candidates, away_m2, found, w, m2)
     for c in range(found, K_WAYPOINTS):

@@ -1,5 +1,7 @@
 """The map with past and predicted paths and charge rings (Gasche et al., Fig. 1 and 2)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,12 +12,14 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, covered_at
+from uas_coverage_env.flight import MODES, Flight, SeenGround, covered_at, seen_ground
 from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade, uas_colour
 from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.vehicle import PSI
 
 _LEGEND_IN = 0.55
+_SEEN_TINTS = (colours.SKY, colours.ORANGE, colours.PURPLE, colours.YELLOW)
+_SEEN_ALPHA = 0.4
 
 
 def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
@@ -47,6 +51,8 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         # the fence is the frame
         axes.spines[["left", "bottom"]].set_visible(False)
         _terrain(axes, flight)
+        seen = seen_ground(flight, now)
+        _seen_ground(axes, seen)
         _waypoints(axes, flight, now)
         _moving_obstacles(axes, flight, now)
         for i in range(len(flight.names)):
@@ -56,7 +62,10 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         title += f"{flight.covered[now]} of {len(flight.scenario.waypoints)} waypoints"
         axes.set_title(title, fontsize=9, parse_math=False)
         figure.legend(
-            handles=_legend(flight), loc="outside lower center", ncols=6, columnspacing=1.2
+            handles=_legend(flight, seen),
+            loc="outside lower center",
+            ncols=4 if seen else 6,
+            columnspacing=1.2,
         )
     return figure
 
@@ -80,6 +89,19 @@ def _terrain(axes: Axes, flight: Flight) -> None:
         corners = _flat(outline_of(hull))
         axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor=edge, linewidth=0.6))
     axes.add_patch(Polygon(fence, fill=False, edgecolor=shade(colours.INK), linewidth=1.2))
+
+
+def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
+    """The ground that cameras have seen, under waypoints and paths; darker where several have."""
+    for ground, tint in zip(seen, _SEEN_TINTS, strict=False):
+        if ground.seen.any():
+            axes.contourf(
+                *(ground.east_m, ground.north_m, ground.seen.astype(float)),
+                levels=(0.5, 1.5),
+                colors=[shade(tint)],
+                alpha=_SEEN_ALPHA,
+                zorder=1,
+            )
 
 
 def _waypoints(axes: Axes, flight: Flight, now: int) -> None:
@@ -167,7 +189,7 @@ def _violations(axes: Axes, flight: Flight, now: int) -> None:
             axes.plot(x, y, "X", color=shade(colours.RED), markeredgecolor="white", markersize=9)
 
 
-def _legend(flight: Flight) -> list[Line2D]:
+def _legend(flight: Flight, seen: Sequence[SeenGround]) -> list[Line2D]:
     ring = {"marker": "o", "linestyle": "", "mfc": "none", "markersize": 8}
     charge = [
         Line2D([], [], **ring, mec=shade(colours.of_charge(soc)), markeredgewidth=2, label=label)
@@ -181,4 +203,15 @@ def _legend(flight: Flight) -> list[Line2D]:
         marks.append(
             Line2D([], [], color=uas_colour(0), marker=".", ls="", ms=3, label="predicted")
         )
+    marks += [
+        Line2D(
+            *([], []),
+            color=(*shade(tint), _SEEN_ALPHA),
+            marker="s",
+            ls="",
+            ms=7,
+            label=f"seen by {ground.sensor}, {ground.share:.0%}",
+        )
+        for ground, tint in zip(seen, _SEEN_TINTS, strict=False)
+    ]
     return [*marks, *charge]
