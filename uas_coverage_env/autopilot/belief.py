@@ -29,11 +29,9 @@ from uas_coverage_env.vehicle import (
     lpv_step,
     plant_step,
 )
+from uas_coverage_env.vehicle.tube import FORGETS_S
 from uas_coverage_env.world.commands import CLIMB, VELOCITY, WRENCH
 from uas_coverage_env.world.state import CONSUMPTION, EXPECTED, SINK, WIND
-
-FORGETS_S = 2.0
-"""The belief in wind and sink follows what is seen with this time constant [s]."""
 
 SEES_CONSUMPTION_S = 30.0
 """Likewise that in the consumption, which takes longer to tell from noise [s]."""

@@ -2,6 +2,7 @@
 
 from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.checks import warnings
+from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.families import Family, Size, installed_families
 from uas_coverage_env.scenario.family import (
@@ -41,6 +42,7 @@ __all__ = [
     "FAMILIES",
     "LEVELS",
     "SERIES",
+    "Conditions",
     "Decoration",
     "DisturbanceTable",
     "Family",
@@ -66,6 +68,7 @@ __all__ = [
     "Uncertainty",
     "Waypoint",
     "Wind",
+    "conditions_of",
     "flood_village",
     "generate_scenario",
     "installed_families",
