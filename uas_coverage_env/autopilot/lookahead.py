@@ -355,9 +355,7 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
         if j == i or status[j] != FLYING:
             continue
         other_m = committed_m[j]
-        least_m = (
-            arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
-        )
+        least_m = arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
         now_m = max(
             math.hypot(path_m[0, 0] - other_m[0, 0], path_m[0, 1] - other_m[0, 1]),
             abs(path_m[0, 2] - other_m[0, 2]),

@@ -203,14 +203,35 @@ def _scene(scenario: UncheckedScenario) -> list[str]:
     ]
 
 
+def out_of_reach(scenario: UncheckedScenario, more_m: float) -> list[int]:
+    """Waypoints of whose spheres no part keeps all safe distances.
+
+    Args:
+        scenario: The scenario.
+        more_m: Kept beyond them from obstacles, and horizontally from the fence [m].
+    """
+    every = range(len(scenario.waypoints))
+    return [index for index in every if not _free_part(scenario, index, more_m)[1].any()]
+
+
+def _free_part(
+    scenario: UncheckedScenario, index: int, more_m: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points (P, 3) of a waypoint's sphere, and whether each keeps all safe distances (P,)."""
+    radius_m, waypoint = min(uas.radius_m for uas in scenario.uas), scenario.waypoints[index]
+    points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
+    fence, margin_m = scenario.fence, scenario.geofence.margin_m
+    level = np.hypot(fence.normals[:, 0], fence.normals[:, 1])
+    free = (fence.face_distances(points) + more_m * level <= -margin_m).all(axis=1)
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m + more_m
+    return points, free
+
+
 def _waypoints_out_of_reach(scenario: UncheckedScenario) -> Iterator[str]:
-    radius_m = min(uas.radius_m for uas in scenario.uas)
     for index, waypoint in enumerate(scenario.waypoints):
-        points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
-        free = scenario.fence.signed_distance(points) <= -scenario.geofence.margin_m
+        points, free = _free_part(scenario, index, 0.0)
         high = _is_high_enough(scenario, points)
-        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-            free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m
         if free.any() and not (free & high).any():
             yield (
                 f"waypoints[{index}].position_m: the sphere around {_point(waypoint.position_m)} "

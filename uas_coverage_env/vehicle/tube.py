@@ -5,8 +5,8 @@ with |d| at most D in every step, the wind that blows less the one believed in. 
 deviation over all sequences of d is D times the sum of the absolute responses: the box around the
 minimal robust invariant set (Raković et al., IEEE Trans. Autom. Control 50(3), 2005), exact for a
 linear loop.
-Both axes have the same map, so the worst sequence keeps to one line of the plane. Vertical wind moves
-no vehicle: its drag is horizontal.
+Both axes have the same map, so the worst sequence keeps to one line of the plane. Vertical wind
+moves no vehicle: its drag is horizontal.
 
 A loop that goes on learning the wind has the belief b as a fifth state, b⁺ = b + g (d - b): then
 even the position stays within a bound, although nothing feeds it back.

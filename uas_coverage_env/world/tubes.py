@@ -10,12 +10,13 @@ UNKNOWN_M = 0.7
 """Where disturbances act, at least this much more is kept from everything: less than the metre that
 routes keep, so that no route is closed [m]."""
 
+
 def tubes_m(scenario: Scenario, steps: int, disturbed: bool) -> NDArray[np.float64]:
     """How far each UAS may be from where it is predicted to be.
 
     For the wind that the scenario's conditions state: the exact bound of every wind that departs by
-    no more than stated from what is believed when the prediction begins. Where something acts of which nothing is
-    stated, UNKNOWN_M at all times; where nothing acts, nothing.
+    no more than stated from what is believed when the prediction begins. Where something acts of
+    which nothing is stated, UNKNOWN_M at all times; where nothing acts, nothing.
 
     Args:
         scenario: The scenario.

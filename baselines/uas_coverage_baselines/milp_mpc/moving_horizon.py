@@ -11,7 +11,7 @@ from typing import Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
+from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering, velocities
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -81,7 +81,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission."""
-        self.dt_s = brief.dt_s
+        self.dt_s, self._steers = brief.dt_s, self.options.tube and brief.conditions is not None
         self.plan = self._backup = None
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
@@ -146,6 +146,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
         self.last_decision = Decision(paths, reason is not None, gap, reason)
+        if self._steers:
+            return velocities(plan, swarm, self.dt_s, self._announced)
         return first_inputs(plan, swarm, self._announced)
 
     def _overruled(
