@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 
-from robustness_rows import NOT_MADE, ROWS
+from robustness_rows import ROWS
 from robustness_rows.row import Finding, Row, errors, markdown
 from robustness_rows.store import Store
 
@@ -43,9 +43,6 @@ def page(stores: Mapping[str, Store], quick: bool) -> tuple[str, bool]:
         counted = f"{finding.trials:,} {row.unit}"
         summary.append((name, row.title, counted, f"{finding.failures:,}", bound))
         parts.append(_section(row, store, finding, quick))
-    for name, (title, reason) in NOT_MADE.items():
-        summary.append((name, title, "not covered", "–", "–"))
-        parts.append(f"## {name}: {title}\n\nNot covered here: {reason}\n")
     summary.sort(key=lambda line: int(line[0][1:]))
     parts.sort(key=lambda part: int(part[4 : part.index(":")]))
     headings = ("row", "what", "tried", "failed", "share at most")
