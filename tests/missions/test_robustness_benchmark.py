@@ -5,12 +5,8 @@ import pytest
 import robustness
 from robustness_rows import (
     ROWS,
-    batteries,
-    decisions,
-    exported,
     faults,
     fuzz,
-    judge,
     missions,
     players,
 )

@@ -22,6 +22,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
+from uas_coverage_baselines.milp_mpc.steering import Steering
 from uas_coverage_baselines.milp_mpc.unheard import Unheard
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import Attempts, Handover, MissionBrief, first_sight, without
@@ -81,7 +82,12 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission."""
-        self.dt_s, self._steers = brief.dt_s, self.options.tube and brief.conditions is not None
+        self.dt_s = brief.dt_s
+        stated = brief.conditions is not None
+        self._has_tube = stated and self.options.in_wind == "tube"
+        self._steering: Steering | None = None
+        if stated and self.options.in_wind == "guidance":
+            self._steering = Steering(brief, self.options, seed)
         self.plan = self._backup = None
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
@@ -96,7 +102,11 @@ class MovingHorizon(ABC, Generic[Chosen]):
         if not swarm.active:
             return {}
         silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
-        commands = self._of_workers(without(swarm, silent), swarm, silent)
+        if self._steering is None:
+            commands = self._of_workers(without(swarm, silent), swarm, silent)
+        else:
+            commands = self._steering.commands(without(swarm, silent))
+            self.last_decision = Decision({})
         home = {swarm.names[u]: GoTo(None) for u in np.flatnonzero(silent)}
         return {**commands, **home}
 
@@ -146,7 +156,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
         self.last_decision = Decision(paths, reason is not None, gap, reason)
-        if self._steers:
+        if self._has_tube:
             return velocities(plan, swarm, self.dt_s, self._announced)
         return first_inputs(plan, swarm, self._announced)
 

@@ -61,10 +61,11 @@ class OcpOptions(PlannerOptions):
     moving_speed_mps: float = Field(
         default=15.0, gt=0.0, le=100.0, description="speed up to which it is assumed to accelerate"
     )
-    tube: bool = Field(
-        default=True,
-        description="where bounds of wind or vehicles are stated: clearances grow along the "
-        "horizon by what these do to a plan, and its velocities are commanded, not its wrenches",
+    in_wind: Literal["guidance", "tube", "wrenches"] = Field(
+        default="guidance",
+        description="what is flown where bounds of wind or vehicles are stated: the order by the "
+        "world's guidance; tube MPC (clearances that grow along the horizon, velocities are "
+        "commanded); or plans as in still air",
     )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),

@@ -69,7 +69,7 @@ class ProblemBuilder:
         self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
         self._waypoint_weight = np.array([w.weight for w in brief.waypoints], float)
         self._getaway_m = self._getaway_margins()
-        self._has_tube = options.tube and brief.conditions is not None
+        self._has_tube = options.in_wind == "tube" and brief.conditions is not None
 
     def vehicle(self, name: str) -> VehicleParams:
         """Parameters of a UAS's vehicle."""
