@@ -22,17 +22,23 @@ trials as they are drawn here: missions of other kinds may fail more often. Vers
 """
 
 
-def page(stores: Mapping[str, Store], quick: bool) -> tuple[str, bool]:
+def page(stores: Mapping[str, Store], quick: bool, before: str = "") -> tuple[str, bool]:
     """The text of the page, and whether anything failed its claim.
 
     Args:
         stores: Results of every row, by its name.
         quick: Whether the quick sizes were asked for.
+        before: The page as it is: rows of which there are no results keep what it says.
     """
-    parts, summary, failed = [], [], False
+    parts, summary, failed, known = [], [], False, _made_before(before)
     for name, row in ROWS.items():
         store = stores[name]
         results = {key: entry["result"] for key, entry in store.entries.items()}
+        if not results and name in known:
+            line, part = known[name]
+            summary.append(line)
+            parts.append(part)
+            continue
         if not results:
             summary.append((name, row.title, "not made", "–", "–"))
             parts.append(f"## {name}: {row.title}\n\nNot made in this run.\n")
@@ -48,6 +54,21 @@ def page(stores: Mapping[str, Store], quick: bool) -> tuple[str, bool]:
     headings = ("row", "what", "tried", "failed", "share at most")
     head = _HEAD.format(option=" --quick" if quick else "", version=version("uas-coverage-env"))
     return "\n".join([head, _left(markdown(headings, summary)), "", *parts]), failed
+
+
+def _made_before(text: str) -> dict[str, tuple[tuple[str, ...], str]]:
+    """Row -> its line in the table at the top, and its section, of those that were made."""
+    sections = {part.split(":", 1)[0]: f"## {part}" for part in text.split("\n## ")[1:]}
+    lines = [
+        tuple(cell.strip() for cell in line.strip("| \n").split("|"))
+        for line in text.split("\n## ")[0].splitlines()
+        if line.startswith("| R")
+    ]
+    return {
+        line[0]: (line, sections[line[0]].rstrip("\n") + "\n")
+        for line in lines
+        if line[0] in sections and "\nClaim: " in sections[line[0]]
+    }
 
 
 def _section(row: Row, store: Store, finding: Finding, quick: bool) -> str:
