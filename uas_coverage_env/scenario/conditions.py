@@ -49,7 +49,8 @@ class Conditions(StrictModel):
 
 
 def conditions_of(wind: Wind | None, uncertainty: Uncertainty | None) -> Conditions | None:
-    """What is stated of a mission with these tables; None without both."""
+    """What is stated of a mission with these tables; None where these change nothing."""
+    uncertainty = None if uncertainty == Uncertainty() else uncertainty
     if wind is None and uncertainty is None:
         return None
     if wind is None:
@@ -62,6 +63,8 @@ def conditions_of(wind: Wind | None, uncertainty: Uncertainty | None) -> Conditi
     unknown_mps = math.hypot(
         _OF_TURBULENCE * turbulent_mps, _OF_A_GUST * max(gusts_mps, default=0.0)
     )
+    if uncertainty is None and mean_mps == unknown_mps == wind.up_mps == 0.0:
+        return None
     return Conditions(mean_mps=mean_mps, unknown_mps=unknown_mps, uncertainty=uncertainty)
 
 
