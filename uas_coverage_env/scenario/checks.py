@@ -222,7 +222,8 @@ def _free_part(
     points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
     fence, margin_m = scenario.fence, scenario.geofence.margin_m
     level = np.hypot(fence.normals[:, 0], fence.normals[:, 1])
-    free = (fence.face_distances(points) + more_m * level <= -margin_m).all(axis=1)
+    inside = fence.face_distances(points) + more_m * level <= -margin_m
+    free: NDArray[np.bool_] = np.asarray(inside.all(axis=1))
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
         free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m + more_m
     return points, free
