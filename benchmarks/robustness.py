@@ -6,7 +6,8 @@
 Tries what the rows of the page say and writes `RELIABILITY.md`: numbers, seeds, dates and exact
 binomial bounds. Every result is kept in `--out` (JSON lines, a file per row), and what is there is
 not tried again: a run that was stopped, or that `--minutes` ended, goes on where it was. Results of
-other source code are used, and the page says so; remove the file of a row to make it anew.
+other source code are used, and the page says so; remove the file of a row to make it anew. A row of
+which `--out` has nothing keeps what the page says of it.
 
 `--quick` takes about ten minutes on two quiet cores. Exits 0 where nothing failed its claim, 1
 otherwise, 2 where the input is bad, 130 where it was stopped by hand.
@@ -106,10 +107,11 @@ def main(
     """Try what the rows say, and write the page."""
     asked = [ROWS[name] for name in chosen(rows, ROWS, "row")]
     stores = make(asked, quick, jobs, minutes, out)
-    # rows that were not asked for stand on the page with what there is of them
+    # rows that were not asked for stand on the page with what there is of them, or was
     stores |= {name: Store(out, name) for name in ROWS if name not in stores}
-    text, failed = page(stores, quick)
     try:
+        before = page_file.read_text(encoding="utf-8") if page_file.exists() else ""
+        text, failed = page(stores, quick, before)
         page_file.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{page_file}: cannot be written: {error.strerror}") from error

@@ -214,7 +214,5 @@ ROW = Row(
     "could survive. Return mode and safety filter are on. Breaches are not counted here: a zone "
     "that is closed round a UAS is one until it is left. A UAS that has landed does not take off "
     "again: where one is lost when the others are home, what it leaves stays open, which counts as "
-    "failed. A limit that is exceeded counts as failed, too, even where the fault is the cause: a "
-    "damaged motor that cannot give what is asked for makes the inner loop believe in a sink, and "
-    "the next climb is too fast.",
+    "failed. A limit that is exceeded counts as failed, too, even where the fault is the cause.",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 
-from robustness_rows import NOT_MADE, ROWS
+from robustness_rows import ROWS
 from robustness_rows.row import Finding, Row, errors, markdown
 from robustness_rows.store import Store
 
@@ -22,17 +22,23 @@ trials as they are drawn here: missions of other kinds may fail more often. Vers
 """
 
 
-def page(stores: Mapping[str, Store], quick: bool) -> tuple[str, bool]:
+def page(stores: Mapping[str, Store], quick: bool, before: str = "") -> tuple[str, bool]:
     """The text of the page, and whether anything failed its claim.
 
     Args:
         stores: Results of every row, by its name.
         quick: Whether the quick sizes were asked for.
+        before: The page as it is: rows of which there are no results keep what it says.
     """
-    parts, summary, failed = [], [], False
+    parts, summary, failed, known = [], [], False, _made_before(before)
     for name, row in ROWS.items():
         store = stores[name]
         results = {key: entry["result"] for key, entry in store.entries.items()}
+        if not results and name in known:
+            line, part = known[name]
+            summary.append(line)
+            parts.append(part)
+            continue
         if not results:
             summary.append((name, row.title, "not made", "–", "–"))
             parts.append(f"## {name}: {row.title}\n\nNot made in this run.\n")
@@ -43,14 +49,26 @@ def page(stores: Mapping[str, Store], quick: bool) -> tuple[str, bool]:
         counted = f"{finding.trials:,} {row.unit}"
         summary.append((name, row.title, counted, f"{finding.failures:,}", bound))
         parts.append(_section(row, store, finding, quick))
-    for name, (title, reason) in NOT_MADE.items():
-        summary.append((name, title, "not covered", "–", "–"))
-        parts.append(f"## {name}: {title}\n\nNot covered here: {reason}\n")
     summary.sort(key=lambda line: int(line[0][1:]))
     parts.sort(key=lambda part: int(part[4 : part.index(":")]))
     headings = ("row", "what", "tried", "failed", "share at most")
     head = _HEAD.format(option=" --quick" if quick else "", version=version("uas-coverage-env"))
     return "\n".join([head, _left(markdown(headings, summary)), "", *parts]), failed
+
+
+def _made_before(text: str) -> dict[str, tuple[tuple[str, ...], str]]:
+    """Row -> its line in the table at the top, and its section, of those that were made."""
+    sections = {part.split(":", 1)[0]: f"## {part}" for part in text.split("\n## ")[1:]}
+    lines = [
+        tuple(cell.strip() for cell in line.strip("| \n").split("|"))
+        for line in text.split("\n## ")[0].splitlines()
+        if line.startswith("| R")
+    ]
+    return {
+        line[0]: (line, sections[line[0]].rstrip("\n") + "\n")
+        for line in lines
+        if line[0] in sections and "\nClaim: " in sections[line[0]]
+    }
 
 
 def _section(row: Row, store: Store, finding: Finding, quick: bool) -> str:

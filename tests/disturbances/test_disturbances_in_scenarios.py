@@ -128,11 +128,14 @@ def test_a_scenario_without_tables_is_written_as_before_there_were_any():
     assert windy.model_copy(update={"wind": None}) == still
 
 
-def test_no_planner_is_told_of_disturbances():
+def test_no_planner_is_told_of_disturbances_but_for_the_bounds_that_are_stated():
     tables = {"wind": Wind(mean_mps=4.0, from_deg=270.0), "disturbances": {"g": Gusts(sigma_mps=1)}}
     windy = meadow(HIGH).model_copy(update=tables)
     brief = MissionBrief.of(windy)
-    assert brief == MissionBrief.of(meadow(HIGH))
+    told = brief.model_dump() | {"conditions": None}
+    assert told == MissionBrief.of(meadow(HIGH)).model_dump()
+    other = windy.model_copy(update={"wind": Wind(mean_mps=1.3, from_deg=20.0)})
+    assert MissionBrief.of(other) == brief
     assert disturbances_of(brief.as_scenario()) == ()
 
 

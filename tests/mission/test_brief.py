@@ -169,7 +169,7 @@ def test_two_missions_that_differ_in_what_is_going_to_happen_have_the_same_brief
 def test_every_field_of_a_scenario_is_deliberately_public_or_hidden():
     for record, public in PUBLIC.items():
         assert set(record.model_fields) == public | HIDDEN.get(record, set()), record
-    assert set(MissionBrief.model_fields) == PUBLIC[Scenario] | {"vehicles"}
+    assert set(MissionBrief.model_fields) == PUBLIC[Scenario] | {"vehicles", "conditions"}
     assert set(MovingObstacleBrief.model_fields) == PUBLIC[MovingObstacle]
 
 
@@ -183,7 +183,7 @@ def test_a_field_that_a_scenario_gains_is_hidden(scenario):
 
 def test_public_fields_are_those_of_the_scenario(scenario):
     brief = MissionBrief.of(scenario)
-    for name in (PUBLIC[Scenario] | {"vehicles", "hulls"}) - {"moving_obstacles"}:
+    for name in (PUBLIC[Scenario] | {"vehicles", "hulls", "conditions"}) - {"moving_obstacles"}:
         assert getattr(brief, name) == getattr(scenario, name), name
     assert brief.fence is scenario.fence
     (kite,) = brief.moving_obstacles

@@ -29,11 +29,9 @@ from uas_coverage_env.vehicle import (
     lpv_step,
     plant_step,
 )
+from uas_coverage_env.vehicle.tube import FORGETS_S
 from uas_coverage_env.world.commands import CLIMB, VELOCITY, WRENCH
 from uas_coverage_env.world.state import CONSUMPTION, EXPECTED, SINK, WIND
-
-FORGETS_S = 2.0
-"""The belief in wind and sink follows what is seen with this time constant [s]."""
 
 SEES_CONSUMPTION_S = 30.0
 """Likewise that in the consumption, which takes longer to tell from noise [s]."""
@@ -111,12 +109,16 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
     if command.kind != WRENCH:
         lift_N = u[LIFT] - belief[SINK] / vehicle.vertical_B[1]
         # lift takes from the speed downwards: the lift of the fastest descent is the least
-        held_mps = vehicle.vertical_A[1, 1] * x[VZ] + belief[SINK]
+        # neither limit relies on a sink that may have ended: a motor gives less than it is asked
+        # for at its limit only, air sinks here and not there
+        held_mps = vehicle.vertical_A[1, 1] * x[VZ]
         margin_mps = vertical_margin_mps(belief)
         down_mps = vehicle.v_down_max_mps - margin_mps
         up_mps = vehicle.v_up_max_mps - margin_mps
-        lift_N = max(lift_N, (down_mps - held_mps) / vehicle.vertical_B[1])
-        lift_N = min(lift_N, (-up_mps - held_mps) / vehicle.vertical_B[1])
+        descending_mps = held_mps + max(belief[SINK], 0.0)
+        climbing_mps = held_mps + min(belief[SINK], 0.0)
+        lift_N = max(lift_N, (down_mps - descending_mps) / vehicle.vertical_B[1])
+        lift_N = min(lift_N, (-up_mps - climbing_mps) / vehicle.vertical_B[1])
         u[LIFT] = min(max(lift_N, vehicle.lift_min_N), vehicle.lift_max_N)
 
 

@@ -35,10 +35,6 @@ TOLERANCE_M = 1e-3
 PLENTY_M = 2.0
 """More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
 
-UNKNOWN_M = 0.7
-"""Where disturbances are declared, this much more is kept from fixed obstacles, and twice as much
-from other UAS: less than the metre that routes keep, so that no route is closed [m]."""
-
 SURPRISE_S = 1.0
 """What moves may turn: its keep-out is widened by how far it goes in this time [s]."""
 
@@ -156,28 +152,32 @@ def _box_of(path_m, n_flown, low, high):
 
 
 @kernel
-def _fence_slack(arena, path_m, n_flown, low, high, slack_m):
+def _fence_slack(arena, i, path_m, n_flown, low, high, slack_m):
     """The smaller of slack_m and the distance to spare from the geofence along a path."""
     rules = arena.rules[0]
+    tube_m = arena.tube_m
     normals = arena.normals
     offsets_m = arena.offsets_m
     required_m = rules.fence_margin_m
     for h in range(rules.fence_first, rules.fence_last):
         outermost = offsets_m[h]
+        # disturbances move a UAS horizontally
+        level = math.hypot(normals[h, 0], normals[h, 1])
         for axis in range(3):
             outermost += max(normals[h, axis] * low[axis], normals[h, axis] * high[axis])
-        if -outermost - required_m >= slack_m:
+        if -outermost - required_m - level * tube_m[i, n_flown] >= slack_m:
             # the whole box around the path is far enough from this face
             continue
         for k in range(1, n_flown + 1):
             spare_m = -signed_distance(
                 normals, offsets_m, h, h + 1, path_m[k, 0], path_m[k, 1], path_m[k, 2]
             )
-            if spare_m - required_m < slack_m:
+            kept_m = required_m + level * tube_m[i, k]
+            if spare_m - kept_m < slack_m:
                 now_m = -signed_distance(
                     normals, offsets_m, h, h + 1, path_m[0, 0], path_m[0, 1], path_m[0, 2]
                 )
-                slack_m = min(slack_m, spare_m - _kept_m(required_m, now_m))
+                slack_m = min(slack_m, spare_m - _kept_m(kept_m, now_m))
     return slack_m
 
 
@@ -206,25 +206,27 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
         slack_m: Slack known so far [m].
 
     Returns:
-        The smaller of slack_m and the distance to spare [m].
+        The smaller of slack_m and the distance to spare [m]: beyond the tube, which grows along the
+        path, since disturbances lead off the more the longer they last.
     """
     low = stack_array(3)
     high = stack_array(3)
     _box_of(path_m, n_flown, low, high)
-    slack_m = _fence_slack(arena, path_m, n_flown, low, high, slack_m)
+    slack_m = _fence_slack(arena, i, path_m, n_flown, low, high, slack_m)
     if arena.rules[0].min_height_m > 0.0:
         slack_m = _height_slack(arena, i, path_m, n_flown, slack_m)
     normals = arena.normals
     offsets_m = arena.offsets_m
-    unknown_m = UNKNOWN_M if arena.rules[0].disturbed else 0.0
+    tube_m = arena.tube_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         if box_apart(obstacle, low[0], low[1], low[2], high[0], high[1], high[2]):
             continue
         first = obstacle.first_kept
         last = obstacle.last_kept
-        required_m = arena.uas[i].radius_m + obstacle.safe_distance_m + unknown_m
+        least_m = arena.uas[i].radius_m + obstacle.safe_distance_m
         for k in range(n_flown):
+            required_m = least_m + tube_m[i, k + 1]
             x0 = path_m[k, 0]
             y0 = path_m[k, 1]
             z0 = path_m[k, 2]
@@ -348,21 +350,18 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
     Returns:
         The smaller of slack_m and the distance to spare [m].
     """
-    unknown_m = 2.0 * UNKNOWN_M if arena.rules[0].disturbed else 0.0
+    tube_m = arena.tube_m
     for j in range(status.shape[0]):
         if j == i or status[j] != FLYING:
             continue
         other_m = committed_m[j]
-        required_m = (
-            arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
-        )
-        required_m += unknown_m
+        least_m = arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
         now_m = max(
             math.hypot(path_m[0, 0] - other_m[0, 0], path_m[0, 1] - other_m[0, 1]),
             abs(path_m[0, 2] - other_m[0, 2]),
         )
-        required_m = _kept_m(required_m, now_m)
         for k in range(path_m.shape[0] - 1):
+            required_m = _kept_m(least_m + tube_m[i, k + 1] + tube_m[j, k + 1], now_m)
             if _paths_apart(path_m, other_m, k, required_m + max(slack_m, 0.0)):
                 continue
             apart_m = separation_at(path_m, other_m, k)

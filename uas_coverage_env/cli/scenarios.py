@@ -15,12 +15,22 @@ from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.draw import picture
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import SERIES, Scenario, load_scenario, scenario_names
+from uas_coverage_env.scenario import (
+    SERIES,
+    Scenario,
+    load_scenario,
+    out_of_reach,
+    scenario_names,
+)
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.tube import tube_of
 from uas_coverage_env.world.arena import LOOKAHEAD_S
+from uas_coverage_env.world.tubes import UNKNOWN_M
 
 _PICTURE_PX = 1024
+_NAMED = 8
+_SLOWLY_S = 3.0
+"""In this time a UAS brakes that creeps up to a waypoint."""
 # what we write into a picture, so that it may be drawn again; other files are left alone
 _MARK = ("Software", "uas-coverage scenarios check")
 
@@ -126,17 +136,33 @@ def _place(scenario: Scenario) -> list[str]:
 
 
 def _tubes(scenario: Scenario) -> list[str]:
-    """By vehicle: how far a wind other than the one believed in leads while a UAS brakes."""
-    if scenario.wind is None:
+    """What the stated wind asks for: clearances by vehicle, and the waypoints that they close."""
+    stated = scenario.conditions
+    if scenario.wind is None or stated is None:
         return []
-    lines, steps = [], math.ceil(LOOKAHEAD_S / scenario.dt_s)
+    lines = [
+        f"stated: mean wind up to {stated.mean_mps:g} m/s, of which up to "
+        f"{stated.unknown_mps:.1f} m/s at a time is not known in flight"
+    ]
+    steps, slowly_m = math.ceil(LOOKAHEAD_S / scenario.dt_s), UNKNOWN_M
     for vehicle in dict.fromkeys(scenario.vehicles):
-        tube = tube_of(vehicle, scenario.dt_s, steps)
-        after = ", ".join(f"{tube.position[k]:.2f}" for k in (1, steps // 4, steps))
-        at_s = ", ".join(f"{k * scenario.dt_s:g}" for k in (1, steps // 4, steps))
+        tube = tube_of(vehicle, scenario.dt_s, steps, learns=True)
+        kept_m = np.maximum(UNKNOWN_M, stated.unknown_mps * tube.position)
+        at = (1, round(_SLOWLY_S / scenario.dt_s), steps)
+        after = ", ".join(f"{kept_m[k]:.1f}" for k in at)
+        at_s = ", ".join(f"{k * scenario.dt_s:g}" for k in at)
         lines.append(
-            f"{vehicle.name}: per m/s of wind that is not believed in, {after} m after {at_s} s, "
-            f"{tube.velocity:.2f} m/s, {math.degrees(tube.tilt):.1f} degrees of tilt"
+            f"{vehicle.name}: {after} m more are kept where it brakes within {at_s} s; off by up "
+            f"to {stated.unknown_mps * tube.velocity:.1f} m/s and "
+            f"{math.degrees(stated.unknown_mps * tube.tilt):.0f} degrees of tilt"
+        )
+        slowly_m = max(slowly_m, float(kept_m[at[1]]))
+    closed = sorted(set(out_of_reach(scenario, slowly_m)) - set(out_of_reach(scenario, 0.0)))
+    if closed:
+        names = ", ".join(f"waypoints[{index}]" for index in closed[:_NAMED])
+        more = f" and {len(closed) - _NAMED} more" if len(closed) > _NAMED else ""
+        lines.append(
+            f"out of reach in this wind: {names}{more}; there is no room with {slowly_m:.1f} m more"
         )
     return lines
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES
-from uas_coverage_env.env.pool import MissionPool, ScenarioPool
+from uas_coverage_env.env.pool import MissionPool, ScenarioPool, check_scene
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
@@ -123,6 +123,7 @@ class DrawnPool:
     def _check_events(self, scenario: Scenario) -> None:
         """Refuse more events, or others, than there is room for."""
         n_events, n_sensed = len(scenario.events), len(scenario.uas) * is_eventful(scenario)
+        check_scene(scenario)
         if (
             n_events > self.sizes["E"]
             or n_sensed > self.sizes["S"]

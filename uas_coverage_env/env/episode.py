@@ -15,6 +15,7 @@ from uas_coverage_env.env.global_state import global_state
 from uas_coverage_env.env.infos import Infos
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
+from uas_coverage_env.env.observation.nearest import count_company
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
@@ -22,7 +23,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import SwarmState
+from uas_coverage_env.world import FLYING, SwarmState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 
@@ -40,7 +41,9 @@ class Episode:
 
     Attributes:
         settings: As given.
-        scenario: The scenario flown, with `max_steps` as given by `settings.max_cycles`.
+        scenario: The scenario flown, with `max_steps` as given by `settings.max_cycles`; where
+            events have changed the scene, as it is now.
+        revisions: How often they have since t = 0.
         names: Of all UAS, in order.
         actions: The kind of action.
         max_cycles: Steps after which the episode is cut.
@@ -69,20 +72,40 @@ class Episode:
             measured_m=0.0,  # only what counts: nothing more is told
             disturbances=settings.disturbances_in(scenario),
         )
-        self.scenario = scenario
         self.names = self._world.names
         self.max_cycles = scenario.max_steps
-        self.tables = tables_of(scenario, self.actions)
         self._sizes = learners_sizes(settings, self.actions.size)
-        sizes = ARENA.sizes_of(self._world.arena, self._sizes)
-        self._learners = LEARNERS.zeros(sizes)
-        self._scratch = SCRATCH.zeros(sizes)
+        self._lay_out()
         self._observation_shape = (len(self.names), settings.observation_size)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
         self.amounts: list[list[float]] = []
         self._first: tuple[Learners, NDArray[np.float32]] | None = None
         self._prepare()
+
+    def _lay_out(self) -> None:
+        """Make the arrays whose sizes are those of the scene."""
+        world = self._world
+        self.scenario, self.revisions = world.known, world.revisions
+        self.tables = tables_of(self.scenario, self.actions)
+        sizes = ARENA.sizes_of(world.arena, self._sizes)
+        self._learners = LEARNERS.zeros(sizes)
+        self._scratch = SCRATCH.zeros(sizes)
+
+    def _see_anew(self) -> None:
+        """Go on in a scene that has changed; waypoints keep their indices."""
+        world, before, outcome = self._world, self._learners, self._scratch
+        self._lay_out()
+        for name in ("asked", "targets", "report", "amounts"):
+            getattr(self._learners, name)[:] = getattr(before, name)
+        for array, old in zip(self._scratch, outcome, strict=True):
+            array[:] = old
+        count_company(world.state.uncovered, self.tables.neighbours, self._learners.company)
+        self._prepare()
+        observe(
+            world.arena, world.state.as_told(), self.tables, self._learners, self._observing,
+            world.state.status == FLYING, self.observation,
+        )  # fmt: skip
 
     def _prepare(self) -> None:
         world = self._world
@@ -129,6 +152,9 @@ class Episode:
             mission: Number of the mission since seeding; each draws other numbers.
         """
         self._world.reset(seed, mission)
+        if self.revisions:
+            self._lay_out()
+            self._prepare()
         self.steps = 0
         if self._first is None:
             self._first = first_observation(
@@ -166,6 +192,8 @@ class Episode:
         self.amounts = self._paid.tolist()
         if self._checks:
             refuse_what_it_wrote(self.actions.kind, self.asked, self.names)
+        if self._world.change_scene():
+            self._see_anew()
         return self._report.tolist()
 
     @property

@@ -316,6 +316,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """The picture of the present state for "rgb_array"; the window for "human"."""
         if not self._begun:
             raise ResetNeeded("render() before reset(): call reset() first")
+        self._screen.change(self._episode.scenario)
         return self._screen.render(self._episode.swarm_state())
 
     def close(self) -> None:

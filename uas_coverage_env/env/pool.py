@@ -22,6 +22,20 @@ from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.state import STATE
 
 
+def check_scene(scenario: Scenario) -> None:
+    """Refuse a scenario whose scene changes.
+
+    Raises:
+        ValueError: It does; the scenes of a batch are laid out once.
+    """
+    for event in scenario.events:
+        if event.changes_scene:
+            raise ValueError(
+                f"scenario {scenario.name!r} has an event {event.kind!r}, which changes the "
+                f"scene: batches do not fly that; take parallel_env, env or gymnasium.make"
+            )
+
+
 class MissionPool(NamedTuple):
     """All that missions of S scenarios need, for kernels."""
 
@@ -88,6 +102,8 @@ class ScenarioPool:
         settings = settings or MissionSettings()
         self.settings = settings
         self.scenarios = tuple(settings.limited(loaded_scenario(entry)) for entry in given)
+        for each in self.scenarios:
+            check_scene(each)
         self.goes_home = any(goes_home(scenario) for scenario in self.scenarios)
         acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
         if disturbances is None:

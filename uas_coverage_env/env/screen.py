@@ -76,9 +76,14 @@ class Screen:
         Args:
             scenario: What it flies; None: the same as before.
         """
-        if scenario is not None and scenario is not self._scenario:
-            self._scenario, self._picture = scenario, None
+        if scenario is not None:
+            self.change(scenario)
         self._path_m.clear()
+
+    def change(self, scenario: Scenario) -> None:
+        """Draw this scenario from now on, with the same paths."""
+        if scenario is not self._scenario:
+            self._scenario, self._picture = scenario, None
 
     def see(self, positions_m: NDArray[np.float64]) -> None:
         """Remember where the UAS are at this sample.

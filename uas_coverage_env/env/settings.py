@@ -141,17 +141,7 @@ class MissionSettings:
         return disturbances_of(scenario) if self.disturbances is None else self.disturbances
 
     def limited(self, scenario: Scenario) -> Scenario:
-        """The scenario with this time limit; return mode and the observed time know it.
-
-        Raises:
-            ValueError: An event changes the scene, which is laid out once in environments.
-        """
-        for event in scenario.events:
-            if event.changes_scene:
-                raise ValueError(
-                    f"scenario {scenario.name!r} has an event {event.kind!r}, which changes the "
-                    f"scene: environments do not fly that; fly it with rollout or World"
-                )
+        """The scenario with this time limit; return mode and the observed time know it."""
         if self.max_cycles is None:
             return scenario
         return scenario.model_copy(update={"max_steps": int(self.max_cycles)})

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import (
+    Conditions,
     Decoration,
     Geofence,
     MovingObstacle,
@@ -71,6 +72,8 @@ class MissionBrief(StrictModel):
         waypoints: What is to be covered.
         decorations: Drawn only.
         place: Where on the Earth it is; None where the scenario does not say.
+        conditions: Stated bounds of wind and of the true vehicles, never what is drawn; None where
+            nothing pushes back.
     """
 
     schema_version: int
@@ -90,6 +93,7 @@ class MissionBrief(StrictModel):
     waypoints: tuple[Waypoint, ...]
     decorations: tuple[Decoration, ...]
     place: Place | None = None
+    conditions: Conditions | None = None
 
     if not TYPE_CHECKING:
 
@@ -150,7 +154,7 @@ class MissionBrief(StrictModel):
     def _motionless(self) -> Scenario:
         still = (ScheduledVelocity(from_s=0.0, velocity_mps=(0.0, 0.0, 0.0)),)
         known = {name: getattr(self, name) for name in type(self).model_fields}
-        vehicles = known.pop("vehicles")
+        vehicles, conditions = known.pop("vehicles"), known.pop("conditions")
         known["schema"] = known.pop("schema_version")
         known["moving_obstacles"] = tuple(
             MovingObstacle.model_construct(**obstacle.model_dump(), schedule=still)
@@ -159,4 +163,6 @@ class MissionBrief(StrictModel):
         # checked before, when the scenario was read; and a vehicle file may be elsewhere by now
         scenario = Scenario.model_construct(**known)
         vars(scenario)["vehicles"] = vehicles
+        # what is stated, not the wind that it is stated of
+        vars(scenario)["conditions"] = conditions
         return scenario

@@ -1,7 +1,8 @@
 """What a mission is: scenarios from files, from code and from a seed, checked at the door."""
 
 from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
-from uas_coverage_env.scenario.checks import warnings
+from uas_coverage_env.scenario.checks import out_of_reach, warnings
+from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.families import Family, Size, installed_families
 from uas_coverage_env.scenario.family import (
@@ -42,6 +43,7 @@ __all__ = [
     "FAMILIES",
     "LEVELS",
     "SERIES",
+    "Conditions",
     "Decoration",
     "DisturbanceTable",
     "Family",
@@ -68,11 +70,13 @@ __all__ = [
     "Uncertainty",
     "Waypoint",
     "Wind",
+    "conditions_of",
     "flood_village",
     "generate_scenario",
     "installed_families",
     "load_scenario",
     "loaded_scenario",
+    "out_of_reach",
     "sample_scenario",
     "scenario_names",
     "warnings",

@@ -223,17 +223,39 @@ def _waypoints_nobody_covers(scenario: UncheckedScenario) -> Iterator[str]:
         )
 
 
+def out_of_reach(scenario: UncheckedScenario, more_m: float) -> list[int]:
+    """Waypoints of whose spheres no part keeps all safe distances.
+
+    Args:
+        scenario: The scenario.
+        more_m: Kept beyond them from obstacles, and horizontally from the fence [m].
+    """
+    every = range(len(scenario.waypoints))
+    return [index for index in every if not _free_part(scenario, index, more_m)[1].any()]
+
+
+def _free_part(
+    scenario: UncheckedScenario, index: int, more_m: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points (P, 3) of a waypoint's sphere, and whether each keeps all safe distances (P,)."""
+    radius_m, waypoint = min(uas.radius_m for uas in scenario.uas), scenario.waypoints[index]
+    points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
+    if waypoint.heights_m is not None:
+        lowest_m, highest_m = waypoint.heights_m
+        points = points[(lowest_m <= -points[:, 2]) & (-points[:, 2] <= highest_m)]
+    fence, margin_m = scenario.fence, scenario.geofence.margin_m
+    level = np.hypot(fence.normals[:, 0], fence.normals[:, 1])
+    inside = fence.face_distances(points) + more_m * level <= -margin_m
+    free: NDArray[np.bool_] = np.asarray(inside.all(axis=1))
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m + more_m
+    return points, free
+
+
 def _waypoints_out_of_reach(scenario: UncheckedScenario) -> Iterator[str]:
-    radius_m = min(uas.radius_m for uas in scenario.uas)
     for index, waypoint in enumerate(scenario.waypoints):
-        points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
-        if waypoint.heights_m is not None:
-            lowest_m, highest_m = waypoint.heights_m
-            points = points[(lowest_m <= -points[:, 2]) & (-points[:, 2] <= highest_m)]
-        free = scenario.fence.signed_distance(points) <= -scenario.geofence.margin_m
+        points, free = _free_part(scenario, index, 0.0)
         high = _is_high_enough(scenario, points)
-        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-            free &= hull.signed_distance(points) >= radius_m + obstacle.safe_distance_m
         if free.any() and not (free & high).any():
             yield (
                 f"waypoints[{index}].position_m: the sphere around {_point(waypoint.position_m)} "

@@ -30,8 +30,11 @@ class Room(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario) -> "Room":
-        """What a scenario has."""
-        return cls(len(scenario.uas), len(scenario.waypoints), len(scenario.moving_obstacles))
+        """What a scenario has, or may have once all of its events have happened."""
+        kinds = [event.kind for event in scenario.events]
+        n_waypoints = len(scenario.waypoints) + kinds.count("waypoint_added")
+        n_moving = len(scenario.moving_obstacles) + kinds.count("moving_obstacle_added")
+        return cls(len(scenario.uas), n_waypoints, n_moving)
 
 
 _LEAST = Room(1, 1, 0)

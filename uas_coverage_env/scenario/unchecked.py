@@ -10,6 +10,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_seriali
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario.air import Wind
+from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
 from uas_coverage_env.scenario.events import Events, EventTable
 from uas_coverage_env.scenario.fields import (
@@ -82,6 +83,11 @@ class UncheckedScenario(StrictModel):
     def hulls(self) -> tuple[ConvexPolytope, ...]:
         """One hull per fixed obstacle, in their order."""
         return tuple(obstacle.hull for obstacle in self.obstacles)
+
+    @cached_property
+    def conditions(self) -> Conditions | None:
+        """What is stated of wind and vehicles; None where nothing pushes back."""
+        return conditions_of(self.wind, self.uncertainty)
 
     @property
     def kept_hulls(self) -> tuple[ConvexPolytope, ...]:

@@ -213,19 +213,27 @@ class World:
         invalid = self._step(*arguments)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
-        if self._scene_events:
-            self._change_scene()
+        self.change_scene()
         return outcome
 
     def _arena_of(self, scenario: Scenario) -> Arena:
         return build_arena(scenario, measured_m=self._measured_m, disturbances=self.disturbances)
 
-    def _change_scene(self) -> None:
-        """Let happen at this sample what changes the scene: it is another one from now on."""
+    def change_scene(self) -> bool:
+        """Let happen at this sample what changes the scene: it is another one from now on.
+
+        `step` does so itself. It is for those that step the arrays of the world by code of their
+        own; `arena` and `state` are other arrays then, and again after `reset`.
+
+        Returns:
+            Whether anything changed.
+        """
+        if not self._scene_events:
+            return False
         state = self.state
         now = [e for e in self._scene_events if state.event_step[e] == state.step[0]]
         if not now:
-            return
+            return False
         for e in now:
             event = self.scenario.events[e]
             self.known = self.known.after(event, self.time_s, int(state.event_uas[e]))
@@ -239,6 +247,7 @@ class World:
         self._state = state._replace(uncovered=uncovered)
         self.revisions += 1
         self._prepare()
+        return True
 
     def _fresh_outcome(self) -> NDArray[np.void]:
         """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""

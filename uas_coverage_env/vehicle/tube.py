@@ -5,16 +5,25 @@ with |d| at most D in every step, the wind that blows less the one believed in. 
 deviation over all sequences of d is D times the sum of the absolute responses: the box around the
 minimal robust invariant set (Raković et al., IEEE Trans. Autom. Control 50(3), 2005), exact for a
 linear loop.
-Both axes have the same map, so the worst sequence keeps to one line of the plane.
+Both axes have the same map, so the worst sequence keeps to one line of the plane. Vertical wind
+moves no vehicle: its drag is horizontal.
+
+A loop that goes on learning the wind has the belief b as a fifth state, b⁺ = b + g (d - b): then
+even the position stays within a bound, although nothing feeds it back.
 """
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.params import VehicleParams
+
+FORGETS_S = 2.0
+"""The belief in wind and sink follows what is seen with this time constant [s]."""
 
 _STEPS = 400
 
@@ -24,8 +33,8 @@ class Tube:
     """Largest deviations from what the believed wind leads to, per m/s of residual wind.
 
     Attributes:
-        position: (S+1,) [m per m/s] after each of the first S steps; nothing holds the position,
-            so that it grows without end.
+        position: (S+1,) [m per m/s] after each of the first S steps; with a belief that is held it
+            grows without end, since nothing holds the position.
         velocity: Of the velocity, however long it blows [m/s per m/s].
         tilt: Of the tilt [rad per m/s].
         rate: Of its rate [rad/s per m/s].
@@ -39,24 +48,38 @@ class Tube:
     alpha: float
 
 
-def tube_of(vehicle: VehicleParams, dt_s: float, steps: int) -> Tube:
-    """The tube of a vehicle's velocity loop with a belief that is held.
+def belief_gain(dt_s: float) -> float:
+    """The share of what it was off by that the belief takes over in a step."""
+    return 1.0 - math.exp(-dt_s / FORGETS_S)
+
+
+@lru_cache(maxsize=64)
+def tube_of(vehicle: VehicleParams, dt_s: float, steps: int, learns: bool = False) -> Tube:
+    """The tube of a vehicle's velocity loop.
 
     Args:
         vehicle: Parameters.
         dt_s: Length of a step [s].
         steps: For how many steps the position is followed.
+        learns: Whether the belief goes on learning, as it does in flight; else it is held, as in
+            what a flight is predicted with.
     """
     A, B = horizontal_axis(vehicle, dt_s)
-    gain = np.concatenate([[0.0], design_velocity_loop(vehicle, dt_s).gain])
-    closed = A - np.outer(B, gain)
+    k_velocity, k_tilt, k_rate = design_velocity_loop(vehicle, dt_s).gain
+    # what is held against a wind believed in is its trim tilt
+    gain = np.array([0.0, k_velocity, k_tilt, k_rate, k_tilt * vehicle.trim_tilt_rad_per_mps])
+    learnt = belief_gain(dt_s) if learns else 0.0
+    closed = np.zeros((5, 5))
+    closed[:4, :4] = A
+    closed[:4] -= np.outer(B, gain)
+    closed[4, 4] = 1.0 - learnt
     # a step in wind is a step in still air at the airspeed, moved by what the air moves
-    response = np.array([dt_s - A[0, 1], 1.0 - A[1, 1], -A[2, 1], -A[3, 1]])
-    total, alpha, position_m = np.zeros(4), 0.0, [0.0]
+    response = np.array([dt_s - A[0, 1], 1.0 - A[1, 1], -A[2, 1], -A[3, 1], learnt])
+    total, alpha, position_m = np.zeros(5), 0.0, [0.0]
     for _ in range(max(_STEPS, steps)):
         total += np.abs(response)
         alpha += abs(float(gain @ response))
         position_m.append(float(total[0]))
         response = closed @ response
-    _, velocity, tilt, rate = total.tolist()
+    _, velocity, tilt, rate, _ = total.tolist()
     return Tube(np.array(position_m[: steps + 1]), velocity, tilt, rate, alpha)

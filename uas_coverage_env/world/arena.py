@@ -29,6 +29,7 @@ from uas_coverage_env.world.events import (
 )
 from uas_coverage_env.world.overhangs import overhangs
 from uas_coverage_env.world.routes import node_distances
+from uas_coverage_env.world.tubes import route_tube_m, tubes_m
 from uas_coverage_env.world.waypoints import (
     N_WAYPOINT_COLUMNS,
     WAYPOINT_DTYPE,
@@ -194,6 +195,8 @@ class Arena(NamedTuple):
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
+    tube_m: Annotated[NDArray[np.float64], "U", "predicted"]
+    """See `tubes_m`: what is kept more for what disturbances do to what is predicted."""
 
 
 ARENA = Memory(Arena)
@@ -225,7 +228,11 @@ def build_arena(
     rules["unit_m"] = unit_m_of(waypoints["position_m"])
     targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
     overfly_m = _overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
-    obstacles, planes, corners = _obstacles(scenario, radius_m, overfly_m)
+    blocks, parameters = disturbance_tables(disturbances)
+    rules["disturbed"] = blocks["acts"].any()
+    tube_m = tubes_m(scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]))
+    route_m = ROUTE_MARGIN_M + route_tube_m(tube_m)
+    obstacles, planes, corners = _obstacles(scenario, radius_m, overfly_m, route_m)
     _measure(obstacles, scenario, float(rules["measured_m"][0]))
     fence = scenario.fence
     rules["fence_first"] = sum(len(rows[1]) for rows in planes)
@@ -233,8 +240,6 @@ def build_arena(
     planes.append((fence.normals, fence.offsets_m))
     normals = np.concatenate([rows[0] for rows in planes])
     offsets_m = np.concatenate([rows[1] for rows in planes])
-    blocks, parameters = disturbance_tables(disturbances)
-    rules["disturbed"] = blocks["acts"].any()
     rules["overhangs"] = obstacles["overhangs"].any()
     rules["eventful"] = is_eventful(scenario)
     rules["asks"] = waypoints["asks"].any()
@@ -264,6 +269,7 @@ def build_arena(
         disturbance_parameters=parameters,
         events=event_records(scenario),
         sensing=sensing_records(scenario),
+        tube_m=tube_m,
     )
 
 
@@ -354,7 +360,7 @@ def _footprint(corners_m: NDArray[np.float64]) -> ConvexHull:
 
 
 def _obstacles(
-    scenario: Scenario, radius_m: float, overfly_m: float
+    scenario: Scenario, radius_m: float, overfly_m: float, route_m: float
 ) -> tuple[
     NDArray[np.void],
     list[tuple[NDArray[np.float64], NDArray[np.float64]]],
@@ -369,7 +375,7 @@ def _obstacles(
     for record, obstacle, hull, kept in zip(
         records, scenario.obstacles, scenario.hulls, scenario.kept_hulls, strict=True
     ):
-        wall_m = radius_m + obstacle.safe_distance_m + ROUTE_MARGIN_M
+        wall_m = radius_m + obstacle.safe_distance_m + route_m
         near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M)
         widened_m = _widened(kept, wall_m)
         footprint = _footprint(widened_m)

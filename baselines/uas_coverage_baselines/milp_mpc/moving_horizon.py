@@ -11,7 +11,7 @@ from typing import Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
+from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering, velocities
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -22,6 +22,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
+from uas_coverage_baselines.milp_mpc.steering import Steering
 from uas_coverage_baselines.milp_mpc.unheard import Unheard
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import (
@@ -90,6 +91,11 @@ class MovingHorizon(ABC, Generic[Chosen]):
         """Start a mission."""
         refuse_what_asks(brief)
         self.dt_s = brief.dt_s
+        stated = brief.conditions is not None
+        self._has_tube = stated and self.options.in_wind == "tube"
+        self._steering: Steering | None = None
+        if stated and self.options.in_wind == "guidance":
+            self._steering = Steering(brief, self.options, seed)
         self.plan = self._backup = None
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
@@ -104,7 +110,11 @@ class MovingHorizon(ABC, Generic[Chosen]):
         if not swarm.active:
             return {}
         silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
-        commands = self._of_workers(without(swarm, silent), swarm, silent)
+        if self._steering is None:
+            commands = self._of_workers(without(swarm, silent), swarm, silent)
+        else:
+            commands = self._steering.commands(without(swarm, silent))
+            self.last_decision = Decision({})
         home = {swarm.names[u]: GoTo(None) for u in np.flatnonzero(silent)}
         return {**commands, **home}
 
@@ -154,6 +164,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
         self.last_decision = Decision(paths, reason is not None, gap, reason)
+        if self._has_tube:
+            return velocities(plan, swarm, self.dt_s, self._announced)
         return first_inputs(plan, swarm, self._announced)
 
     def _overruled(

@@ -61,6 +61,12 @@ class OcpOptions(PlannerOptions):
     moving_speed_mps: float = Field(
         default=15.0, gt=0.0, le=100.0, description="speed up to which it is assumed to accelerate"
     )
+    in_wind: Literal["guidance", "tube", "wrenches"] = Field(
+        default="guidance",
+        description="what is flown where bounds of wind or vehicles are stated: the order by the "
+        "world's guidance; tube MPC (clearances that grow along the horizon, velocities are "
+        "commanded); or plans as in still air",
+    )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),
         description="added to the OCP: names (entry points) or MODULE:CLASS, separated by commas",

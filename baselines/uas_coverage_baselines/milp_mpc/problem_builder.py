@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 from uas_coverage_baselines.milp_mpc.options import OcpOptions
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
+from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import (
     DOD,
     VX,
@@ -68,6 +69,7 @@ class ProblemBuilder:
         self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
         self._waypoint_weight = np.array([w.weight for w in brief.waypoints], float)
         self._getaway_m = self._getaway_margins()
+        self._has_tube = options.in_wind == "tube" and brief.conditions is not None
 
     def vehicle(self, name: str) -> VehicleParams:
         """Parameters of a UAS's vehicle."""
@@ -233,15 +235,23 @@ class ProblemBuilder:
             waypoint_index=waypoints,
             n_scenario_waypoints=len(self.waypoints_m),
             home_m=np.array([self.home_m[name] for name in names]),
-            dod_max=np.array([u.dod_max for u in uas]),
+            dod_max=self._dod_max(uas, x0[:, DOD]),
             targets=(None,) * len(names),
             ways_home=ways_home if any(ways_home) else (),
             dt_s=self.dt_s,
             min_height_m=least_m + margin_m if least_m else 0.0,
             landing_zone_m=self.brief.landing_zone_m - margin_m,
             weights=weights,
+            tube_m=self._view.arena.tube_m[rows] if self._has_tube else None,
             **self._form,
         )
+
+    def _dod_max(self, uas: Sequence[Uas], dod: FloatArray) -> FloatArray:
+        """(U,) where the charge ends that counts: what may not be there is held back."""
+        dod_max = np.array([u.dod_max for u in uas])
+        if not self._has_tube or self.brief.conditions is None:
+            return dod_max
+        return dod + self.brief.conditions.charge_share * (dod_max - dod)
 
     def _within_reach(self, swarm: SwarmState) -> list[int]:
         """Obstacles that some UAS could come near, within the horizon or braking after it.
@@ -251,6 +261,7 @@ class ProblemBuilder:
         if not self._form.get("prune", PlanningProblem.prune):
             return list(range(len(self.brief.obstacles)))
         near_m = max(u.radius_m for u in self.brief.uas) + self._options.margin_m
+        near_m += float(self._view.arena.tube_m.max())
         result = []
         rows = [swarm.names.index(name) for name in swarm.active]
         speed = [self._vehicles[name].limits.v_xy_max_mps for name in swarm.active]

@@ -62,6 +62,7 @@ class Schedule:
     def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
         self.legs = Legs(brief)
         self._arena, self._can_cover = arena, brief.can_cover
+        self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         self._moves = moves
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
@@ -145,7 +146,7 @@ class Schedule:
     def _budget_s(self, view: View) -> FloatArray:
         """(U,) seconds of legs that battery and clock allow each UAS."""
         uas = self._arena.uas
-        left_s = (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
+        left_s = self._charge_share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
         left_s = np.minimum(left_s, self._until_s - view.time_s)
         return (left_s - _RESERVE_S - _SPARE_S) / self.pace
 

@@ -90,9 +90,10 @@ class Fleet:
         return uas[i].radius_m + uas[j].radius_m + self.brief.uas_safe_distance_m
 
     def battery_s(self, x: FloatArray) -> FloatArray:
-        """(U,) seconds that each battery lasts at full speed."""
-        uas = self.arena.uas
-        return (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
+        """(U,) seconds that each battery lasts at full speed, and with the worst vehicle stated."""
+        uas, conditions = self.arena.uas, self.brief.conditions
+        share = 1.0 if conditions is None else conditions.charge_share
+        return share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
 
     def task(self, moment: Moment, less_s: FloatArray) -> RoutingTask:
         """The routing problem of a moment.

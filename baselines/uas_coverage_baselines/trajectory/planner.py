@@ -127,6 +127,8 @@ class Trajectory:
         self._world.update(swarm)
         self._silent = self._silent_then = np.zeros(len(brief.uas), np.bool_)
         self._make_plan(swarm, self._seen_movers(swarm))
+        if brief.conditions is not None and brief.conditions.mean_mps > 0.0:
+            self._steering = self._steer()  # no flight that is planned in still air is flown
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""

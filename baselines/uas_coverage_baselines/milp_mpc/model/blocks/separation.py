@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
+from uas_coverage_baselines.milp_mpc.model.tightening import across, kept
 from uas_coverage_env.geometry import closed_cylinder_faces
 
 FloatArray = NDArray[np.float64]
@@ -229,18 +230,27 @@ def from_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
     clearance = np.repeat(problem.obstacle_clearance_m, faces, axis=1)
     lowest = offsets - problem.reach.support(-normals)
     highest = offsets + problem.reach.support(normals)
+    offsets = np.broadcast_to(offsets, lowest.shape)
+    tube_m = problem.tubes(problem.horizon)
+    if tube_m is not None:
+        spare_m = np.maximum.reduceat(lowest[:, 0] - clearance, ends - faces, axis=1)
+        margin_m = [
+            np.repeat(kept(tube_m, room)[:, :, None], n, axis=2)
+            for room, n in zip(spare_m.T, faces, strict=True)
+        ]
+        shift_m = np.concatenate(margin_m, axis=2) * across(normals)
+        offsets, lowest, highest = offsets - shift_m, lowest - shift_m, highest - shift_m
     separates = (lowest >= clearance[:, None]).all(axis=1)
     far = np.logical_or.reduceat(separates, ends - faces, axis=1).all(axis=0) & problem.prune
     swarm = np.arange(problem.n_uas)
     for row in np.flatnonzero(~far):
         own = slice(ends[row] - faces[row], ends[row])
-        shape = (problem.n_uas, problem.horizon + 1, faces[row])
         yield Separation(
             problem.obstacles[row][0],
             normals[own],
             swarm,
             None,
-            np.broadcast_to(offsets[own], shape),
+            offsets[..., own],
             clearance[:, own],
             lowest[..., own],
             highest[..., own],
@@ -253,17 +263,23 @@ def from_moving_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
     faces = closed_cylinder_faces(problem.obstacle_sides)
     swarm = np.arange(problem.n_uas)
     highest, lowest = problem.reach.support(faces), -problem.reach.support(-faces)
+    tube_m = problem.tubes(problem.horizon)
     for row, moving in enumerate(problem.moving):
         offset = -(moving.position_m @ faces.T)
+        offset = np.broadcast_to(offset, (problem.n_uas, *offset.shape))
         size = np.full(len(faces), moving.radius_m)
         size[-2:] = moving.half_height_m
+        clearance = size + problem.moving_clearance_m[:, [row]]
+        if tube_m is not None:
+            spare_m = (lowest[:, 0] + offset[:, 0] - clearance).max(axis=1)
+            offset = offset - kept(tube_m, spare_m)[:, :, None] * across(faces)
         yield Separation(
             moving.name,
             faces,
             swarm,
             None,
-            np.broadcast_to(offset, (problem.n_uas, *offset.shape)),
-            size + problem.moving_clearance_m[:, [row]],
+            offset,
+            clearance,
             lowest + offset,
             highest + offset,
             problem.prune,
@@ -279,15 +295,22 @@ def from_each_other(problem: PlanningProblem) -> Iterator[Separation]:
     faces = closed_cylinder_faces(problem.obstacle_sides)
     ahead, behind = problem.reach.support(faces), problem.reach.support(-faces)
     clearance = np.repeat(problem.separation_m[first, second][:, None], len(faces), axis=1)
+    lowest, highest = -(behind[first] + ahead[second]), ahead[first] + behind[second]
+    offset = np.zeros(lowest.shape)
+    tube_m = problem.tubes(problem.horizon)
+    if tube_m is not None:
+        spare_m = (lowest[:, 0] - clearance).max(axis=1)
+        shift_m = kept(tube_m[first] + tube_m[second], spare_m)[:, :, None] * across(faces)
+        offset, lowest, highest = offset - shift_m, lowest - shift_m, highest - shift_m
     yield Separation(
         "collision",
         faces,
         first,
         second,
-        np.zeros((len(first), problem.horizon + 1, len(faces))),
+        offset,
         clearance,
-        -(behind[first] + ahead[second]),
-        ahead[first] + behind[second],
+        lowest,
+        highest,
         problem.prune,
         problem.corners_of_all,
     )

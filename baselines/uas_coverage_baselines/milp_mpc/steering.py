@@ -1,0 +1,55 @@
+"""What the planners in real time fly in a stated wind: their order, under the world's guidance.
+
+A plan is a sequence of wrenches, computed in still air; in a wind each step ends elsewhere, and the
+limits of the vehicle are exceeded. The inner loop knows what pushes the UAS, and guidance flies by
+it. The order is the one of `milp-mpc-guided`, searched on at every decision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
+from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
+from uas_coverage_env.mission import Approach, Attempts, MissionBrief, first_sight
+from uas_coverage_env.world import Command, GoTo, SwarmState
+
+
+class Steering:
+    """Sends each UAS along its route by the world's guidance; no program is solved.
+
+    Args:
+        brief: the mission.
+        options: of the planner.
+        seed: of the first search.
+    """
+
+    def __init__(self, brief: MissionBrief, options: MovingHorizonOptions, seed: int) -> None:
+        decision_s = options.threads * options.time_limit_s
+        builder = ProblemBuilder(brief, options)
+        self._guide = RouteGuide(brief, builder, TourShape(), decision_s)
+        self._guide.begin(first_sight(brief), seed)
+        self._attempts, self._approach = Attempts(brief), Approach(brief)
+
+    def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """A command for each UAS that flies and takes commands."""
+        wanted = self._attempts.wanted(swarm.uncovered)
+        self._guide.update(replace(swarm, uncovered=wanted))
+        ahead = dict(zip(swarm.active, self._guide.tours(swarm.active), strict=True))
+        flown_to = {name: int(route[0]) for name, route in ahead.items() if len(route)}
+        blocked = np.zeros(len(swarm.uncovered), np.bool_)
+        blocked[list(self._guide.blocked)] = True
+        self._attempts.update(swarm, flown_to, blocked)
+        return {name: self._command(swarm, name, flown_to.get(name)) for name in swarm.active}
+
+    def _command(self, swarm: SwarmState, name: str, target: int | None) -> Command:
+        if target is None:
+            return GoTo(None, "return")
+        uas = swarm.names.index(name)
+        if self._attempts.is_hard(uas, target):
+            return self._approach.command(swarm, uas, target)
+        return GoTo(target, mode="covering")
