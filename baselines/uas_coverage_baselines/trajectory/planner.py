@@ -64,8 +64,14 @@ class TrajectoryOptions(PlannerOptions):
     weight_energy: float = Field(
         default=0.6,
         ge=0.0,
-        le=2.0,
+        le=100.0,
         description="worth of a second of each UAS's flight against one of the mission",
+    )
+    speed_share: float = Field(
+        default=1.0,
+        ge=0.2,
+        le=1.0,
+        description="of the largest horizontal speed: so fast is flown at most",
     )
     margin_m: float = Field(
         default=0.3,
@@ -114,7 +120,7 @@ class Trajectory:
         """Plan the mission from the starts."""
         self._brief, self._seed = brief, seed
         self._world, self._handover = WorldView(brief), Handover(brief)
-        self._fleet = Fleet(brief, self.options.margin_m)
+        self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
