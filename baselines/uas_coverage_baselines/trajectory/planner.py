@@ -40,7 +40,9 @@ _OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at 
 _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
+_WHOLE_WEIGHT = 4  # UAS; beyond, each one's energy weighs less
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
+_GUESS = 5  # so much less is searched where only the time that it takes is asked
 _SOON_S = 22.0  # a visit to what is still blocked so soon is put off
 
 
@@ -65,7 +67,8 @@ class TrajectoryOptions(PlannerOptions):
         default=0.6,
         ge=0.0,
         le=100.0,
-        description="worth of a second of each UAS's flight against one of the mission",
+        description="worth of a second of each UAS's flight against one of the mission; "
+        "of more than four UAS, of four seconds shared by all",
     )
     speed_share: float = Field(
         default=1.0,
@@ -160,9 +163,14 @@ class Trajectory:
 
     def _steer(self) -> Steering:
         assert self.mission_plan is not None
-        moves, weight = self.options.moves // 10, self.options.weight_energy
+        moves, weight = self.options.moves // 10, self._total_weight
         order = self.mission_plan.order
         return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
+
+    @property
+    def _total_weight(self) -> float:
+        """Worth of a second of each UAS's flight: in a large fleet of less, or most stay home."""
+        return self.options.weight_energy * min(1.0, _WHOLE_WEIGHT / len(self._brief.uas))
 
     def _seen_movers(self, swarm: SwarmState) -> Movers:
         """What moves, and with it UAS that take no commands."""
@@ -341,7 +349,7 @@ class Trajectory:
             orders,
             round(larger * options.moves),
             options.programs,
-            options.weight_energy,
+            self._total_weight,
             options.threads,
         )
         if unknown.any():
@@ -372,6 +380,6 @@ class Trajectory:
             return round(max(_OPENS_AGAIN_S, later_s) / dt_s)
         others = moment.uncovered & ~unknown
         task = self._fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
-        search = SearchEffort(effort.moves)
+        search = SearchEffort(effort.moves // _GUESS, by_pieces=True)
         order = improve_routes(task, empty_routes(task.n_uas), search, self._seed)
         return round(max(_OPENS_AGAIN_S, _OPENS_SHARE * float(order.seconds.mean())) / dt_s)
