@@ -29,8 +29,11 @@ from uas_coverage_baselines.trajectory.space import Body
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+SMALL_FLEET = 4
+"""So many UAS, or fewer; of larger fleets, less is searched for each."""
+
 _UNFLOWN_S = 1000.0
-_SHARED_BY, _LEAST_PROGRAMS = 4, 20  # more UAS share the programs of four, but get so many each
+_LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
 _HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _BATTERY = "the battery does not last"
 _BUDGETS = 3
@@ -137,7 +140,7 @@ def plan_mission(
         known: set[tuple[bytes, ...]] = set()
         orders = _orders(task, effort, seed, kept)
         for order in orders:
-            if order.cost_s > _HOPELESS * orders[0].cost_s:
+            if task.n_uas > SMALL_FLEET and order.cost_s > _HOPELESS * orders[0].cost_s:
                 break
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
@@ -163,7 +166,7 @@ def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -
             effort.moves,
             hottest_s=4.0 if kept is None or k else 1.5,
             total_weight=effort.total_weight,
-            by_pieces=True,
+            by_pieces=task.n_uas > SMALL_FLEET,
         )
         return improve_routes(task, begin, search, seed + k)
 
@@ -193,7 +196,7 @@ def _flown(
         for u, route in routes.items()
         if u in flown and np.array_equal(flown[u][0], route)
     }
-    each = max(_LEAST_PROGRAMS, _SHARED_BY * effort.programs // max(len(routes), 1))
+    each = max(_LEAST_PROGRAMS, SMALL_FLEET * effort.programs // max(len(routes), 1))
     programs = min(effort.programs, each)
     flights = fleet.flights(moment, routes, movers, programs, known, effort.threads)
     planned: dict[int, Planned] = {}

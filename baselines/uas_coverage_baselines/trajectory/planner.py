@@ -13,6 +13,7 @@ from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_r
 from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
+    SMALL_FLEET,
     Effort,
     MissionPlan,
     Planned,
@@ -40,9 +41,7 @@ _OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at 
 _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
-_WHOLE_WEIGHT = 4  # UAS; beyond, each one's energy weighs less
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
-_GUESS = 5  # so much less is searched where only the time that it takes is asked
 _SOON_S = 22.0  # a visit to what is still blocked so soon is put off
 
 
@@ -170,7 +169,7 @@ class Trajectory:
     @property
     def _total_weight(self) -> float:
         """Worth of a second of each UAS's flight: in a large fleet of less, or most stay home."""
-        return self.options.weight_energy * min(1.0, _WHOLE_WEIGHT / len(self._brief.uas))
+        return self.options.weight_energy * min(1.0, SMALL_FLEET / len(self._brief.uas))
 
     def _seen_movers(self, swarm: SwarmState) -> Movers:
         """What moves, and with it UAS that take no commands."""
@@ -380,6 +379,6 @@ class Trajectory:
             return round(max(_OPENS_AGAIN_S, later_s) / dt_s)
         others = moment.uncovered & ~unknown
         task = self._fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
-        search = SearchEffort(effort.moves // _GUESS, by_pieces=True)
+        search = SearchEffort(effort.moves)
         order = improve_routes(task, empty_routes(task.n_uas), search, self._seed)
         return round(max(_OPENS_AGAIN_S, _OPENS_SHARE * float(order.seconds.mean())) / dt_s)
