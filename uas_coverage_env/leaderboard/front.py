@@ -164,7 +164,8 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
                     axes.annotate(str(one.n_flying), at, **offset)
             bound = sorted({(one.time_s, one.bound_Wh) for one in found if one.bound_Wh})
             if bound:
-                axes.plot(*zip(*bound, strict=True), ":", color="black", label="lower bound")
+                style = {"drawstyle": "steps-pre", "color": "black", "label": "lower bound"}
+                axes.plot(*zip(*bound, strict=True), ":", **style)  # of less time, it is higher
             axes.set_title(name, fontsize=8)
             axes.set_xlabel("Time, s")
         panels[0].set_ylabel("Energy, Wh")
