@@ -193,8 +193,8 @@ SOLVERS: dict[str, Callable[[RoutingTask, float, float, int], Found | None]] = {
 
 def flown_cost_s(task: RoutingTask, routes: list[list[int]], weight: float) -> float:
     """What an order costs with its turns."""
-    nothing = np.zeros(0, np.int64)
-    order = Routes(tuple(np.array(r, np.int64) for r in routes), nothing, nothing, np.inf)
+    seconds, nobody = np.zeros(len(routes)), np.zeros(0, np.int64)
+    order = Routes(tuple(np.array(r, np.int64) for r in routes), nobody, seconds, np.inf)
     return improve_routes(task, order, SearchEffort(0, total_weight=weight), 0).cost_s
 
 

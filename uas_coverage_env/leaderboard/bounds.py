@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from uas_coverage_env.bound import MissionBound, bound_of
+from uas_coverage_env.bound import bound_of
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.scenario import Scenario
 
@@ -20,16 +20,11 @@ def bounds_of(
         scenarios: By name; flights on others have no bound.
     """
     found: dict[tuple[str, int], float] = {}
-    known: dict[str, MissionBound | None] = {}
     for row in rows:
         if not row.accomplished or row.steps is None or row.dynamics != "lpv":
             continue
         key = row.scenario, row.steps
-        if key in found or row.scenario not in scenarios:
-            continue
-        if row.scenario not in known:
-            known[row.scenario] = bound_of(scenarios[row.scenario])
-        bound = known[row.scenario]
-        if bound is not None:
+        bound = bound_of(scenarios[row.scenario]) if row.scenario in scenarios else None
+        if bound is not None and key not in found:
             found[key] = bound.energy_Wh(row.steps)
     return found
