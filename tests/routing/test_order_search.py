@@ -159,12 +159,28 @@ def test_seconds_and_cost_are_those_of_the_routes(seed, uas):
     assert found.cost_s == pytest.approx(exact, abs=1e-6)
 
 
+@few
+@given(seeds, st.integers(1, 3), st.booleans(), st.booleans())
+def test_judged_by_pieces_routes_cost_what_they_cost_as_a_whole(seed, uas, alike, late):
+    made = task(seed, 12, uas, not_before_s=np.where(np.arange(12) % 5 == 0, 40.0 * late, 0.0))
+    if alike:  # stretches change hands
+        same = {"kind": np.zeros(uas, np.int64), "turn_s": np.ones((uas, 12))}
+        made = replace(made, **same, between_s=made.between_s * np.linspace(0.8, 1.2, 12))
+    found = improve_routes(made, empty_routes(uas), SearchEffort(4000, by_pieces=True), seed)
+    again = improve_routes(made, found, SearchEffort(0), 0)
+    assert visits(found) == list(range(12))
+    assert found.seconds == pytest.approx(again.seconds, abs=1e-6)
+    assert found.cost_s == pytest.approx(again.cost_s, abs=1e-6)
+
+
 @pytest.mark.parametrize(("seed", "waypoints", "uas"), [(0, 7, 1), (1, 7, 2), (2, 6, 2)])
 def test_the_search_finds_the_optimum_of_all_orders(seed, waypoints, uas):
     problem = task(seed, waypoints, uas)
-    effort = SearchEffort(60_000)
-    found = min(improve_routes(problem, empty_routes(uas), effort, s).cost_s for s in range(3))
-    assert found == pytest.approx(cheapest(problem, effort.total_weight), abs=0.3)
+    least = cheapest(problem, SOME.total_weight)
+    for by_pieces in (False, True):
+        effort = SearchEffort(60_000, by_pieces=by_pieces)
+        found = min(improve_routes(problem, empty_routes(uas), effort, s).cost_s for s in range(3))
+        assert found == pytest.approx(least, abs=0.3)
 
 
 @few

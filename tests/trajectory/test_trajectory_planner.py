@@ -12,7 +12,7 @@ from uas_coverage_env.flight.metrics import home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, VX
 
 QUICK = {"orders": 1, "moves": 20_000, "programs": 40}
 TWO = ((100.0, 100.0, -1.0), (112.0, 100.0, -1.0))
@@ -191,6 +191,22 @@ def test_energy_can_be_weighed_more_than_time():
     thrifty = rollout(scenario, planner(weight_energy=2.0))
     assert quick.steps <= thrifty.steps
     assert energy_Wh(thrifty).sum() <= energy_Wh(quick).sum()
+
+
+def test_no_uas_flies_faster_than_it_is_told_to():
+    scenario = meadow(TWO[:1], waypoints=FIELD[:2])
+    fast = MissionBrief.of(scenario).vehicles[0].limits.v_xy_max_mps
+    slow = planner(speed_share=0.5)
+    slow.reset(MissionBrief.of(scenario), 0)
+    level_mps = np.hypot(*slow._planned[0].course.x[:, VX : VX + 2].T)
+    assert 0.45 * fast < level_mps.max() <= 0.5 * fast
+
+
+def test_most_of_a_large_fleet_fly_where_that_makes_the_mission_shorter():
+    town = MissionBrief.of(generate_scenario(1, n_uas=8, n_waypoints=100, n_obstacles=6))
+    eight = planner(programs=1, moves=100_000)
+    eight.reset(town, 0)
+    assert len(eight._planned) >= 5
 
 
 def test_a_uas_that_stays_at_home_is_in_no_ones_way():

@@ -34,6 +34,11 @@ COMMANDS = (
         "Fly every planner on every scenario with every seed, and compare them.",
     ),
     CommandEntry(
+        "front",
+        at(f"{_CLI}.front:front"),
+        "Fly a planner with different options, and draw time against energy.",
+    ),
+    CommandEntry(
         "score",
         at(f"{_CLI}.score:score_command"),
         "Fly the missions of a level and print the scores (docs/levels.md).",

@@ -40,6 +40,7 @@ class Legs:
     To a waypoint that a UAS cannot cover there is no leg: it takes for ever, inf.
 
     Attributes:
+        arena: The mission as arrays.
         between_s: (V, W, W) between waypoints, for each kind of vehicle, and of what it carries.
         waypoints_m: (W, 3).
         starts_m: (U, 3).
@@ -54,7 +55,7 @@ class Legs:
     def __init__(self, brief: MissionBrief) -> None:
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self._credit_m = np.array([0.5 * w.radius_m for w in brief.waypoints])
-        self._arena = build_arena(brief.as_scenario())
+        self.arena = build_arena(brief.as_scenario())
         self._can_cover = brief.can_cover
         carried = map(tuple, self._can_cover.tolist())
         of_each = list(zip(brief.vehicles, carried, strict=True))
@@ -92,7 +93,7 @@ class Legs:
         result = _straight_s(here, self.waypoints_m, self._credit_m, speeds)
         near = np.argpartition(result, min(_FROM_HERE, len(result)) - 1)[:_FROM_HERE]
         result[near] = _legs_s(
-            self._arena,
+            self.arena,
             near,
             here[near],
             self.waypoints_m[near],
@@ -108,7 +109,7 @@ class Legs:
         start = self.starts_m[[uas]]
         here = np.asarray(position_m, float)[None]
         speeds = self._speeds[self.kind[uas]]
-        return float(_legs_s(self._arena, target, here, start, np.zeros(1), speeds, _OCTAGON)[0])
+        return float(_legs_s(self.arena, target, here, start, np.zeros(1), speeds, _OCTAGON)[0])
 
     def _between(self, speeds: Speeds) -> FloatArray:
         n = len(self.waypoints_m)
@@ -118,7 +119,7 @@ class Legs:
         ).reshape(n, n)
         near = np.repeat(np.arange(n), self.neighbours.shape[1]), self.neighbours.ravel()
         straight[near] = _legs_s(
-            self._arena,
+            self.arena,
             near[1],
             self.waypoints_m[near[0]],
             self.waypoints_m[near[1]],
@@ -132,7 +133,7 @@ class Legs:
     def _towards_home(self, uas: int, start_m: FloatArray) -> FloatArray:
         n = len(self.waypoints_m)
         return _legs_s(
-            self._arena,
+            self.arena,
             np.full(n, n + uas),
             self.waypoints_m,
             np.broadcast_to(start_m, (n, 3)),

@@ -9,11 +9,19 @@ reversed, the rests of two routes exchanged.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.routing.route_time import (
+    RoutingArrays,
+    add_piece,
+    joined,
+    pieces_s,
+    route_s,
+    sum_up,
+    sums_of,
+)
 from uas_coverage_baselines.routing.task import RoutingTask
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
@@ -27,6 +35,7 @@ _TURN_STEPS = 256
 _TURN_OF_COSINE = np.interp(
     np.degrees(np.arccos(np.linspace(-1.0, 1.0, _TURN_STEPS + 1))), _TURN_DEG, _TURN_RADII
 )
+_SAME_TEMPERATURE = 64  # moves
 _OVERTIME = 200.0  # cost of a second beyond the budget, in seconds
 _LEFT_OUT_S = 120.0  # cost of leaving out a waypoint of weight 1, beyond that of a visit
 
@@ -41,6 +50,8 @@ class SearchEffort:
         coldest_s: temperature at the end.
         window: only the first so many waypoints of each route are moved; 0 for all.
         total_weight: worth of a second of anybody's flight against one of the longest.
+        by_pieces: whether a change is judged by sums along the routes, which takes the same time
+            however long they are, and rounds otherwise: another order may come of it.
     """
 
     moves: int
@@ -48,6 +59,7 @@ class SearchEffort:
     coldest_s: float = 0.05
     window: int = 0
     total_weight: float = 0.4
+    by_pieces: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,7 +115,7 @@ def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed:
     lengths[U] += len(missing)
     # missing waypoints begin as left out and go where they cost least
     arrays = _arrays(task, effort.total_weight)
-    _insert_missing(arrays, routes, lengths, missing, effort.total_weight)
+    _insert_missing(arrays, routes, lengths, missing, effort.total_weight, effort.by_pieces)
     seconds = np.empty(U)
     cost = _search(
         arrays,
@@ -115,6 +127,7 @@ def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed:
         effort.coldest_s,
         effort.window,
         effort.total_weight,
+        effort.by_pieces,
         np.random.default_rng(seed),
     )
     left_out = routes[U, : lengths[U]].copy()
@@ -136,30 +149,9 @@ def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
     return _LEFT_OUT_S * task.weight + (1.0 + total_weight) * visit_s
 
 
-class _Arrays(NamedTuple):
-    """What the search reads of a task, for compiled code."""
-
-    first: FloatArray
-    between: FloatArray
-    kind: NDArray[np.int64]
-    home: FloatArray
-    idle: FloatArray
-    place: FloatArray
-    """(W+2U, 2) of waypoints, UAS and starts, north and east."""
-    velocity: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
-    turn: FloatArray
-    opens: FloatArray
-    budget: FloatArray
-    left_out_s: FloatArray
-    neighbours: NDArray[np.int64]
-    turn_of_cosine: FloatArray
-
-
-def _arrays(task: RoutingTask, total_weight: float) -> _Arrays:
+def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
-    return _Arrays(
+    return RoutingArrays(
         first=task.first_s,
         between=task.between_s,
         kind=task.kind,
@@ -179,51 +171,6 @@ def _arrays(task: RoutingTask, total_weight: float) -> _Arrays:
 
 
 @allocating_kernel
-def _turn(table, place, a, b, c):
-    """Cost in radii of turning at place b on the way from a to c."""
-    ax, ay = place[b, 0] - place[a, 0], place[b, 1] - place[a, 1]
-    bx, by = place[c, 0] - place[b, 0], place[c, 1] - place[b, 1]
-    length = np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
-    if length < 1e-9:
-        return 0.0
-    cosine = min(max((ax * bx + ay * by) / length, -1.0), 1.0)
-    return table[int(0.5 * (cosine + 1.0) * (len(table) - 1) + 0.5)]
-
-
-@allocating_kernel
-def _setting_off_s(place, velocity, speed_mps, acceleration_mps2, here, to):
-    """What is lost until the velocity points to the first waypoint."""
-    dx, dy = place[to, 0] - place[here, 0], place[to, 1] - place[here, 1]
-    length = np.hypot(dx, dy) + 1e-9
-    ax, ay = velocity[0] - speed_mps * dx / length, velocity[1] - speed_mps * dy / length
-    return (ax * ax + ay * ay) / (2.0 * acceleration_mps2 * speed_mps)
-
-
-@allocating_kernel
-def _route_s(task, u, route, length):
-    """Flight time of one UAS along a route and home."""
-    if length == 0:
-        return task.idle[u]
-    place, kind, opens = task.place, task.kind[u], task.opens
-    n_waypoints, n_uas = len(opens), len(task.kind)
-    before, here = n_waypoints + u, route[0]
-    time = task.first[u, here]
-    time += _setting_off_s(
-        place, task.velocity[u], task.speed[u], task.acceleration[u], before, here
-    )
-    time = max(time, opens[here])
-    for k in range(1, length + 1):
-        following = route[k] if k < length else n_waypoints + n_uas + u
-        time += task.turn[u, here] * _turn(task.turn_of_cosine, place, before, here, following)
-        if k == length:
-            break
-        time += task.between[kind, here, following]
-        time = max(time, opens[following])
-        before, here = here, following
-    return time + task.home[u, here]
-
-
-@allocating_kernel
 def _cost_s(task, seconds, left_out, n_left_out, total_weight):
     budget, left_out_s = task.budget, task.left_out_s
     longest, cost = 0.0, 0.0
@@ -238,30 +185,34 @@ def _cost_s(task, seconds, left_out, n_left_out, total_weight):
 
 
 @allocating_kernel
-def _put_in(route, length, at, waypoint):
-    for k in range(length, at, -1):
-        route[k] = route[k - 1]
-    route[at] = waypoint
-
-
-@allocating_kernel
-def _insert_missing(task, routes, lengths, missing, total_weight):
+def _insert_missing(task, routes, lengths, missing, total_weight, by_pieces):
     """Give each missing waypoint, taken out of the last row, to the route it lengthens least.
 
     What makes the longest route longer counts fully, another one's length by its weight.
     """
-    n_uas = len(routes) - 1
+    n_uas, width = len(routes) - 1, routes.shape[1]
     seconds = np.empty(n_uas)
-    trial = np.empty(routes.shape[1], np.int64)
+    trial, pieces = np.empty(width, np.int64), np.empty((3, 4), np.int64)
+    sums = sums_of(task, n_uas, width)
     for u in range(n_uas):
-        seconds[u] = _route_s(task, u, routes[u], lengths[u])
+        seconds[u] = route_s(task, u, routes[u], lengths[u])
+        sum_up(task, sums, u, routes[u], lengths[u])
     for waypoint in missing:
         best, best_u, best_at, best_s = np.inf, -1, 0, 0.0
+        k = 0
+        while routes[n_uas, k] != waypoint:
+            k += 1
         for u in range(n_uas):
+            quick = by_pieces and sums.late[u] == 0 and not task.opens[waypoint] > 0.0
             for at in range(lengths[u] + 1):
-                trial[: lengths[u]] = routes[u, : lengths[u]]
-                _put_in(trial, lengths[u], at, waypoint)
-                new_s = _route_s(task, u, trial, lengths[u] + 1)
+                n = add_piece(pieces, 0, u, 0, at - 1, 0)
+                n = add_piece(pieces, n, n_uas, k, k, 0)
+                n = add_piece(pieces, n, u, at, lengths[u] - 1, 0)
+                if quick:
+                    new_s = pieces_s(task, sums, u, routes, pieces, n)
+                else:
+                    joined(routes, pieces, n, trial)
+                    new_s = route_s(task, u, trial, lengths[u] + 1)
                 old_s, seconds[u] = seconds[u], new_s
                 cost = _cost_s(task, seconds, routes[n_uas], 0, total_weight)
                 seconds[u] = old_s
@@ -269,22 +220,41 @@ def _insert_missing(task, routes, lengths, missing, total_weight):
                     best, best_u, best_at, best_s = cost, u, at, new_s
         if best_u < 0:  # no UAS may fly
             continue
-        _put_in(routes[best_u], lengths[best_u], best_at, waypoint)
+        route, length = routes[best_u], lengths[best_u]
+        for j in range(length, best_at, -1):
+            route[j] = route[j - 1]
+        route[best_at] = waypoint
         lengths[best_u] += 1
         seconds[best_u] = best_s
-        for k in range(lengths[n_uas]):
-            if routes[n_uas, k] == waypoint:
-                routes[n_uas, k : lengths[n_uas] - 1] = routes[n_uas, k + 1 : lengths[n_uas]].copy()
-                lengths[n_uas] -= 1
-                break
+        sum_up(task, sums, best_u, route, lengths[best_u])
+        routes[n_uas, k : lengths[n_uas] - 1] = routes[n_uas, k + 1 : lengths[n_uas]].copy()
+        lengths[n_uas] -= 1
+
+
+@allocating_kernel
+def _below(rng, n, quick):
+    """A random number in 0..n-1; the quick one is not to be told from the exact one."""
+    return int(rng.random() * n) if quick else rng.integers(0, n)
 
 
 @allocating_kernel(nogil=True)
-def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window, total_weight, rng):
+def _search(
+    task,
+    routes,
+    lengths,
+    seconds,
+    moves,
+    hottest_s,
+    coldest_s,
+    window,
+    total_weight,
+    by_pieces,
+    rng,
+):
     """Anneal `routes` in place (its last row: left out); the cost of the best, which is returned.
 
     Args:
-        task: `_Arrays` of the task.
+        task: `RoutingArrays` of the task.
         routes: (U+1, W+1).
         lengths: (U+1,).
         seconds: (U,) written: flight times of the best order.
@@ -293,6 +263,7 @@ def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window,
         coldest_s: last temperature.
         window: see `SearchEffort`.
         total_weight: see `SearchEffort`.
+        by_pieces: see `SearchEffort`.
         rng: source of random numbers.
     """
     neighbours = task.neighbours
@@ -302,114 +273,136 @@ def _search(task, routes, lengths, seconds, moves, hottest_s, coldest_s, window,
     for r in range(n_rows):
         for k in range(lengths[r]):
             row_of[routes[r, k]], place_in[routes[r, k]] = r, k
+    sums = sums_of(task, n_uas if by_pieces else 0, width)
     for u in range(n_uas):
-        seconds[u] = _route_s(task, u, routes[u], lengths[u])
+        seconds[u] = route_s(task, u, routes[u], lengths[u])
+        if by_pieces:
+            sum_up(task, sums, u, routes[u], lengths[u])
     cost = _cost_s(task, seconds, routes[n_uas], lengths[n_uas], total_weight)
     best, best_routes, best_lengths = cost, routes.copy(), lengths.copy()
-    best_seconds, new_seconds = seconds.copy(), seconds.copy()
+    best_seconds = seconds.copy()
     one, two = np.empty(2 * width, np.int64), np.empty(2 * width, np.int64)
+    ours, theirs = np.empty((4, 4), np.int64), np.empty((4, 4), np.int64)
+    temperature = hottest_s
     for move in range(moves):
-        temperature = hottest_s * (coldest_s / hottest_s) ** (move / moves)
-        r = rng.integers(0, n_rows)
+        if move % _SAME_TEMPERATURE == 0 or not by_pieces:
+            temperature = hottest_s * (coldest_s / hottest_s) ** (move / moves)
+        r = _below(rng, n_rows, by_pieces)
         reach = lengths[r] if window <= 0 or r == n_uas else min(window, lengths[r])
         if reach == 0:
             continue
-        i = rng.integers(0, reach)
+        i = _below(rng, reach, by_pieces)
         w = routes[r, i]
         # next to what: mostly a near waypoint, sometimes an end of any route
         if neighbours.shape[1] > 0 and rng.random() < 0.95:
             nearest = min(neighbours.shape[1], 10)
-            v = neighbours[w, rng.integers(0, nearest)]
+            v = neighbours[w, _below(rng, nearest, by_pieces)]
             s, j = row_of[v], place_in[v]
             if s < 0:
                 continue
         else:
-            s = rng.integers(0, n_rows)
-            j = rng.integers(0, lengths[s] + 1) - 1
-        n_one, n_two = -1, -1
+            s = _below(rng, n_rows, by_pieces)
+            j = _below(rng, lengths[s] + 1, by_pieces) - 1
         kind = rng.random()
+        n, m = 0, -1
         if s != r:
             if kind < 0.6 or r == n_uas or s == n_uas:  # relocate a chain
-                chain = 1 if r == n_uas else 1 + rng.integers(0, 3)
+                chain = 1 if r == n_uas else 1 + _below(rng, 3, by_pieces)
                 chain = min(chain, lengths[r] - i)
-                backward, after = rng.random() < 0.5, rng.integers(0, 2)
-                n_one, n_two = lengths[r] - chain, lengths[s] + chain
-                one[:i] = routes[r, :i]
-                one[i:n_one] = routes[r, i + chain : lengths[r]]
+                backward, after = rng.random() < 0.5, _below(rng, 2, by_pieces)
                 at = min(max(j + after, 0), lengths[s])
-                two[:at] = routes[s, :at]
-                for k in range(chain):
-                    two[at + k] = routes[r, i + chain - 1 - k] if backward else routes[r, i + k]
-                two[at + chain : n_two] = routes[s, at : lengths[s]]
+                n = add_piece(ours, 0, r, 0, i - 1, 0)
+                n = add_piece(ours, n, r, i + chain, lengths[r] - 1, 0)
+                m = add_piece(theirs, 0, s, 0, at - 1, 0)
+                m = add_piece(theirs, m, r, i, i + chain - 1, int(backward))
+                m = add_piece(theirs, m, s, at, lengths[s] - 1, 0)
             else:  # exchange the rests: w follows v
                 at = min(max(j + 1, 0), lengths[s])
-                n_one, n_two = i + lengths[s] - at, at + lengths[r] - i
-                one[:i] = routes[r, :i]
-                one[i:n_one] = routes[s, at : lengths[s]]
-                two[:at] = routes[s, :at]
-                two[at:n_two] = routes[r, i : lengths[r]]
+                n = add_piece(ours, 0, r, 0, i - 1, 0)
+                n = add_piece(ours, n, s, at, lengths[s] - 1, 0)
+                m = add_piece(theirs, 0, s, 0, at - 1, 0)
+                m = add_piece(theirs, m, r, i, lengths[r] - 1, 0)
         elif r < n_uas:
-            n_one = lengths[r]
             if kind < 0.5:  # reverse the stretch between
                 low, high = min(i, j) + 1, max(i, j)
                 if rng.random() < 0.5:
                     low, high = max(min(i, j), 0), max(i, j) - 1
                 if high <= low:
                     continue
-                one[:n_one] = routes[r, :n_one]
-                for k in range(low, high + 1):
-                    one[k] = routes[r, low + high - k]
+                n = add_piece(ours, 0, r, 0, low - 1, 0)
+                n = add_piece(ours, n, r, low, high, 1)
+                n = add_piece(ours, n, r, high + 1, lengths[r] - 1, 0)
             else:  # relocate a chain within the route
-                chain = min(1 + rng.integers(0, 3), lengths[r] - i)
+                chain = min(1 + _below(rng, 3, by_pieces), lengths[r] - i)
                 if i <= j < i + chain:
                     continue
-                backward, after = rng.random() < 0.5, rng.integers(0, 2)
-                n = 0
+                backward, after = rng.random() < 0.5, _below(rng, 2, by_pieces)
                 at = j + after
-                for k in range(n_one + 1):
-                    if k == at:
-                        for c in range(chain):
-                            one[n] = routes[r, i + chain - 1 - c] if backward else routes[r, i + c]
-                            n += 1
-                    if k < n_one and not i <= k < i + chain:
-                        one[n] = routes[r, k]
-                        n += 1
-                if n != n_one:
+                if at < 0:
                     continue
+                n = add_piece(ours, 0, r, 0, min(at, i) - 1, 0)
+                if at <= i:
+                    n = add_piece(ours, n, r, i, i + chain - 1, int(backward))
+                    n = add_piece(ours, n, r, at, i - 1, 0)
+                else:
+                    n = add_piece(ours, n, r, i + chain, at - 1, 0)
+                    n = add_piece(ours, n, r, i, i + chain - 1, int(backward))
+                n = add_piece(ours, n, r, max(at, i + chain), lengths[r] - 1, 0)
         else:
             continue
-        for u in range(n_uas):
-            new_seconds[u] = seconds[u]
+        quick = by_pieces and r < n_uas and s < n_uas and sums.late[r] + sums.late[s] == 0
+        n_one, n_two = -1, -1
+        if not quick:
+            n_one = joined(routes, ours, n, one)
+            n_two = joined(routes, theirs, m, two) if m >= 0 else -1
+        old_r, old_s = seconds[min(r, n_uas - 1)], seconds[min(s, n_uas - 1)]
         if r < n_uas:
-            new_seconds[r] = _route_s(task, r, one, n_one)
-        if n_two >= 0 and s < n_uas:
-            new_seconds[s] = _route_s(task, s, two, n_two)
+            if quick:
+                seconds[r] = pieces_s(task, sums, r, routes, ours, n)
+            else:
+                seconds[r] = route_s(task, r, one, n_one)
+        if m >= 0 and s < n_uas:
+            if quick:
+                seconds[s] = pieces_s(task, sums, s, routes, theirs, m)
+            else:
+                seconds[s] = route_s(task, s, two, n_two)
         out, n_out = routes[n_uas], lengths[n_uas]
         if r == n_uas:
             out, n_out = one, n_one
-        elif n_two >= 0 and s == n_uas:
+        elif m >= 0 and s == n_uas:
             out, n_out = two, n_two
-        new = _cost_s(task, new_seconds, out, n_out, total_weight)
+        new = _cost_s(task, seconds, out, n_out, total_weight)
         if new > cost and rng.random() >= np.exp((cost - new) / temperature):
+            if r < n_uas:
+                seconds[r] = old_r
+            if m >= 0 and s < n_uas:
+                seconds[s] = old_s
             continue
         cost = new
-        for u in range(n_uas):
-            seconds[u] = new_seconds[u]
+        if quick:
+            n_one = joined(routes, ours, n, one)
+            n_two = joined(routes, theirs, m, two) if m >= 0 else -1
         routes[r, :n_one] = one[:n_one]
         lengths[r] = n_one
         for k in range(n_one):
             row_of[one[k]], place_in[one[k]] = r, k
-        if n_two >= 0:
+        if by_pieces and r < n_uas:
+            sum_up(task, sums, r, routes[r], n_one)
+        if m >= 0:
             routes[s, :n_two] = two[:n_two]
             lengths[s] = n_two
             for k in range(n_two):
                 row_of[two[k]], place_in[two[k]] = s, k
+            if by_pieces and s < n_uas:
+                sum_up(task, sums, s, routes[s], n_two)
         if cost < best - 1e-9:
             best = cost
-            best_routes[:] = routes
+            for row in range(n_rows):
+                best_routes[row, : lengths[row]] = routes[row, : lengths[row]]
             best_lengths[:] = lengths
             best_seconds[:] = seconds
-    routes[:] = best_routes
+    for row in range(n_rows):
+        routes[row, : best_lengths[row]] = best_routes[row, : best_lengths[row]]
     lengths[:] = best_lengths
     seconds[:] = best_seconds
     return best

@@ -53,10 +53,11 @@ class Fleet:
     Args:
         brief: The mission.
         margin_m: Planned beyond the distances that count as a breach.
+        speed_share: Of the largest horizontal speed, that is flown.
     """
 
-    def __init__(self, brief: MissionBrief, margin_m: float) -> None:
-        self.brief, self.margin_m = brief, margin_m
+    def __init__(self, brief: MissionBrief, margin_m: float, speed_share: float = 1.0) -> None:
+        self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
         self.terrain = Terrain(brief)
         arena = self.terrain.arena
         self.arena = arena
@@ -65,7 +66,7 @@ class Fleet:
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self.programs = [
             FlightProgram(
-                flight_model(arena.vehicles[u]),
+                flight_model(arena.vehicles[u], speed_share=speed_share),
                 space_of(arena, u, margin_m),
                 Landing(
                     np.array(uas.start_m, float), brief.landing_distance_m, brief.landing_speed_mps
@@ -80,7 +81,7 @@ class Fleet:
     def leave_room(self) -> None:
         """Plan with part of the limits from now on: what flies is not what is planned with."""
         self.programs = [
-            replace(program, model=flight_model(self.arena.vehicles[u], _ROOM))
+            replace(program, model=flight_model(self.arena.vehicles[u], _ROOM, self._speed_share))
             for u, program in enumerate(self.programs)
         ]
 
@@ -107,21 +108,21 @@ class Fleet:
         first_s = np.array([terrain.from_here_s(u, x[u, :3]) for u in range(n_uas)])
         idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
         budget_s = np.minimum(self.battery_s(x), until_s - moment.time_s) - _SPARE_S - less_s
-        may = moment.may_work
+        may, legs_share = moment.may_work, _LEGS / self._speed_share
         return RoutingTask(
             open_waypoints=np.flatnonzero(moment.uncovered),
-            first_s=_LEGS * first_s,
-            between_s=_LEGS * terrain.between_s,
+            first_s=legs_share * first_s,
+            between_s=legs_share * terrain.between_s,
             kind=legs.kind,
-            home_s=_LEGS * terrain.home_s + _LANDING_S,
+            home_s=legs_share * terrain.home_s + _LANDING_S,
             idle_s=np.where(may, idle_s, 0.0),
             position_m=np.ascontiguousarray(x[:, :2]),
             velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
-            speed_mps=legs.speed_mps,
+            speed_mps=self._speed_share * legs.speed_mps,
             acceleration_mps2=legs.acceleration_mps2,
             start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
             waypoints_m=self.waypoints_m,
-            turn_s=legs.turn_s,
+            turn_s=legs.turn_s / self._speed_share,
             neighbours=legs.neighbours,
             weight=self._weight,
             not_before_s=self.brief.dt_s * moment.earliest.astype(float),

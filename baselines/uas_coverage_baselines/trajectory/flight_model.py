@@ -68,12 +68,15 @@ class FlightModel(NamedTuple):
     """(3,) cost of squared inputs."""
 
 
-def flight_model(vehicle: np.record, kept_back: float = _KEPT_BACK) -> FlightModel:
+def flight_model(
+    vehicle: np.record, kept_back: float = _KEPT_BACK, speed_share: float = 1.0
+) -> FlightModel:
     """The model of a compiled vehicle.
 
     Args:
         vehicle: Record of VEHICLE_DTYPE.
         kept_back: Share of each limit that is not used.
+        speed_share: Of the largest horizontal speed, that is flown at most.
     """
     A, B = np.zeros((N_X, N_X)), np.zeros((N_X, N_U))
     for axis in range(2):
@@ -90,7 +93,9 @@ def flight_model(vehicle: np.record, kept_back: float = _KEPT_BACK) -> FlightMod
         A=A,
         B=B,
         norms=share
-        * np.array([vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps]),
+        * np.array(
+            [speed_share * vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps]
+        ),
         vertical=share * np.array([vehicle.v_up_max_mps, vehicle.v_down_max_mps]),
         input_low=share * np.array([-alpha[0], -alpha[1], vehicle.lift_min_N]),
         input_high=share * np.array([alpha[0], alpha[1], vehicle.lift_max_N]),

@@ -29,7 +29,12 @@ from uas_coverage_baselines.trajectory.space import Body
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+SMALL_FLEET = 4
+"""So many UAS, or fewer; of larger fleets, less is searched for each."""
+
 _UNFLOWN_S = 1000.0
+_LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
+_HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _BATTERY = "the battery does not last"
 _BUDGETS = 3
 _SHORTER = 0.04  # of the battery, taken off a budget that did not last
@@ -133,7 +138,10 @@ def plan_mission(
     for _ in range(_BUDGETS):
         task = fleet.task(moment, less_s)
         known: set[tuple[bytes, ...]] = set()
-        for order in _orders(task, effort, seed, kept):
+        orders = _orders(task, effort, seed, kept)
+        for order in orders:
+            if task.n_uas > SMALL_FLEET and order.cost_s > _HOPELESS * orders[0].cost_s:
+                break
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
                 known.add(key)
@@ -158,6 +166,7 @@ def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -
             effort.moves,
             hottest_s=4.0 if kept is None or k else 1.5,
             total_weight=effort.total_weight,
+            by_pieces=task.n_uas > SMALL_FLEET,
         )
         return improve_routes(task, begin, search, seed + k)
 
@@ -187,7 +196,9 @@ def _flown(
         for u, route in routes.items()
         if u in flown and np.array_equal(flown[u][0], route)
     }
-    flights = fleet.flights(moment, routes, movers, effort.programs, known, effort.threads)
+    each = max(_LEAST_PROGRAMS, SMALL_FLEET * effort.programs // max(len(routes), 1))
+    programs = min(effort.programs, each)
+    flights = fleet.flights(moment, routes, movers, programs, known, effort.threads)
     planned: dict[int, Planned] = {}
     troubles: dict[int, str] = {}
     for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):

@@ -13,6 +13,7 @@ from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_r
 from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
+    SMALL_FLEET,
     Effort,
     MissionPlan,
     Planned,
@@ -64,8 +65,15 @@ class TrajectoryOptions(PlannerOptions):
     weight_energy: float = Field(
         default=0.6,
         ge=0.0,
-        le=2.0,
-        description="worth of a second of each UAS's flight against one of the mission",
+        le=100.0,
+        description="worth of a second of each UAS's flight against one of the mission; "
+        "of more than four UAS, of four seconds shared by all",
+    )
+    speed_share: float = Field(
+        default=1.0,
+        ge=0.2,
+        le=1.0,
+        description="of the largest horizontal speed: so fast is flown at most",
     )
     margin_m: float = Field(
         default=0.3,
@@ -114,7 +122,7 @@ class Trajectory:
         """Plan the mission from the starts."""
         self._brief, self._seed = brief, seed
         self._world, self._handover = WorldView(brief), Handover(brief)
-        self._fleet = Fleet(brief, self.options.margin_m)
+        self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
@@ -156,9 +164,14 @@ class Trajectory:
 
     def _steer(self) -> Steering:
         assert self.mission_plan is not None
-        moves, weight = self.options.moves // 10, self.options.weight_energy
+        moves, weight = self.options.moves // 10, self._total_weight
         order = self.mission_plan.order
         return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
+
+    @property
+    def _total_weight(self) -> float:
+        """Worth of a second of each UAS's flight: in a large fleet of less, or most stay home."""
+        return self.options.weight_energy * min(1.0, SMALL_FLEET / len(self._brief.uas))
 
     def _seen_movers(self, swarm: SwarmState) -> Movers:
         """What moves, and with it UAS that take no commands."""
@@ -337,7 +350,7 @@ class Trajectory:
             orders,
             round(larger * options.moves),
             options.programs,
-            options.weight_energy,
+            self._total_weight,
             options.threads,
         )
         if unknown.any():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.scenario import Obstacle
-from uas_coverage_env.world import Arena, build_arena, route
+from uas_coverage_env.world import Arena, route
 from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner
 
 FloatArray = NDArray[np.float64]
@@ -37,13 +37,13 @@ class Terrain:
     def __init__(self, brief: MissionBrief) -> None:
         self.legs = Legs(brief)
         self._legs = [self.legs]
-        self._arenas = [build_arena(brief.as_scenario())]
+        self._arenas = [self.legs.arena]
         self.between_s, self.home_s = self.legs.between_s, self.legs.home_s
         raised = _raised(brief)
         if raised is not None:
             around = Legs(raised)
             self._legs.append(around)
-            self._arenas.append(build_arena(raised.as_scenario()))
+            self._arenas.append(around.arena)
             self.between_s = np.minimum(self.between_s, around.between_s)
             self.home_s = np.minimum(self.home_s, around.home_s)
 
