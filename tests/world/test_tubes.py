@@ -10,7 +10,7 @@ from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import LEVELS, with_disturbances
 from uas_coverage_env.world import GoTo, Velocity, build_arena
-from uas_coverage_env.world.arena import ROUTE_MARGIN_M
+from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
 from uas_coverage_env.world.tubes import UNKNOWN_M
 
 TOWER = box("tower", (90.0, 90.0, -50.0), (110.0, 110.0, 0.0))

@@ -6,11 +6,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.geometry import ConvexPolytope, corners_of
-from uas_coverage_env.scenario import NoFlyZone, Scenario
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
@@ -27,7 +25,14 @@ from uas_coverage_env.world.events import (
     is_eventful,
     sensing_records,
 )
-from uas_coverage_env.world.overhangs import overhangs
+from uas_coverage_env.world.obstacles import (
+    OBSTACLE_DTYPE,
+    ROUTE_MARGIN_M,
+    free_nodes,
+    measure,
+    obstacle_records,
+    overfly_limit,
+)
 from uas_coverage_env.world.routes import node_distances
 from uas_coverage_env.world.tubes import route_tube_m, tubes_m
 from uas_coverage_env.world.waypoints import (
@@ -38,15 +43,6 @@ from uas_coverage_env.world.waypoints import (
     waypoint_columns,
     waypoint_records,
 )
-
-NEAR_M = 20.0
-"""Obstacles that are farther need no exact distance, unless nothing is nearer [m]."""
-
-ROUTE_MARGIN_M = 1.0
-"""Routes keep this much more than the clearance that counts as a breach [m]."""
-
-NODE_MARGIN_M = 1.0
-"""Corners of routes lie this much outside of what routes avoid, so that they see past it [m]."""
 
 LOOKAHEAD_S = 14.0
 """A braking flight takes less than this from the highest speed [s]."""
@@ -72,43 +68,6 @@ UAS_DTYPE = _record(
         ("dod_per_s", "f8"),
         # bits, see `WAYPOINT_DTYPE`
         ("sensors", "i8"),
-    ]
-)
-
-OBSTACLE_DTYPE = _record(
-    [
-        # rows of `normals`: the hull, and the walls of its footprint widened by wall_m
-        ("first_face", "i8"),
-        ("last_face", "i8"),
-        # what commands keep clear of: the hull again, or with its upper faces raised
-        ("first_kept", "i8"),
-        ("last_kept", "i8"),
-        ("first_side", "i8"),
-        ("last_side", "i8"),
-        ("safe_distance_m", "f8"),
-        # the box around the hull, by its middle and half its sides
-        ("hull_middle_m", "f8", (3,)),
-        ("hull_half_m", "f8", (3,)),
-        # outside of this box every point is at least near_m away
-        ("near_m", "f8"),
-        ("lower_m", "f8", (3,)),
-        ("upper_m", "f8", (3,)),
-        # the same box by its middle and one over half its sides; beyond it, s times as far from
-        # the middle as its walls, every point is at least near_m + rise_m (s - 1) away
-        ("middle_m", "f8", (3,)),
-        ("per_half_m", "f8", (3,)),
-        ("rise_m", "f8"),
-        # outside of this box every point is farther away than `rules.measured_m`
-        ("measured_lower_m", "f8", (3,)),
-        ("measured_upper_m", "f8", (3,)),
-        # routes keep wall_m beside it, or pass over it at roof_m, positive up, unless it is tall
-        ("wall_m", "f8"),
-        ("roof_m", "f8"),
-        ("tall", "?"),
-        # there is room below a part of it
-        ("overhangs", "?"),
-        # nothing stands there: no contact
-        ("no_fly_zone", "?"),
     ]
 )
 
@@ -227,13 +186,13 @@ def build_arena(
     waypoints = waypoint_records(scenario)
     rules["unit_m"] = unit_m_of(waypoints["position_m"])
     targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
-    overfly_m = _overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
+    overfly_m = overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
     blocks, parameters = disturbance_tables(disturbances)
     rules["disturbed"] = blocks["acts"].any()
     tube_m = tubes_m(scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]))
     route_m = ROUTE_MARGIN_M + route_tube_m(tube_m)
-    obstacles, planes, corners = _obstacles(scenario, radius_m, overfly_m, route_m)
-    _measure(obstacles, scenario, float(rules["measured_m"][0]))
+    obstacles, planes, corners = obstacle_records(scenario, radius_m, overfly_m, route_m)
+    measure(obstacles, scenario, float(rules["measured_m"][0]))
     fence = scenario.fence
     rules["fence_first"] = sum(len(rows[1]) for rows in planes)
     rules["fence_last"] = rules["fence_first"] + fence.n_faces
@@ -243,7 +202,7 @@ def build_arena(
     rules["overhangs"] = obstacles["overhangs"].any()
     rules["eventful"] = is_eventful(scenario)
     rules["asks"] = waypoints["asks"].any()
-    nodes_m = _free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
+    nodes_m = free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
         vehicles=_vehicles(scenario),
@@ -333,112 +292,3 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     rules["brake"]["kind"] = CLIMB
     rules["lookahead_steps"] = np.ceil(LOOKAHEAD_S / scenario.dt_s)
     return rules
-
-
-def _overfly_limit(target_altitudes_m: NDArray[np.float64], ceiling_m: float) -> float:
-    """Roofs up to here are flown over: 15 m above the usual target, below the ceiling [m]."""
-    return min(float(np.median(target_altitudes_m)) + 15.0, ceiling_m)
-
-
-def _widened(hull: ConvexPolytope, distance_m: float) -> NDArray[np.float64]:
-    """Corners of {p : D(p) ≤ distance_m}: what the paper's clearance makes of a hull.
-
-    Args:
-        hull: The hull.
-        distance_m: [m].
-
-    Returns:
-        (V, 3) [m].
-    """
-    inside_m = hull.vertices_m.mean(axis=0)
-    return corners_of(hull.normals, hull.offsets_m - distance_m, inside_m)
-
-
-def _footprint(corners_m: NDArray[np.float64]) -> ConvexHull:
-    # to the micrometre: corners that differ by rounding only would make sides of no length
-    return ConvexHull(np.unique(corners_m[:, :2].round(6), axis=0))
-
-
-def _obstacles(
-    scenario: Scenario, radius_m: float, overfly_m: float, route_m: float
-) -> tuple[
-    NDArray[np.void],
-    list[tuple[NDArray[np.float64], NDArray[np.float64]]],
-    list[NDArray[np.float64]],
-]:
-    """The obstacles, the planes of their hulls and footprints, and the corners to turn at."""
-    records = np.zeros(len(scenario.obstacles), dtype=OBSTACLE_DTYPE)
-    ground_m = float(-scenario.fence.vertices_m[:, 2].max())
-    planes = []
-    corners = []
-    first = 0
-    for record, obstacle, hull, kept in zip(
-        records, scenario.obstacles, scenario.hulls, scenario.kept_hulls, strict=True
-    ):
-        wall_m = radius_m + obstacle.safe_distance_m + route_m
-        near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M)
-        widened_m = _widened(kept, wall_m)
-        footprint = _footprint(widened_m)
-        sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
-        planes.append((hull.normals, hull.offsets_m))
-        planes.append((sides, footprint.equations[:, 2]))
-        low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
-        record["hull_middle_m"] = (low_m + high_m) / 2
-        record["hull_half_m"] = (high_m - low_m) / 2 + EPS_M
-        near = _widened(kept, near_m)
-        record["first_face"] = first
-        record["last_face"] = record["first_side"] = first + hull.n_faces
-        first += hull.n_faces + len(sides)
-        record["last_side"] = first
-        record["first_kept"], record["last_kept"] = record["first_face"], record["last_face"]
-        if kept is not hull:
-            planes.append((kept.normals, kept.offsets_m))
-            record["first_kept"] = first
-            first += kept.n_faces
-            record["last_kept"] = first
-        record["safe_distance_m"] = obstacle.safe_distance_m
-        record["near_m"] = near_m
-        # the corners are rounded in the last digits: widen the box rather than miss a contact
-        record["lower_m"] = near.min(axis=0) - EPS_M
-        record["upper_m"] = near.max(axis=0) + EPS_M
-        record["middle_m"] = (record["lower_m"] + record["upper_m"]) / 2
-        record["per_half_m"] = 2 / (record["upper_m"] - record["lower_m"])
-        record["rise_m"] = near_m - max(0.0, float(hull.signed_distance(record["middle_m"])))
-        record["wall_m"] = wall_m
-        record["roof_m"] = -widened_m[:, 2].min()
-        record["tall"] = record["roof_m"] > overfly_m
-        record["overhangs"] = overhangs(hull, ground_m)
-        record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
-        if record["tall"]:
-            outline = _footprint(_widened(kept, wall_m + NODE_MARGIN_M))
-            corners.append(outline.points[outline.vertices])
-    return records, planes, corners
-
-
-def _measure(obstacles: NDArray[np.void], scenario: Scenario, measured_m: float) -> None:
-    """Note around each obstacle the box outside of which it is farther away than measured_m."""
-    obstacles["measured_lower_m"], obstacles["measured_upper_m"] = -math.inf, math.inf
-    if measured_m < math.inf:
-        for record, hull in zip(obstacles, scenario.hulls, strict=True):
-            widened_m = _widened(hull, measured_m)
-            record["measured_lower_m"] = widened_m.min(axis=0) - EPS_M
-            record["measured_upper_m"] = widened_m.max(axis=0) + EPS_M
-
-
-def _free_nodes(
-    scenario: Scenario,
-    corners: list[NDArray[np.float64]],
-    obstacles: NDArray[np.void],
-    normals: NDArray[np.float64],
-    offsets_m: NDArray[np.float64],
-    target_altitudes_m: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """The corners that lie inside the fence and outside of all other tall obstacles."""
-    nodes_m = np.concatenate([np.zeros((0, 2)), *corners])
-    down_m = np.full((len(nodes_m), 1), -np.median(target_altitudes_m))
-    inset_m = scenario.geofence.margin_m + NODE_MARGIN_M
-    free = scenario.fence.signed_distance(np.hstack([nodes_m, down_m])) <= -inset_m
-    for obstacle in obstacles[obstacles["tall"]]:
-        sides = slice(obstacle["first_side"], obstacle["last_side"])
-        free &= (nodes_m @ normals[sides, :2].T + offsets_m[sides]).max(axis=1) > 0.0
-    return np.ascontiguousarray(nodes_m[free])
