@@ -7,6 +7,7 @@ QUICK = {
     "agents/test_observer.py": "",
     "agents/test_stuck_detection.py": "",
     "agents/test_policy_directory.py": "",
+    "agents/test_route_policy.py": "only test_the_networks_of_the_file_are_those_that_are_compiled",
     "agents/test_waypoint_observation.py": "",
     "autopilot/test_guidance.py": "",
     "autopilot/test_return_mode.py": "",

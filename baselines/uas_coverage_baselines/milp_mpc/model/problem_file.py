@@ -121,6 +121,7 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
             for way in problem.ways_home
         ],
         "weights": asdict(problem.weights),
+        "tube_m": None if problem.tube_m is None else problem.tube_m.tolist(),
     }
 
 
@@ -165,13 +166,15 @@ def _problem(
             else Target(np.array(target["position_m"], float), target["weight"], target["waypoint"])
             for target in row["targets"]
         ),
-        # files from before these were written: no tours, straight ways, the default weights
+        # files from before these were written: no tours, straight ways, the default weights, no
+        # tubes
         tours=tuple(None if tour is None else _read_tour(tour) for tour in row.get("tours", ())),
         ways_home=tuple(
             None if way is None else WayHome(np.array(way["corner_m"], float), way["onward_s"])
             for way in row.get("ways_home", ())
         ),
         weights=Weights(**row.get("weights", {})),
+        tube_m=None if row.get("tube_m") is None else np.array(row["tube_m"], float),
         **fields,
     )
 
