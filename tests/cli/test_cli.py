@@ -150,6 +150,13 @@ def test_a_check_describes_and_draws_a_scenario(elsewhere, capsys):
     assert (elsewhere / "village.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_check_says_what_waypoints_ask_for_and_who_carries_it(elsewhere, capsys):
+    assert main(["scenarios", "check", "mixed_fleet"]) == 0
+    out = capsys.readouterr().out
+    assert "15 for camera: mapper" in out
+    assert "usable to 25%, carries thermal, gas" in out
+
+
 def test_a_check_replaces_a_picture_only_where_it_was_asked_to(elsewhere, capsys):
     picture = elsewhere / "drawn.png"
     picture.write_bytes(b"precious")

@@ -18,6 +18,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import (
     SERIES,
     Scenario,
+    Uas,
     load_scenario,
     out_of_reach,
     scenario_names,
@@ -115,15 +116,33 @@ def _lines(scenario: Scenario) -> list[str]:
         f"waypoints  {len(scenario.waypoints)}, sum of weights {weight:g}",
         f"obstacles  {len(scenario.obstacles)} fixed, {len(scenario.moving_obstacles)} moving",
         f"time       at most {scenario.max_steps} steps of {scenario.dt_s:g} s",
+        *(f"asked      {line}" for line in _asked(scenario)),
         *(f"place      {line}" for line in _place(scenario)),
         *(f"disturbed  {line}" for line in _disturbances(scenario)),
         *(f"tube       {line}" for line in _tubes(scenario)),
         *(
             f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, "
-            f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}"
+            f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}{_carried(uas)}"
             for uas in scenario.uas
         ),
     ]
+
+
+def _carried(uas: Uas) -> str:
+    names = ", ".join(sensor.name for sensor in uas.sensors)
+    return f", carries {names}" if names else ""
+
+
+def _asked(scenario: Scenario) -> list[str]:
+    """How many waypoints ask for which sensor, and who carries it."""
+    wanted = [waypoint.sensor for waypoint in scenario.waypoints]
+    lines = []
+    for name in dict.fromkeys(one for one in wanted if one is not None):
+        carriers = [
+            uas.name for uas in scenario.uas if any(one.name == name for one in uas.sensors)
+        ]
+        lines.append(f"{wanted.count(name)} for {name}: {', '.join(carriers) or 'nobody'}")
+    return lines
 
 
 def _place(scenario: Scenario) -> list[str]:
