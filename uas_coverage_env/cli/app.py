@@ -39,6 +39,11 @@ COMMANDS = (
         "Fly a planner with different options, and draw time against energy.",
     ),
     CommandEntry(
+        "demonstrate",
+        at(f"{_CLI}.demonstrate:demonstrate_command"),
+        "Fly missions and keep observations and what was done, for imitation.",
+    ),
+    CommandEntry(
         "score",
         at(f"{_CLI}.score:score_command"),
         "Fly the missions of a level and print the scores (docs/levels.md).",

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +11,7 @@ import typer
 from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.figures_of_flight import data
 from uas_coverage_env.cli.flights import keep_flight, report_flight
+from uas_coverage_env.cli.options import options_of
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
@@ -106,7 +106,7 @@ def run(
     if sorties is not None and live:
         raise InputError("--live shows one flight: give either --live or --sorties")
     mission = loaded(scenario)
-    player = load_planner(planner, _options(option or ()))
+    player = load_planner(planner, options_of(option or ()))
     # KIND:ARGUMENT may hold a path
     player_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")
     directory = out or free_directory(f"{mission.name}-{player_name}-{seed}")
@@ -142,18 +142,6 @@ def run(
     if as_json:
         typer.echo(json.dumps(data(flight, str(directory)), indent=2))
     raise typer.Exit(_exit_code(flight, steps))
-
-
-def _options(pairs: Sequence[str]) -> dict[str, str]:
-    options: dict[str, str] = {}
-    for pair in pairs:
-        key, separator, value = (part.strip() for part in pair.partition("="))
-        if not key or not separator:
-            raise InputError(f"--option {pair!r}: should be KEY=VALUE, as in horizon=12")
-        if key in options:
-            raise InputError(f"--option {key} is given twice; give it once")
-        options[key] = value
-    return options
 
 
 def free_directory(name: str) -> Path:

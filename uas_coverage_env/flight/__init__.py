@@ -1,6 +1,7 @@
 """What is kept of a flight: planners by name, the rollout, its record, measures and directory."""
 
 from uas_coverage_env.files.errors import PlannerError
+from uas_coverage_env.flight.demonstrations import Demonstrations, demonstrate
 from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.flight.evaluation import Episode, Evaluation, evaluate
 from uas_coverage_env.flight.flight import Flight
@@ -45,6 +46,7 @@ __all__ = [
     "AssistedOptions",
     "Decision",
     "DecisionRecord",
+    "Demonstrations",
     "Episode",
     "Evaluation",
     "Flight",
@@ -63,6 +65,7 @@ __all__ = [
     "check_directory",
     "coverage",
     "covered_at",
+    "demonstrate",
     "describe_planner",
     "describe_planners",
     "draw_flight",
