@@ -10,7 +10,7 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Demonstrations, demonstrate, episode_return
+from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate, episode_return
 from uas_coverage_env.flight.demonstrations import UNKNOWN_CHOICE, written
 
 SCENARIO = load_scenario("open_field")
@@ -46,7 +46,7 @@ def test_the_choice_is_the_waypoint_that_the_uas_covers_next():
     class Watch:
         def __init__(self):
             self.planner, self.swarms = load_planner("nearest-waypoint"), []
-            self.assistants = self.planner.assistants
+            self.assistants = Assistants(return_mode=True, safety_filter=True)
 
         def reset(self, brief, seed):
             self.planner.reset(brief, seed)

@@ -18,7 +18,6 @@ from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.rollout import Progress, rollout
 from uas_coverage_env.mission import MissionBrief
@@ -142,7 +141,9 @@ def demonstrate(scenario: Scenario, planner: Planner | str, seed: int = 0) -> De
     }
     swarms = [swarm for swarm, _, _ in seen]
     next_covered = _next_covered(scenario, swarms)
-    rows = [_rows_of(scenario, flight, k, seen, next_covered[k]) for k in range(len(seen) - 1)]
+    assert flight.reward_terms is not None  # as every rollout keeps them
+    paid = flight.reward_terms.sum(axis=2)
+    rows = [_rows_of(scenario, paid[k], k, seen, next_covered[k]) for k in range(len(seen) - 1)]
     columns = {name: np.concatenate([row[name] for row in rows]) for name in _COLUMNS}
     mission = np.zeros(len(columns["step"]), np.int64)
     return Demonstrations(**columns, mission=mission, missions=(about,))
@@ -150,7 +151,7 @@ def demonstrate(scenario: Scenario, planner: Planner | str, seed: int = 0) -> De
 
 def _rows_of(
     scenario: Scenario,
-    flight: Flight,
+    paid: NDArray[np.float64],
     k: int,
     seen: Sequence[tuple[SwarmState, NDArray[np.float32], NDArray[np.int64]]],
     next_covered: NDArray[np.int64],
@@ -168,7 +169,7 @@ def _rows_of(
         "velocity": _shares(VELOCITY.scaled_to(scenario)[flies], asked),
         "choice": np.where(wanted[:, 0] < 0, HOME_CHOICE, choice),
         "choice_mask": np.column_stack([offered, np.ones(len(flies), np.bool_)]),
-        "reward": flight.reward_terms[k, flies].sum(axis=1),
+        "reward": paid[flies],
         "step": np.full(len(flies), swarm.step, np.int64),
         "uas": flies.astype(np.int64),
     }
