@@ -15,7 +15,7 @@ from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 
 from uas_coverage_env.flight import load_planner
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import Attempts, MissionBrief
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, compile_vehicle
@@ -124,3 +124,13 @@ def test_charge_for_the_way_home_overrules_every_plan(monkeypatch):
     first = flight.reasons.index(Reason.CHARGE)
     assert set(flight.reasons[first:]) == {Reason.CHARGE}, "it is not sent out again"
     assert 0.70 < flight.world.state.x[0, DOD] < 0.75
+
+
+def test_a_uas_that_came_no_nearer_to_home_flies_slowly_only_at_its_end(monkeypatch):
+    monkeypatch.setattr(moving_horizon, "decide", Hovering())
+    monkeypatch.setattr(Attempts, "is_hard", lambda *_: True)
+    flight = Flight("wall", "milp-mpc").behind(70.0, 62.0, -10.0).until(landed, 100)
+    assert landed(flight.world.state)
+    assert flight.world.state.status[0] == LANDED
+    assert Reason.STANDSTILL in flight.reasons
+    assert len(flight.reasons) <= 45, "78 where all of the way home is flown slowly"

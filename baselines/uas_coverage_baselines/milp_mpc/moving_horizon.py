@@ -35,6 +35,8 @@ from uas_coverage_env.mission import (
 )
 from uas_coverage_env.world import FLYING, HOME, Command, GoTo, Mode, SwarmState
 
+_CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly
+
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
 
 
@@ -185,11 +187,17 @@ class MovingHorizon(ABC, Generic[Chosen]):
             if target is None:
                 continue
             hard = self._attempts.is_hard(swarm.names.index(name), target)
+            # the whole way home flown slowly takes more charge than there is
+            careful = hard and (target != HOME or self._is_near_home(problem, uas))
             if name in self._called:
-                result[name] = Sent(HOME, careful=hard), Reason.CHARGE
+                result[name] = Sent(HOME, careful), Reason.CHARGE
             elif hard:
-                result[name] = Sent(target, careful=True), Reason.STANDSTILL
+                result[name] = Sent(target, careful), Reason.STANDSTILL
         return result
+
+    def _is_near_home(self, problem: PlanningProblem, uas: int) -> bool:
+        away_m = problem.x0[uas, :2] - problem.home_m[uas, :2]
+        return float(np.hypot(*away_m)) < _CAREFUL_WITHIN_M
 
     def _effort(self) -> Effort:
         return Effort(
