@@ -22,6 +22,8 @@ export interface ControlEvents {
   trail(kind: TrailKind): void;
   together(on: boolean): void;
   save(what: Saved): void;
+  /** Ask for other flights; null: none can be opened. */
+  open: (() => void) | null;
   /** Turn and tilt the camera [rad], and come nearer by a factor. */
   turn(turn: number, tilt: number, nearer: number): void;
 }
@@ -74,6 +76,7 @@ export class Controls {
     private readonly choice: ViewChoice,
     private readonly has3d: boolean,
     private readonly events: ControlEvents,
+    signal: AbortSignal,
   ) {
     this.speed.append(...SPEEDS.map((n) => element("option", { value: String(n) }, `${n}×`)));
     const names = flights.reduce((a, b) => (a.uas >= b.uas ? a : b)).scene.uas;
@@ -98,13 +101,16 @@ export class Controls {
     });
     const overview = button("Overview", "Whole area (O)");
     this.top = button("Top", "From above (T)");
+    const opener = button("Open", "Another flight beside this one: its replay.html (or drop it here)");
+    opener.hidden = events.open === null;
+    opener.addEventListener("click", () => events.open?.());
     const question = button("?", "Keys (?)");
     question.className = "keys";
     this.element = element(
       "footer",
       { class: "controls" },
       element("div", { class: "row" }, this.play, element("div", { class: "track" }, this.slider, this.marks), this.clockText, this.speed),
-      element("div", { class: "row views" }, this.kind, this.both, overview, this.top, this.followed, this.trails, this.saved, question),
+      element("div", { class: "row views" }, this.kind, this.both, overview, this.top, this.followed, this.trails, this.saved, opener, question),
       this.help,
     );
     this.renew(flights);
@@ -135,7 +141,7 @@ export class Controls {
       const target = event.target as HTMLElement;
       if (event.detail > 0 && target instanceof HTMLButtonElement) target.blur();
     });
-    addEventListener("keydown", (event) => this.key(event));
+    addEventListener("keydown", (event) => this.key(event), { signal });
   }
 
   draw(): void {

@@ -9,11 +9,13 @@ export function isDark(): boolean {
   return DARK.matches;
 }
 
-export function onThemeChange(changed: () => void): void {
-  DARK.addEventListener("change", () => {
+/** Call back on light and dark, until the signal. */
+export function onThemeChange(changed: () => void, signal: AbortSignal): void {
+  const forget = () => {
     known.clear();
     changed();
-  });
+  };
+  DARK.addEventListener("change", forget, { signal });
 }
 
 /** A custom property of the style, as "--ink". */

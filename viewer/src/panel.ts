@@ -98,6 +98,11 @@ export class Panel {
     this.resize();
   }
 
+  /** Leave the graphics card to others. */
+  end(): void {
+    this.scene?.end();
+  }
+
   /** The 3D scene, or the map. */
   show(threeD: boolean): void {
     this.view = threeD && this.scene ? this.scene : this.map;

@@ -200,6 +200,12 @@ export class SceneView implements View {
     this.framed = null;
     this.camera.take(pose);
   }
+
+  /** A browser keeps few of these: give it back. */
+  end(): void {
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
 }
 
 /** Light from the north-west, the common direction on maps. */
