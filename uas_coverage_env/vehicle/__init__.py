@@ -1,6 +1,7 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
 from uas_coverage_env.vehicle.air import enter_air, leave_air, push
+from uas_coverage_env.vehicle.attitude import body_attitude
 from uas_coverage_env.vehicle.battery import (
     battery_current_A,
     battery_segments,
@@ -25,7 +26,10 @@ from uas_coverage_env.vehicle.deviation import (
 )
 from uas_coverage_env.vehicle.endurance import Endurance, endurance, flight_time_s
 from uas_coverage_env.vehicle.inner_loop import (
+    COURSE_SPEED_MPS,
     acceleration_wrench,
+    face_course,
+    within_half_turn,
     reseed_reference,
     velocity_climb_wrench,
     velocity_wrench,
@@ -82,6 +86,7 @@ from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_t
 
 __all__ = [
     "CAPACITY",
+    "COURSE_SPEED_MPS",
     "DELTA_THRUST",
     "DEVIATIONS",
     "DOD",
@@ -124,6 +129,7 @@ __all__ = [
     "add_force",
     "battery_current_A",
     "battery_segments",
+    "body_attitude",
     "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
@@ -134,9 +140,11 @@ __all__ = [
     "endurance",
     "enter_air",
     "exact_delta_thrust",
+    "face_course",
     "fit_thrust_correction",
     "flight_time_s",
     "fly_kinematics",
+    "within_half_turn",
     "leave_air",
     "limit_names",
     "limits_exceeded",

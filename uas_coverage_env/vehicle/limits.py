@@ -4,7 +4,8 @@ Inputs need no such question: they are kept within U where they act (`clip_wrenc
 leave X all the same, since torques within their limits add up to any rate, tilt and speed.
 
 The thrust correction is judged by the current that it draws. The bound of the heading is not a
-capability: it keeps the linearisation valid.
+capability: it keeps the linearisation of the plan valid, and does not hold for a UAS that looks
+where it flies (`heading = "course"`), whose tilts are on axes that do not turn.
 """
 
 import math
@@ -101,6 +102,7 @@ def write_limited(x, voltage_V, current_A, nonlinear, values):
     values[_TILT_RATE] = math.sqrt(x[WX] * x[WX] + x[WY] * x[WY])
     yaw_rate = x[WZ]
     if nonlinear:
+        # on axes that do not turn, cos(phi) / cos(theta) of the rate: within 7 % of it
         yaw_rate = math.sin(x[PHI]) * x[WY] + math.cos(x[PHI]) * x[WZ]
         yaw_rate /= math.cos(x[THETA])
     values[_YAW_RATE] = abs(yaw_rate)

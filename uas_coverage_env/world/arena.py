@@ -234,7 +234,9 @@ def build_arena(
 
 def _vehicles(scenario: Scenario) -> NDArray[np.void]:
     compiled = {v: compile_vehicle(v, scenario.dt_s) for v in set(scenario.vehicles)}
-    return np.stack([compiled[vehicle] for vehicle in scenario.vehicles])
+    records = np.stack([compiled[vehicle] for vehicle in scenario.vehicles])
+    records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
+    return records
 
 
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
