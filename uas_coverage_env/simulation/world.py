@@ -59,9 +59,9 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
     step = int(state.step[0])
     sample = min(step, len(arena.moving_path_m) - 1)
     x = state.as_told().x.copy()
-    heading_rad = x[:, PSI].copy()
-    turning = arena.vehicles["follows_course"]
+    turning, turned_rad = arena.vehicles["follows_course"], np.zeros(0)
     if turning.any():
+        turned_rad = np.where(turning, x[:, PSI], 0.0)
         x[turning, PSI] = x[turning, WZ] = 0.0
     return SwarmState(
         time_s=step * scenario.dt_s,
@@ -77,7 +77,7 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         moving_position_m=arena.moving_path_m[sample].copy(),
         moving_velocity_mps=arena.moving_velocity_mps[sample].copy(),
         responds=responding(arena, state),
-        heading_rad=heading_rad,
+        turned_rad=turned_rad,
     )
 
 

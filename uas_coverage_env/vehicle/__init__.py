@@ -29,10 +29,10 @@ from uas_coverage_env.vehicle.inner_loop import (
     COURSE_SPEED_MPS,
     acceleration_wrench,
     face_course,
-    within_half_turn,
     reseed_reference,
     velocity_climb_wrench,
     velocity_wrench,
+    within_half_turn,
 )
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
@@ -144,7 +144,6 @@ __all__ = [
     "fit_thrust_correction",
     "flight_time_s",
     "fly_kinematics",
-    "within_half_turn",
     "leave_air",
     "limit_names",
     "limits_exceeded",
@@ -164,5 +163,6 @@ __all__ = [
     "vehicle_names",
     "velocity_climb_wrench",
     "velocity_wrench",
+    "within_half_turn",
     "write_limited",
 ]

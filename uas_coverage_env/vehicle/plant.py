@@ -342,6 +342,8 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
     _euler_rates(x_next, roll)
     if rarely(turns):
         roll[2] = 0.0
+        # the body's own rate, until the end of the step
+        x_next[WZ] -= math.tan(x_next[PHI]) * x_next[WY]
     first[_ROLL_RATE] += math.sin(x_next[THETA]) * roll[2]
     first[_PITCH_RATE] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
     correction = 0.0
@@ -382,5 +384,7 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
         _integrate(
             vehicle, deviation, x_next, h, more_thrust * thrust, torque, slope, total, middle
         )
+    if rarely(turns):
+        x_next[WZ] = _turn_rate(x_next)
     u[DELTA_THRUST] = correction / steps
     return energy / charge, charge / vehicle.dt_s

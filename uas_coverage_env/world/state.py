@@ -150,7 +150,8 @@ class SwarmState:
         moving_position_m: (M, 3) [m] centres of moving obstacles, now.
         moving_velocity_mps: (M, 3) [m/s] their velocities, now.
         responds: (U,) takes commands now; not without its radio, nor before a late start.
-        heading_rad: (U,) where they look, clockwise from north, not wrapped; by default as in `x`.
+        turned_rad: (U,) [rad] how far those have turned that look where they fly, 0 for the others;
+            empty where none does.
     """
 
     time_s: float
@@ -166,11 +167,12 @@ class SwarmState:
     moving_position_m: NDArray[np.float64]
     moving_velocity_mps: NDArray[np.float64]
     responds: NDArray[np.bool_]
-    heading_rad: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    turned_rad: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
-    def __post_init__(self) -> None:
-        if len(self.heading_rad) != len(self.x):
-            object.__setattr__(self, "heading_rad", self.x[:, PSI].copy())
+    @property
+    def heading_rad(self) -> NDArray[np.float64]:
+        """(U,) where they look, clockwise from north [rad], beyond a half turn too."""
+        return self.x[:, PSI] + self.turned_rad if len(self.turned_rad) else self.x[:, PSI].copy()
 
     @property
     def active(self) -> tuple[str, ...]:

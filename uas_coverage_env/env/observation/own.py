@@ -28,7 +28,13 @@ from uas_coverage_env.world import FLYING
 _FEATURES = (
     Feature("position", 3, -1, 1, "north, east, up in the box around the fence; ±1: its sides"),
     Feature("velocity", 3, -2, 2, "north, east, down / the vehicle's limits"),
-    Feature("attitude", 3, -2, 2, "roll, pitch / tilt limit, yaw / yaw limit (heading = course: yaw in ±pi / pi)"),
+    Feature(
+        "attitude",
+        3,
+        -2,
+        2,
+        "roll, pitch / tilt limit, yaw / yaw limit (heading = course: yaw in ±pi / pi)",
+    ),
     Feature("rates", 3, -2, 2, "body rates / the vehicle's limits"),
     Feature("reference", 2, -2, 2, "velocity that the inner loop tracks, as `velocity`"),
     flag("flying", "1 while it flies, 0 once landed or lost"),
