@@ -24,6 +24,7 @@ from uas_coverage_env.vehicle import (
     compile_vehicle,
     lpv_step,
     plant_step,
+    tilts_and_turn,
 )
 from uas_coverage_env.vehicle.deviation import N_DEVIATIONS
 from uas_coverage_env.vehicle.plant import _rigid_body
@@ -112,6 +113,7 @@ def test_roll_pitch_and_yaw_of_a_body_are_those_of_its_tilts_and_turn(phi, theta
     np.testing.assert_allclose(rotation(angles), turned_after(x[PHI:WX]), rtol=0, atol=1e-9)
     # the same turn, and not another number of them
     assert abs(angles[2] - psi) < np.pi
+    np.testing.assert_allclose(tilts_and_turn(angles), x[PHI:WX], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("dt_s", STEPS_S)

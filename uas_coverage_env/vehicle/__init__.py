@@ -1,7 +1,7 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
 from uas_coverage_env.vehicle.air import enter_air, leave_air, push
-from uas_coverage_env.vehicle.attitude import body_attitude
+from uas_coverage_env.vehicle.attitude import body_attitude, tilts_and_turn
 from uas_coverage_env.vehicle.battery import (
     battery_current_A,
     battery_segments,
@@ -160,6 +160,7 @@ __all__ = [
     "return_threshold",
     "seconds_to_land",
     "simulate_battery",
+    "tilts_and_turn",
     "vehicle_names",
     "velocity_climb_wrench",
     "velocity_wrench",
