@@ -71,7 +71,7 @@ def test_the_yaw_of_a_uas_that_looks_where_it_flies_is_shown_whole():
     for _ in range(14):
         south = {agent: np.array([-0.4, 0.1, 0.0]) for agent in env.agents}
         observations, *_ = env.step(south)
-    yaw, other = (feature(observations[a], "own", "attitude")[2] for a in env.agents)
+    yaw, other = (feature(observations[a], "own", "attitude")[0, 2] for a in env.agents)
     assert yaw == pytest.approx(env.swarm_state().heading_rad[0] / math.pi)
     assert 0.9 < yaw < 1.0
     assert other == 0.0
