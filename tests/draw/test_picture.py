@@ -1,3 +1,4 @@
+import dataclasses
 import subprocess
 import sys
 from typing import Any
@@ -36,6 +37,15 @@ def pixel(scenario, position_m, size_px=512):
     """Row and column of a place in the picture."""
     x, y = Frame.around(scenario.fence.vertices_m, size_px).pixels(np.array(position_m)) / 2
     return round(float(y)), round(float(x))
+
+
+def test_a_uas_is_drawn_as_it_looks(village, swarm):
+    east = dataclasses.replace(swarm, turned_rad=np.array([0.5 * np.pi, 0.0]))
+    top, bottom, left, right = differs(picture(village, swarm), picture(village, east))
+    row, column = pixel(village, swarm.x[0, :3])
+    assert top <= row <= bottom
+    assert left <= column <= right
+    assert max(bottom - top, right - left) < 30
 
 
 def test_a_picture_is_an_array_of_bytes(village, swarm):

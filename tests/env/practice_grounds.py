@@ -80,9 +80,10 @@ def practice_ground(
 
 
 def with_roles(scenario: Scenario) -> Scenario:
-    """The same, every second waypoint for what the last UAS carries, low and slow."""
+    """The same, every second waypoint for what the last UAS carries, which looks where it flies."""
     fleet = list(scenario.uas)
-    fleet[-1] = fleet[-1].model_copy(update={"sensors": (Sensor(name="thermal"),)})
+    role = {"sensors": (Sensor(name="thermal"),), "heading": "course"}
+    fleet[-1] = fleet[-1].model_copy(update=role)
     asked = {"sensor": "thermal", "heights_m": (5.0, 15.0), "max_speed_mps": 4.0}
     waypoints = [
         waypoint.model_copy(update=asked if w % 2 == 0 else {})

@@ -63,6 +63,20 @@ def test_every_number_belongs_to_exactly_one_feature():
     assert sorted(np.concatenate(columns).tolist()) == list(range(OBSERVATION_SIZE))
 
 
+def test_the_yaw_of_a_uas_that_looks_where_it_flies_is_shown_whole():
+    ground = practice_ground()
+    fleet = (ground.uas[0].model_copy(update={"heading": "course"}), ground.uas[1])
+    env = CoverageParallelEnv(ground.model_copy(update={"uas": fleet}))
+    env.reset(seed=0)
+    for _ in range(14):
+        south = {agent: np.array([-0.4, 0.1, 0.0]) for agent in env.agents}
+        observations, *_ = env.step(south)
+    yaw, other = (feature(observations[a], "own", "attitude")[0, 2] for a in env.agents)
+    assert yaw == pytest.approx(env.swarm_state().heading_rad[0] / math.pi)
+    assert 0.9 < yaw < 1.0
+    assert other == 0.0
+
+
 def test_an_unknown_feature_is_refused_with_those_known():
     with pytest.raises(ValueError, match=r"own\.position"):
         observation_columns("own", "pozition")

@@ -1,5 +1,6 @@
 """What cameras have seen of the ground."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -46,6 +47,31 @@ def test_a_picture_is_as_wide_as_its_angle_and_turns_with_the_heading():
     assert np.abs(picture[:, 1]) == pytest.approx([40.0] * 4)
     (turned,) = footprints_m(CAMERA, at(40.0, psi=math.pi / 2))
     assert np.abs(turned[:, 1]) == pytest.approx([ahead_m] * 4)
+
+
+def test_a_uas_that_looks_where_it_flies_sees_across_its_way():
+    flight = flown(hovering([CAMERA]))
+    uas = flight.scenario.uas[0].model_copy(update={"heading": "course"})
+    scenario = flight.scenario.model_copy(update={"uas": (uas,)})
+    x = flight.x.copy()
+    x[..., PSI], x[..., THETA] = math.pi / 2, 0.2
+    for sensor in (CAMERA, FIXED):
+        (north, east) = (np.ptp(footprints_m(sensor, x[:1, 0])[0][:, k]) for k in range(2))
+        assert north > east
+    turned = dataclasses.replace(flight, scenario=scenario, x=x)
+    # on axes that do not turn it leans to the south, which is to the right of who looks east
+    np.testing.assert_allclose(turned.attitude_rad[0, 0], [0.2, 0.0, math.pi / 2], atol=1e-12)
+    carrying = dataclasses.replace(
+        turned,
+        scenario=scenario.model_copy(
+            update={"uas": (uas.model_copy(update={"sensors": (FIXED,)}),)}
+        ),
+    )
+    (ground,) = seen_ground(carrying)
+    places = ground.seen.nonzero()
+    # the picture lies north of the UAS, to where its belly points
+    assert ground.north_m[places[0]].mean() > 103.0
+    assert ground.east_m[places[1]].mean() == pytest.approx(100.0, abs=0.5)
 
 
 def test_tilt_moves_the_picture_of_a_camera_that_nothing_keeps_level():

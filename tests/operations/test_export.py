@@ -1,5 +1,6 @@
 """Exports are read back by parsers that are not ours, their metres by geodesics that are not."""
 
+import dataclasses
 import json
 import math
 import warnings
@@ -125,6 +126,20 @@ def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(
             assert away.min() < MOST_OFF_M
         assert plan["mission"]["firmwareType"] == {"ardupilot": 3, "px4": 12}[autopilot]
         assert len(plan["rallyPoints"]["points"]) == 1
+
+
+def test_who_looks_where_it_flies_leaves_its_yaw_to_the_autopilot():
+    flight, place = random_flight(0), Place(latitude_deg=60.0, longitude_deg=20.0)
+    first, *others = flight.scenario.uas
+    fleet = (first.model_copy(update={"heading": "course"}), *others)
+    scenario = flight.scenario.model_copy(update={"uas": fleet})
+    made = {}
+    for format in ("qgc", "ardupilot"):
+        files = exported(dataclasses.replace(flight, scenario=scenario), place, format).files
+        made |= {name: text for name, text in files.items() if first.name in name}
+    items = json.loads(made[f"{first.name}.plan"])["mission"]["items"]
+    assert {item["params"][3] for item in items if item["command"] == 16} == {None}
+    assert "WP_YAW_BEHAVIOR,3\n" in made[f"{first.name}.param"]
 
 
 def test_tracks_for_maps_and_tables_hold_the_flown_samples(flight, place):

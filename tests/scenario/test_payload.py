@@ -29,7 +29,7 @@ def refusal(**changes):
 def test_a_scenario_that_asks_for_nothing_has_none_of_the_keys():
     data = load_scenario("village").content()
     assert not {"sensor", "heights_m", "max_speed_mps"} & set(data["waypoints"][0])
-    assert "sensors" not in data["uas"][0]
+    assert not {"sensors", "heading"} & set(data["uas"][0])
 
 
 def test_a_file_with_sensors_reads_back_equal(tmp_path):
@@ -50,6 +50,18 @@ def test_mistakes_are_one_line_with_field_value_and_fix():
         sensors=[{"name": "camera", "field_of_view_deg": [60.0, 180.0]}]
     )
     assert "uas[0].sensors[0].fov: unknown key" in refusal(sensors=[{"name": "a", "fov": 1}])
+
+
+def test_where_a_uas_looks_is_one_of_two_and_reads_back_equal(tmp_path):
+    data = meadow().model_dump(mode="json", by_alias=True)
+    data["uas"][0]["heading"] = "course"
+    scenario = parse(data, Scenario, "mine")
+    scenario.to_file(tmp_path / "again.toml")
+    assert load_scenario(tmp_path / "again.toml").uas[0].heading == "course"
+    for wrong in ("east", 90.0, ""):
+        data["uas"][0]["heading"] = wrong
+        with pytest.raises(InputError, match=r"mine: uas\[0\].heading: .*'north' or 'course'"):
+            parse(data, Scenario, "mine")
 
 
 def test_a_sensor_that_nobody_carries_is_warned_of_in_one_line():

@@ -13,7 +13,7 @@ from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.terrain import terrain
 from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, PSI, Z
+from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.world import FLYING, LANDED, STATUS_NAMES, SwarmState
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class Picture:
         for i, (x, y) in enumerate(centres):
             colour = _colour(i)
             if swarm.status[i] == FLYING:
-                yaw, soc = float(swarm.x[i, PSI]), 1 - float(swarm.x[i, DOD])
+                yaw, soc = float(swarm.heading_rad[i]), 1 - float(swarm.x[i, DOD])
                 marks.flying(draw, frame, x, y, yaw, soc, colour)
                 place = (x + 13 * unit, y - 9 * unit)
             elif swarm.status[i] == LANDED:

@@ -206,14 +206,14 @@ class FlightLog:
         mask = int(entry["limits_exceeded"])
         if not mask:
             return
-        values, bounds = np.empty(N_LIMITS), self._world.arena.vehicles[i].bounds
-        nonlinear = self._world.dynamics == "nonlinear"
+        vehicle, values = self._world.arena.vehicles[i], np.empty(N_LIMITS)
+        body_rates = self._world.dynamics == "nonlinear" and not vehicle.follows_course
         interpreted(write_limited)(
-            step.sample.x[i], entry["voltage_V"], entry["current_A"], nonlinear, values
+            step.sample.x[i], entry["voltage_V"], entry["current_A"], body_rates, values
         )
         for bit, limit in enumerate(LIMIT_NAMES):
             if mask >> bit & 1:
-                yield limit, float(values[bit]), float(bounds[bit])
+                yield limit, float(values[bit]), float(vehicle.bounds[bit])
 
     def _smallest(self, field: str) -> float | None:
         """The smallest distance met in flight; None where there never was a partner (infinity)."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, LIMITS
+from uas_coverage_env.vehicle import DOD, LIMITS, PHI, WX, body_attitude
 
 MODES = ("covering", "transit", "return", "landed", "lost")
 COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))
@@ -205,6 +205,18 @@ class FlightRecord:
     def soc(self) -> NDArray[np.float64]:
         """(T, U) state of charge, 0..1."""
         return 1.0 - self.x[..., DOD]
+
+    @property
+    def attitude_rad(self) -> NDArray[np.float64]:
+        """(T, U, 3) roll, pitch, yaw of the bodies [rad], those that look where they fly included.
+
+        These have their tilts in `x` on axes that do not turn, see `vehicle.layout`.
+        """
+        angles = self.x[..., PHI:WX].copy()
+        for i, uas in enumerate(self.scenario.uas):
+            if uas.heading == "course":
+                angles[:, i] = body_attitude(self.x[:, i])
+        return angles
 
     @property
     def last_sample(self) -> NDArray[np.int64]:

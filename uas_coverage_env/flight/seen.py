@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, FlightRecord
 from uas_coverage_env.scenario import Scenario, Sensor
-from uas_coverage_env.vehicle import PHI, PSI, THETA, VX, VZ, Z
+from uas_coverage_env.vehicle import PHI, PSI, THETA, VX, VZ, WX, Z
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -63,7 +63,8 @@ def seen_ground(flight: FlightRecord, until: int | None = None) -> tuple[SeenGro
         until: The last sample that counts; None: that of the flight.
     """
     samples = slice(None if until is None else until + 1)
-    x, flies = flight.x[samples], flight.mode[samples] < LANDED
+    x, flies = flight.x[samples].copy(), flight.mode[samples] < LANDED
+    x[..., PHI:WX] = flight.attitude_rad[samples]
     carried: dict[str, list[tuple[int, Sensor]]] = {}
     for i, uas in enumerate(flight.scenario.uas):
         for sensor in uas.sensors:
@@ -84,7 +85,7 @@ def footprints_m(sensor: Sensor, x: FloatArray) -> FloatArray:
 
     Args:
         sensor: With a field of view.
-        x: (T, 14) states.
+        x: (T, 14) states, their angles those of the body (`FlightRecord.attitude_rad`).
 
     Returns:
         (T, 4, 2) north and east [m], in order round the picture; NaN where a ray does not meet the

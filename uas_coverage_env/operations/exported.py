@@ -66,6 +66,7 @@ class Exported:
             None where there is none below the fence's top.
         vehicle: Its vehicle.
         frame: Where it is on the Earth.
+        looks_ahead: Whether it looks where it flies; else, north.
     """
 
     track: Track
@@ -78,6 +79,7 @@ class Exported:
     return_m: float | None
     vehicle: VehicleParams
     frame: LocalFrame
+    looks_ahead: bool
 
     @property
     def point_of_no_return(self) -> int | None:
@@ -142,6 +144,7 @@ def exported(
         return_m=return_height_m(scenario, track),
         vehicle=vehicle,
         frame=frame,
+        looks_ahead=scenario.uas[track.uas].heading == "course",
     )
 
 

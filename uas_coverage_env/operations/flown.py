@@ -17,7 +17,15 @@ from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.operations.tracks import distances_m
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.flown import FlownWorld
-from uas_coverage_env.vehicle import DOD, N_STATES, PHI, VX, VehicleParams, dod_per_s
+from uas_coverage_env.vehicle import (
+    DOD,
+    N_STATES,
+    PHI,
+    VX,
+    VehicleParams,
+    dod_per_s,
+    tilts_and_turn,
+)
 from uas_coverage_env.vehicle.battery import open_circuit_voltage
 
 PLANNER = "log"
@@ -202,7 +210,9 @@ def _track(
     if not at[-1]:
         notes.append(f"its log ends away from home, at {log.time_s[-1]:.1f} s")
     if log.attitude_rad is not None:
-        x[:, PHI : PHI + 3] = _interpolated(times_s, log.time_s, log.attitude_rad)
+        attitude_rad = _interpolated(times_s, log.time_s, log.attitude_rad)
+        turns = scenario.uas[i].heading == "course"
+        x[:, PHI : PHI + 3] = tilts_and_turn(attitude_rad) if turns else attitude_rad
     in_air = ~(before | resting)
     x[:, DOD], said = _depths(scenario, i, log, times_s, in_air)
     voltage_V, current_A = _battery(scenario.vehicles[i], scenario.dt_s, log, times_s, x[:, DOD])

@@ -13,7 +13,7 @@ from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.replay.safety_data import floors_m, rooms
 from uas_coverage_env.replay.scene_data import scene_data
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA
+from uas_coverage_env.vehicle import DOD
 
 POSITION_M = 0.01
 PLAN_M = 0.1
@@ -43,7 +43,7 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
     durations_s = np.array([decision.duration_s for decision in flight.decisions])
     series = {
         "position": (flight.x[..., 0:3], POSITION_M),
-        "attitude": (flight.x[..., [PHI, THETA, PSI]], ANGLE_RAD),
+        "attitude": (flight.attitude_rad, ANGLE_RAD),
         "soc": (1.0 - flight.x[..., DOD], SOC),
         "voltage": (flight.voltage_V, VOLTAGE_V),
         "current": (flight.current_A, CURRENT_A),

@@ -7,7 +7,7 @@ scenario files; see `village.toml`.
 import itertools
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -249,6 +249,7 @@ class Uas(StrictModel):
         radius_m: Radius of the sphere that holds the machine, δ_UAV [m].
         dod_max: Depth of discharge beyond which the UAS is lost [-].
         sensors: What it carries; without it, nothing that a waypoint could ask for.
+        heading: Where it looks: `north` always, as in the paper, or `course`, where it flies.
     """
 
     name: Name
@@ -258,6 +259,7 @@ class Uas(StrictModel):
     radius_m: Annotated[float, Field(gt=0.0, le=100.0)]
     dod_max: Annotated[float, Field(gt=0.0, lt=1.0)]
     sensors: Annotated[tuple[Sensor, ...], Strict(False), Field(max_length=16)] = ()
+    heading: Literal["north", "course"] = "north"
 
     @field_validator("sensors")
     @classmethod
@@ -269,10 +271,12 @@ class Uas(StrictModel):
         return sensors
 
     @model_serializer(mode="wrap")
-    def _without_sensors_where_none(self, serialise: SerializerFunctionWrapHandler) -> Any:
+    def _without_what_is_usual(self, serialise: SerializerFunctionWrapHandler) -> Any:
+        # files, and what is computed from them, are those of scenarios before the fields
         data = serialise(self)
-        if not self.sensors:
-            data.pop("sensors", None)
+        for name, usual in (("sensors", ()), ("heading", "north")):
+            if getattr(self, name) == usual:
+                data.pop(name, None)
         return data
 
     @field_validator("vehicle")

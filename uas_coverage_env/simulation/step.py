@@ -18,6 +18,7 @@ from uas_coverage_env.vehicle import (
     deviating_lpv_step,
     deviating_plant_step,
     enter_air,
+    face_course,
     leave_air,
     lpv_step,
     plant_step,
@@ -101,9 +102,10 @@ def begin_step(state, commands, outcome):
 def _write_inputs(arena, state, i, outcome):
     """What the inner loop, or a wrench, asks of the motors of a UAS."""
     event = outcome[i]
-    command_wrench(
-        arena.vehicles[i], state.x[i], state.reference[i], event.applied_command, event.u[:]
-    )
+    vehicle = arena.vehicles[i]
+    command_wrench(vehicle, state.x[i], state.reference[i], event.applied_command, event.u[:])
+    if rarely(vehicle.follows_course):
+        face_course(vehicle, state.x[i], event.u[:])
 
 
 @rare_kernel
@@ -118,6 +120,8 @@ def _write_believed_inputs(arena, state, felt, nonlinear, i, outcome):
         # a first look at the wind: to set off before would take more tilt than there is
         command = arena.rules[0].brake
     believed_wrench(vehicle, belief, felt.x[i], felt.reference[i], command, u)
+    if vehicle.follows_course:
+        face_course(vehicle, felt.x[i], u)
     expect(vehicle, belief, nonlinear, state.x[i], u)
 
 

@@ -15,7 +15,7 @@ from uas_coverage_env.disturbances.act import begin_random, disturbance_code
 from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.scenario.ground_phases import take_off
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
-from uas_coverage_env.vehicle import DOD, U_TH
+from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.disturbance import checked_disturbances
@@ -58,11 +58,16 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
     """
     step = int(state.step[0])
     sample = min(step, len(arena.moving_path_m) - 1)
+    x = state.as_told().x.copy()
+    turning, turned_rad = arena.vehicles["follows_course"], np.zeros(0)
+    if turning.any():
+        turned_rad = np.where(turning, x[:, PSI], 0.0)
+        x[turning, PSI] = x[turning, WZ] = 0.0
     return SwarmState(
         time_s=step * scenario.dt_s,
         step=step,
         names=tuple(uas.name for uas in scenario.uas),
-        x=state.as_told().x.copy(),
+        x=x,
         reference_mps=state.reference.copy(),
         status=state.status.copy(),
         departed=state.departed.copy(),
@@ -72,6 +77,7 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         moving_position_m=arena.moving_path_m[sample].copy(),
         moving_velocity_mps=arena.moving_velocity_mps[sample].copy(),
         responds=responding(arena, state),
+        turned_rad=turned_rad,
     )
 
 

@@ -1,6 +1,7 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
 from uas_coverage_env.vehicle.air import enter_air, leave_air, push
+from uas_coverage_env.vehicle.attitude import body_attitude, tilts_and_turn
 from uas_coverage_env.vehicle.battery import (
     battery_current_A,
     battery_segments,
@@ -25,10 +26,13 @@ from uas_coverage_env.vehicle.deviation import (
 )
 from uas_coverage_env.vehicle.endurance import Endurance, endurance, flight_time_s
 from uas_coverage_env.vehicle.inner_loop import (
+    COURSE_SPEED_MPS,
     acceleration_wrench,
+    face_course,
     reseed_reference,
     velocity_climb_wrench,
     velocity_wrench,
+    within_half_turn,
 )
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
@@ -82,6 +86,7 @@ from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_t
 
 __all__ = [
     "CAPACITY",
+    "COURSE_SPEED_MPS",
     "DELTA_THRUST",
     "DEVIATIONS",
     "DOD",
@@ -124,6 +129,7 @@ __all__ = [
     "add_force",
     "battery_current_A",
     "battery_segments",
+    "body_attitude",
     "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
@@ -134,6 +140,7 @@ __all__ = [
     "endurance",
     "enter_air",
     "exact_delta_thrust",
+    "face_course",
     "fit_thrust_correction",
     "flight_time_s",
     "fly_kinematics",
@@ -153,8 +160,10 @@ __all__ = [
     "return_threshold",
     "seconds_to_land",
     "simulate_battery",
+    "tilts_and_turn",
     "vehicle_names",
     "velocity_climb_wrench",
     "velocity_wrench",
+    "within_half_turn",
     "write_limited",
 ]

@@ -75,6 +75,8 @@ VEHICLE_DTYPE = np.dtype(
                 ("alpha_xy_max_radps2", _f8),
                 ("alpha_z_max_radps2", _f8),
                 ("yaw_rate_max_radps", _f8),
+                # a UAS that looks where it flies, see `layout`; the arena says which do
+                ("follows_course", "?"),
                 # what a sample must not exceed, see `limits`
                 ("bounds", _f8, (N_LIMITS,)),
                 # velocity loop

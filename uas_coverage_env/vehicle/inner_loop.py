@@ -14,7 +14,7 @@ their limits.
 
 import math
 
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import kernel, rare_kernel
 from uas_coverage_env.vehicle.compiled import GOVERNOR_BLOCK
 from uas_coverage_env.vehicle.layout import (
     LIFT,
@@ -32,6 +32,10 @@ from uas_coverage_env.vehicle.layout import (
     WZ,
     Z,
 )
+
+COURSE_SPEED_MPS = 1.0
+"""Ground speed below which a UAS that looks where it flies keeps its heading, that of ArduCopter
+(`YAW_LOOK_AHEAD_MIN_SPEED`) [m/s]."""
 
 _BLOCKS = -GOVERNOR_BLOCK  # as a mask: to whole blocks
 _TINY = 1e-12
@@ -220,6 +224,33 @@ def _hold_heading(vehicle, x, u):
     u[TAU_Z] = vehicle.inertia_kgm2[2] * _turn_towards(
         vehicle, x[PSI], x[WZ], 0.0, vehicle.yaw_rate_max_radps, vehicle.alpha_z_max_radps2
     )
+
+
+@kernel
+def within_half_turn(angle_rad):
+    """The same angle within half a turn of 0, in [-pi, pi] [rad]."""
+    return math.atan2(math.sin(angle_rad), math.cos(angle_rad))
+
+
+@rare_kernel
+def face_course(vehicle, x, u):
+    """Yaw torque that turns a UAS to its course over ground, the shorter way round.
+
+    It turns within the limits of yaw rate and torque and stops there. Slower than
+    COURSE_SPEED_MPS there is no course: it stops turning. No other input depends on the heading.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state, the velocity over ground.
+        u: (5,) the yaw torque is written, whatever it was.
+    """
+    most = vehicle.alpha_z_max_radps2
+    if x[VX] * x[VX] + x[VY] * x[VY] < COURSE_SPEED_MPS * COURSE_SPEED_MPS:
+        alpha = min(max(-x[WZ] / vehicle.dt_s, -most), most)
+    else:
+        course = x[PSI] + within_half_turn(math.atan2(x[VY], x[VX]) - x[PSI])
+        alpha = _turn_towards(vehicle, x[PSI], x[WZ], course, vehicle.yaw_rate_max_radps, most)
+    u[TAU_Z] = vehicle.inertia_kgm2[2] * alpha
 
 
 @kernel

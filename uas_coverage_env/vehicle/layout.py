@@ -5,7 +5,13 @@ Frame: NED, metres: x north, y east, z down (altitude is -z); body axes forward,
 
 X, Y, Z, VX, VY, VZ, PHI, THETA, PSI, WX, WY, WZ, DOD, U_TH = range(14)
 """Position [m], velocity [m/s], Euler angles [rad], body rates [rad/s], depth of discharge,
-polarisation voltage [V]."""
+polarisation voltage [V].
+
+The model of the plan is linearised at heading 0: there, roll and pitch are tilts about north and
+east. A UAS that looks where it flies (`heading = "course"`) keeps these axes. Its PHI, THETA, WX
+and WY are those of a body that has not turned; PSI is the angle by which it has turned about its
+own vertical axis from there, which goes on counting beyond a half turn, and WZ its rate; torques
+are about the axes of the tilts. `attitude.body_attitude` has roll, pitch and yaw of its body."""
 
 LIFT, TAU_X, TAU_Y, TAU_Z, DELTA_THRUST = range(5)
 """Lift in excess of the weight [N], torques [N m], corrected thrust deviation [N]."""

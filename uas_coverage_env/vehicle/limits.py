@@ -4,7 +4,8 @@ Inputs need no such question: they are kept within U where they act (`clip_wrenc
 leave X all the same, since torques within their limits add up to any rate, tilt and speed.
 
 The thrust correction is judged by the current that it draws. The bound of the heading is not a
-capability: it keeps the linearisation valid.
+capability: it keeps the linearisation of the plan valid, and does not hold for a UAS that looks
+where it flies (`heading = "course"`), whose tilts are on axes that do not turn.
 """
 
 import math
@@ -83,15 +84,15 @@ def bounds_of(vehicle: VehicleParams) -> NDArray[np.float64]:
 
 
 @inlined_kernel
-def write_limited(x, voltage_V, current_A, nonlinear, values):
+def write_limited(x, voltage_V, current_A, body_rates, values):
     """Write what is limited, in the order of LIMITS.
 
     Args:
         x: (14,) state.
         voltage_V: Battery voltage over the step that led to it.
         current_A: Battery current over that step.
-        nonlinear: The state is of the nonlinear plant, whose heading turns at another rate than
-            the body about its own axis.
+        body_rates: The state is of the nonlinear plant, whose heading turns at another rate than
+            the body about its own axis; not so where its tilts are on axes that do not turn.
         values: (N_LIMITS,) written.
     """
     values[_SPEED] = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
@@ -100,7 +101,7 @@ def write_limited(x, voltage_V, current_A, nonlinear, values):
     values[_TILT] = math.sqrt(x[PHI] * x[PHI] + x[THETA] * x[THETA])
     values[_TILT_RATE] = math.sqrt(x[WX] * x[WX] + x[WY] * x[WY])
     yaw_rate = x[WZ]
-    if nonlinear:
+    if body_rates:
         yaw_rate = math.sin(x[PHI]) * x[WY] + math.cos(x[PHI]) * x[WZ]
         yaw_rate /= math.cos(x[THETA])
     values[_YAW_RATE] = abs(yaw_rate)
@@ -114,14 +115,15 @@ def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear, disturbed):
 
     Args:
         vehicle: record of VEHICLE_DTYPE.
-        x: See `write_limited`, also the next three.
+        x: See `write_limited`, also the next two.
         voltage_V: [V].
         current_A: [A].
-        nonlinear: See `write_limited`; it has a tolerance of its own.
+        nonlinear: The state is of the nonlinear plant, which has a tolerance of its own.
         disturbed: Whether disturbances act; likewise.
     """
     values = stack_array(N_LIMITS)
-    write_limited(x, voltage_V, current_A, nonlinear, values)
+    body_rates = nonlinear and not vehicle.follows_course
+    write_limited(x, voltage_V, current_A, body_rates, values)
     tolerance = LPV_TOLERANCE
     if nonlinear:
         tolerance = NONLINEAR_TOLERANCE

@@ -6,13 +6,17 @@ state, theta_lin(t). There, tilt is horizontal acceleration over g, which is the
 real one under a thrust whose vertical part is weight plus lift: the loop follows
 theta = atan(theta_lin(t)), and the velocities of the step come out as predicted.
 
+A UAS that looks where it flies has its tilts and their rates on axes that do not turn (`layout`):
+body to NED is pitch, then roll, then the turn about the body's own axis. Thrust, drag and power do
+not depend on the turn; torques, inertia and motors are those of the body.
+
 Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, and the
 loss of motor speed with a falling battery voltage.
 """
 
 import math
 
-from uas_coverage_env.compiled.kernels import kernel, stack_array
+from uas_coverage_env.compiled.kernels import kernel, rarely, stack_array
 from uas_coverage_env.vehicle.compiled import MAX_MOTORS
 from uas_coverage_env.vehicle.deviation import (
     CAPACITY,
@@ -27,6 +31,8 @@ from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
     LIFT,
+    N_INPUTS,
+    N_STATES,
     PHI,
     PSI,
     TAU_X,
@@ -105,14 +111,33 @@ def _euler_rates(x, rates):
 
 
 @kernel
+def _attitude_rates(vehicle, x, rates):
+    """Rates of PHI, THETA and PSI, into rates (3,)."""
+    if rarely(vehicle.follows_course):
+        rates[0] = x[WX]
+        rates[1] = x[WY] / math.cos(x[PHI])
+        rates[2] = _turn_rate(x)
+    else:
+        _euler_rates(x, rates)
+
+
+@kernel
+def _turn_rate(x):
+    """Rate of PSI on axes that do not turn: the body rate less what tilting them takes."""
+    return x[WZ] + math.tan(x[PHI]) * x[WY]
+
+
+@kernel
 def _rigid_body(vehicle, deviation, x, thrust_N, torque, dx):
     """The twelve derivatives of the rigid body with thrust and torque held."""
     sp = math.sin(x[PHI])
     cp = math.cos(x[PHI])
     st = math.sin(x[THETA])
     ct = math.cos(x[THETA])
-    ss = math.sin(x[PSI])
-    cs = math.cos(x[PSI])
+    turns = vehicle.follows_course
+    psi = 0.0 if turns else x[PSI]
+    ss = math.sin(psi)
+    cs = math.cos(psi)
     mass = vehicle.mass_kg * (1.0 + deviation[MASS])
     more_drag = 1.0 + deviation[DRAG]
     push = thrust_N / mass
@@ -123,11 +148,23 @@ def _rigid_body(vehicle, deviation, x, thrust_N, torque, dx):
     dx[VY] = -push * (cp * st * ss - sp * cs) - drag * x[VY]
     dx[VZ] = vehicle.gravity_mps2 - push * cp * ct
     dx[VZ] -= vehicle.drag_vertical_kgps * more_drag / mass * x[VZ]
-    _euler_rates(x, dx[PHI:WX])
+    _attitude_rates(vehicle, x, dx[PHI:WX])
+    p = x[WX]
+    q = x[WY]
+    if rarely(turns):
+        ss = math.sin(x[PSI])
+        cs = math.cos(x[PSI])
+        p = cs * x[WX] + ss * x[WY]
+        q = cs * x[WY] - ss * x[WX]
     inertia = vehicle.inertia_kgm2
-    dx[WX] = (torque[0] - (inertia[2] - inertia[1]) * x[WY] * x[WZ]) / inertia[0]
-    dx[WY] = (torque[1] - (inertia[0] - inertia[2]) * x[WZ] * x[WX]) / inertia[1]
-    dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * x[WX] * x[WY]) / inertia[2]
+    dp = (torque[0] - (inertia[2] - inertia[1]) * q * x[WZ]) / inertia[0]
+    dq = (torque[1] - (inertia[0] - inertia[2]) * x[WZ] * p) / inertia[1]
+    dx[WX] = dp
+    dx[WY] = dq
+    dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
+    if rarely(turns):
+        dx[WX] = cs * dp - ss * dq - dx[PSI] * x[WY]
+        dx[WY] = ss * dp + cs * dq + dx[PSI] * x[WX]
 
 
 @kernel
@@ -192,6 +229,43 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     torque[0] = inertia[0] * (ahead_p + _RATE_GAIN_PER_S * (p - x[WX]))
     torque[1] = inertia[1] * (ahead_q + _RATE_GAIN_PER_S * (q - x[WY]))
     torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[WZ]))
+
+
+@kernel
+def _turning_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
+    """`_attitude_loop` of a UAS that turns: tilts as if it did not, and its heading beside them.
+
+    Arguments as there; the torque is that of the body.
+    """
+    level = stack_array(N_STATES)
+    facing = stack_array(6)
+    tilting = stack_array(N_INPUTS)
+    for s in range(PHI, DOD):
+        level[s] = x[s]
+        facing[s - PHI] = first[s - PHI]
+    for k in range(N_INPUTS):
+        tilting[k] = u[k]
+    level[PSI] = 0.0
+    facing[_YAW] = 0.0
+    facing[_YAW_RATE] = 0.0
+    tilting[TAU_Z] = 0.0
+    _attitude_loop(vehicle, level, facing, tilting, time_s, roll, pitch, torque)
+    inertia = vehicle.inertia_kgm2
+    alpha = u[TAU_Z] / inertia[2]
+    turn_rate = _turn_rate(x)
+    rate = first[_YAW_RATE] + alpha * time_s
+    heading = first[_YAW] + 0.5 * (first[_YAW_RATE] + rate) * time_s
+    rate += _ANGLE_GAIN_PER_S * (heading - x[PSI])
+    rate = min(max(rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
+    torque[2] = inertia[2] * (alpha + _RATE_GAIN_PER_S * (rate - turn_rate))
+    cs = math.cos(x[PSI])
+    ss = math.sin(x[PSI])
+    p = cs * x[WX] + ss * x[WY]
+    q = cs * x[WY] - ss * x[WX]
+    about_x = torque[0] / inertia[0]
+    about_y = torque[1] / inertia[1]
+    torque[0] = inertia[0] * (cs * about_x + ss * about_y + turn_rate * q)
+    torque[1] = inertia[1] * (cs * about_y - ss * about_x - turn_rate * p)
 
 
 @kernel
@@ -264,16 +338,24 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
         first[s] = x_next[PHI + s]
     # the LPV model reads body rates as rates of the angles; of a body that spins, the part of the
     # spin in them changes no tilt and would be taken for more and more of it
+    turns = vehicle.follows_course
     _euler_rates(x_next, roll)
+    if rarely(turns):
+        roll[2] = 0.0
+        # the body's own rate, until the end of the step
+        x_next[WZ] -= math.tan(x_next[PHI]) * x_next[WY]
     first[_ROLL_RATE] += math.sin(x_next[THETA]) * roll[2]
     first[_PITCH_RATE] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
     correction = 0.0
     charge = 0.0
     energy = 0.0
     for step in range(steps):
-        _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
+        if rarely(turns):
+            _turning_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
+        else:
+            _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
         # upright in the middle of the substep
-        _euler_rates(x_next, roll)
+        _attitude_rates(vehicle, x_next, roll)
         upright = math.cos(x_next[PHI] + 0.5 * h * roll[0])
         upright *= math.cos(x_next[THETA] + 0.5 * h * roll[1])
         thrust = (vehicle.weight_N + u[LIFT]) / max(upright, _UPRIGHT_MIN)
@@ -283,7 +365,7 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
             thrust,
             x_next[PHI],
             x_next[THETA],
-            x_next[PSI],
+            0.0 if turns else x_next[PSI],
             x_next[VX],
             x_next[VY],
             x_next[VZ],
@@ -302,5 +384,7 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
         _integrate(
             vehicle, deviation, x_next, h, more_thrust * thrust, torque, slope, total, middle
         )
+    if rarely(turns):
+        x_next[WZ] = _turn_rate(x_next)
     u[DELTA_THRUST] = correction / steps
     return energy / charge, charge / vehicle.dt_s

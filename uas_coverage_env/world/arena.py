@@ -234,7 +234,12 @@ def build_arena(
 
 def _vehicles(scenario: Scenario) -> NDArray[np.void]:
     compiled = {v: compile_vehicle(v, scenario.dt_s) for v in set(scenario.vehicles)}
-    return np.stack([compiled[vehicle] for vehicle in scenario.vehicles])
+    # zeros: equal vehicles are equal in the bytes between their fields, too
+    records = np.zeros(len(scenario.vehicles), dtype=VEHICLE_DTYPE)
+    for i, vehicle in enumerate(scenario.vehicles):
+        records[i] = compiled[vehicle]
+    records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
+    return records
 
 
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

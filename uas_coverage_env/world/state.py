@@ -1,6 +1,6 @@
 """The state of the world, and the part of it that a player sees."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values
-from uas_coverage_env.vehicle import N_STATES
+from uas_coverage_env.vehicle import N_STATES, PSI
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
 from uas_coverage_env.world.events import EVERY, N_DELAYED, N_HEARD, NEVER, write_responds
 
@@ -138,7 +138,9 @@ class SwarmState:
         time_s: [s] since the start.
         step: Number of the sample.
         names: (U,) names of the UAS.
-        x: (U, 14) states as they are sensed, in the order of `vehicle.layout`.
+        x: (U, 14) states as they are sensed, in the order of `vehicle.layout`. A UAS that looks
+            where it flies has heading and yaw rate 0 here: its autopilot turns it, and nothing that
+            a player plans depends on that.
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST.
         departed: (U,) has been farther from its start than the landing distance.
@@ -148,6 +150,8 @@ class SwarmState:
         moving_position_m: (M, 3) [m] centres of moving obstacles, now.
         moving_velocity_mps: (M, 3) [m/s] their velocities, now.
         responds: (U,) takes commands now; not without its radio, nor before a late start.
+        turned_rad: (U,) [rad] how far those have turned that look where they fly, 0 for the others;
+            empty where none does.
     """
 
     time_s: float
@@ -163,6 +167,12 @@ class SwarmState:
     moving_position_m: NDArray[np.float64]
     moving_velocity_mps: NDArray[np.float64]
     responds: NDArray[np.bool_]
+    turned_rad: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def heading_rad(self) -> NDArray[np.float64]:
+        """(U,) where they look, clockwise from north [rad], beyond a half turn too."""
+        return self.x[:, PSI] + self.turned_rad if len(self.turned_rad) else self.x[:, PSI].copy()
 
     @property
     def active(self) -> tuple[str, ...]:

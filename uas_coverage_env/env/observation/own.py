@@ -1,18 +1,40 @@
 """The UAS itself: where it is, how it moves, what its battery holds, and how much is left to do."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.home import charge_home
 from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.env.observation.remaining import share_of_open_weight
 from uas_coverage_env.env.observation.scales import MARGIN
-from uas_coverage_env.vehicle import DOD, PHI, PSI, THETA, U_TH, VX, VY, VZ, WX, WY, WZ, X, Y, Z
+from uas_coverage_env.vehicle import (
+    DOD,
+    PHI,
+    PSI,
+    THETA,
+    U_TH,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    WZ,
+    X,
+    Y,
+    Z,
+    within_half_turn,
+)
 from uas_coverage_env.world import FLYING
 
 _FEATURES = (
     Feature("position", 3, -1, 1, "north, east, up in the box around the fence; ±1: its sides"),
     Feature("velocity", 3, -2, 2, "north, east, down / the vehicle's limits"),
-    Feature("attitude", 3, -2, 2, "roll, pitch / tilt limit, yaw / yaw limit"),
+    Feature(
+        "attitude",
+        3,
+        -2,
+        2,
+        "roll, pitch / tilt limit, yaw / yaw limit (heading = course: yaw in ±pi / pi)",
+    ),
     Feature("rates", 3, -2, 2, "body rates / the vehicle's limits"),
     Feature("reference", 2, -2, 2, "velocity that the inner loop tracks, as `velocity`"),
     flag("flying", "1 while it flies, 0 once landed or lost"),
@@ -50,7 +72,10 @@ def write_own(arena, state, tables, i, home_dod, open_share, row):
     row[_AT.velocity + 2] = within(x[VZ] * scale.per_v_z, -2.0, 2.0)
     row[_AT.attitude] = within(x[PHI] * scale.per_tilt, -2.0, 2.0)
     row[_AT.attitude + 1] = within(x[THETA] * scale.per_tilt, -2.0, 2.0)
-    row[_AT.attitude + 2] = within(x[PSI] * scale.per_yaw, -2.0, 2.0)
+    yaw = x[PSI]
+    if rarely(arena.vehicles[i].follows_course):
+        yaw = within_half_turn(yaw)
+    row[_AT.attitude + 2] = within(yaw * scale.per_yaw, -2.0, 2.0)
     row[_AT.rates] = within(x[WX] * scale.per_rate, -2.0, 2.0)
     row[_AT.rates + 1] = within(x[WY] * scale.per_rate, -2.0, 2.0)
     row[_AT.rates + 2] = within(x[WZ] * scale.per_yaw_rate, -2.0, 2.0)

@@ -1,5 +1,7 @@
 """What the numbers of an observation are divided by, and how many neighbours are in it."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -85,12 +87,13 @@ def scales_of(scenario: Scenario) -> NDArray[np.void]:
     low_m, high_m = corners_m.min(axis=0), corners_m.max(axis=0)
     weights = [waypoint.weight for waypoint in scenario.waypoints]
     scales = np.zeros(len(scenario.uas), dtype=SCALES_DTYPE)
-    for i, (scale, vehicle) in enumerate(zip(scales, scenario.vehicles, strict=True)):
+    fleet = zip(scales, scenario.uas, scenario.vehicles, strict=True)
+    for i, (scale, uas, vehicle) in enumerate(fleet):
         limits = vehicle.limits
         scale["per_v_xy"] = 1 / limits.v_xy_max_mps
         scale["per_v_z"] = 1 / max(limits.v_up_max_mps, limits.v_down_max_mps)
         scale["per_tilt"] = 1 / limits.tilt_max_rad
-        scale["per_yaw"] = 1 / limits.yaw_max_rad
+        scale["per_yaw"] = 1 / (math.pi if uas.heading == "course" else limits.yaw_max_rad)
         scale["per_rate"] = 1 / limits.rate_max_radps
         scale["per_yaw_rate"] = 1 / limits.yaw_rate_max_radps
         scale["rank"] = i / max(1, len(scales) - 1)

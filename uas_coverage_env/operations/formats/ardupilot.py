@@ -10,6 +10,7 @@ from uas_coverage_env.scenario import Scenario
 _CEILING_AND_POLYGONS = 5
 _SMART_RTL_OR_LAND, _RTL_OR_LAND = 5, 1
 _SMART_RTL = 3
+_YAW_AS_TOLD, _YAW_ALONG_COURSE = 0, 3
 
 
 def waypoints_text(one: Exported, tolerances: Tolerances) -> str:
@@ -44,7 +45,7 @@ def parameters_text(scenario: Scenario, one: Exported, tolerances: Tolerances) -
         "WPNAV_SPEED_UP": 100.0 * limits.v_up_max_mps,
         "WPNAV_SPEED_DN": 100.0 * limits.v_down_max_mps,
         "WPNAV_RADIUS": 100.0 * tolerances.corner_m,
-        "WP_YAW_BEHAVIOR": 0,
+        "WP_YAW_BEHAVIOR": _YAW_ALONG_COURSE if one.looks_ahead else _YAW_AS_TOLD,
         "FENCE_ENABLE": 1,
         "FENCE_TYPE": _CEILING_AND_POLYGONS,  # the default adds a circle of 300 m around home
         "FENCE_ALT_MAX": -float(scenario.fence.vertices_m[:, 2].min()),

@@ -12,7 +12,8 @@ MISSION_FRAME, RELATIVE_FRAME = 2, 3
 """MAV_FRAME: no place; altitude relative to home."""
 
 _NORTH_DEG = 0.0
-"""Heading at waypoints, as the world flies: cameras keep their wide side from west to east."""
+"""Heading at waypoints, as the world flies: cameras keep their wide side from west to east. Without
+one (NaN), an autopilot turns as it is set to, which is towards where it flies."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,13 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
         items.append(Item(DELAY, MISSION_FRAME, (one.waits.start_s, -1.0, -1.0, -1.0, 0, 0, 0)))
     items.append(Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height))))
     set_mps = None
+    heading_deg = math.nan if one.looks_ahead else _NORTH_DEG
     for leg, speed_mps, hold_s in zip(one.track.legs, one.speeds_mps, one.holds_s, strict=True):
         if speed_mps != set_mps:
             items.append(Item(CHANGE_SPEED, MISSION_FRAME, (1.0, speed_mps, -1.0, 0, 0, 0, 0)))
             set_mps = speed_mps
         place = (float(number) for number in one.geodetic(leg.end_m))
-        first = (hold_s, corner_m, 0.0, _NORTH_DEG)
+        first = (hold_s, corner_m, 0.0, heading_deg)
         items.append(Item(WAYPOINT, RELATIVE_FRAME, (*first, *place)))
     items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, *ground, 0.0)))
     return items
