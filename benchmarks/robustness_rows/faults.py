@@ -148,7 +148,9 @@ def mission(kind: str, seed: int) -> Scenario:
     soon = kind in ("obstacle_added", "moving_obstacle_added")
     at_s = float(rng.integers(2, 5) if soon else rng.integers(3, 60))
     event = {"kind": kind, "at_s": at_s, **fields}
-    return Scenario.model_validate(town.model_dump(by_alias=True) | changes | {"events": (event,)})
+    # who has landed takes off again for what a lost UAS leaves
+    changes |= {"relaunch": True, "events": (event,)}
+    return Scenario.model_validate(town.model_dump(by_alias=True) | changes)
 
 
 def fly(kind: str, planner: str, seed: int) -> Result:
