@@ -214,7 +214,7 @@ ROW = Row(
     ),
     "Several events in one mission, events in wind, and losses of charge or thrust that no UAS "
     "could survive. Return mode and safety filter are on. Breaches are not counted here: a zone "
-    "that is closed round a UAS is one until it is left. A UAS that has landed does not take off "
-    "again: where one is lost when the others are home, what it leaves stays open, which counts as "
-    "failed. A limit that is exceeded counts as failed, too, even where the fault is the cause.",
+    "that is closed round a UAS is one until it is left. All missions have `relaunch = true`: who "
+    "has landed takes off again for what a UAS leaves that is lost later. A limit that is exceeded "
+    "counts as failed, too, even where the fault is the cause.",
 )
