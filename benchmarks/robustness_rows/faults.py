@@ -66,8 +66,19 @@ def _added(rng: Rng, scenario: Scenario) -> Made:
     return {"position_m": (*_free_m(rng, scenario, 20.0), -42.0), "radius_m": 6.0}, {}
 
 
-def _hull(rng: Rng, scenario: Scenario) -> Made:
+def _zone(rng: Rng, scenario: Scenario) -> Made:
     return {"name": "new", "safe_distance_m": 2.0, "vertices_m": _block_m(rng, scenario)}, {}
+
+
+def _block(rng: Rng, scenario: Scenario) -> Made:
+    waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    for _ in range(1000):
+        made = _zone(rng, scenario)
+        corners_m = np.array(made[0]["vertices_m"])
+        inside = (waypoints_m >= corners_m.min(axis=0)) & (waypoints_m <= corners_m.max(axis=0))
+        if not inside.all(axis=1).any():
+            return made
+    raise RuntimeError("no place is free")
 
 
 def _appears(rng: Rng, scenario: Scenario) -> Made:
@@ -130,8 +141,8 @@ KINDS: Mapping[str, tuple[Callable[[Rng, Scenario], Made], Callable[[Flight], bo
         "accomplished",
     ),
     "waypoint_added": (_added, accomplished, "accomplished"),
-    "obstacle_added": (_hull, _all_home, "all land"),
-    "no_fly_zone": (_hull, _all_home, "all land"),
+    "obstacle_added": (_block, _all_home, "all land"),
+    "no_fly_zone": (_zone, _all_home, "all land"),
     "moving_obstacle_added": (_appears, _all_home, "all land"),
     "moving_obstacle_turns": (_turns, _all_home, "all land"),
     "home_closed": (_closed, accomplished, "accomplished, landed at the alternative"),

@@ -179,9 +179,7 @@ class FlightLog:
         end = self._steps[-1].sample if self._steps else self._start
         return np.array([*(step.outcome["flew"] for step in self._steps), end.status == FLYING])
 
-    def _mode(
-        self, status: NDArray[np.int64], flies: NDArray[np.bool_]
-    ) -> NDArray[np.int8]:
+    def _mode(self, status: NDArray[np.int64], flies: NDArray[np.bool_]) -> NDArray[np.int8]:
         """(T, U) the mode of the command that acts from a sample on, or how the UAS has ended.
 
         One that has landed and takes off again has not ended yet: it is on its return.
