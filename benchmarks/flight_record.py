@@ -148,6 +148,12 @@ def read_record(directory: Path) -> FlightRecord:
         raise BadFlightError(f"{directory / name}: was damaged ({kind}: {reason})") from error
     if scenario.get("events"):
         raise BadFlightError(f"{directory}: events happen in it, which are not judged here")
+    for track in tracks:
+        drawn = np.flatnonzero(track.columns["current_A"] > 0.0)
+        if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
+            raise BadFlightError(
+                f"{directory}: {track.name} lands and takes off again, which is not judged here"
+            )
     return FlightRecord(scenario, summary, tracks, moving_m, plan, dynamics, disturbed)
 
 

@@ -66,8 +66,19 @@ def _added(rng: Rng, scenario: Scenario) -> Made:
     return {"position_m": (*_free_m(rng, scenario, 20.0), -42.0), "radius_m": 6.0}, {}
 
 
-def _hull(rng: Rng, scenario: Scenario) -> Made:
+def _zone(rng: Rng, scenario: Scenario) -> Made:
     return {"name": "new", "safe_distance_m": 2.0, "vertices_m": _block_m(rng, scenario)}, {}
+
+
+def _block(rng: Rng, scenario: Scenario) -> Made:
+    waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    for _ in range(1000):
+        made = _zone(rng, scenario)
+        corners_m = np.array(made[0]["vertices_m"])
+        inside = (waypoints_m >= corners_m.min(axis=0)) & (waypoints_m <= corners_m.max(axis=0))
+        if not inside.all(axis=1).any():
+            return made
+    raise RuntimeError("no place is free")
 
 
 def _appears(rng: Rng, scenario: Scenario) -> Made:
@@ -130,8 +141,8 @@ KINDS: Mapping[str, tuple[Callable[[Rng, Scenario], Made], Callable[[Flight], bo
         "accomplished",
     ),
     "waypoint_added": (_added, accomplished, "accomplished"),
-    "obstacle_added": (_hull, _all_home, "all land"),
-    "no_fly_zone": (_hull, _all_home, "all land"),
+    "obstacle_added": (_block, _all_home, "all land"),
+    "no_fly_zone": (_zone, _all_home, "all land"),
     "moving_obstacle_added": (_appears, _all_home, "all land"),
     "moving_obstacle_turns": (_turns, _all_home, "all land"),
     "home_closed": (_closed, accomplished, "accomplished, landed at the alternative"),
@@ -148,7 +159,9 @@ def mission(kind: str, seed: int) -> Scenario:
     soon = kind in ("obstacle_added", "moving_obstacle_added")
     at_s = float(rng.integers(2, 5) if soon else rng.integers(3, 60))
     event = {"kind": kind, "at_s": at_s, **fields}
-    return Scenario.model_validate(town.model_dump(by_alias=True) | changes | {"events": (event,)})
+    # who has landed takes off again for what a lost UAS leaves
+    changes |= {"relaunch": True, "events": (event,)}
+    return Scenario.model_validate(town.model_dump(by_alias=True) | changes)
 
 
 def fly(kind: str, planner: str, seed: int) -> Result:
@@ -212,7 +225,7 @@ ROW = Row(
     ),
     "Several events in one mission, events in wind, and losses of charge or thrust that no UAS "
     "could survive. Return mode and safety filter are on. Breaches are not counted here: a zone "
-    "that is closed round a UAS is one until it is left. A UAS that has landed does not take off "
-    "again: where one is lost when the others are home, what it leaves stays open, which counts as "
-    "failed. A limit that is exceeded counts as failed, too, even where the fault is the cause.",
+    "that is closed round a UAS is one until it is left. All missions have `relaunch = true`: who "
+    "has landed takes off again for what a UAS leaves that is lost later. A limit that is exceeded "
+    "counts as failed, too, even where the fault is the cause.",
 )

@@ -14,8 +14,10 @@ _HEAD = """# Reliability
 What was tried to make the software fail, and how often it did. This page is generated:
 
 ```
-python benchmarks/robustness.py{option}
+python benchmarks/robustness.py --quick
 ```
+
+Without `--quick` far more is tried; each row names the command that it is from, and the source.
 
 Each bound is the exact one-sided 95 % bound (Clopper and Pearson) of the share that fails, of the \
 trials as they are drawn here: missions of other kinds may fail more often. Version {version}.
@@ -52,7 +54,7 @@ def page(stores: Mapping[str, Store], quick: bool, before: str = "") -> tuple[st
     summary.sort(key=lambda line: int(line[0][1:]))
     parts.sort(key=lambda part: int(part[4 : part.index(":")]))
     headings = ("row", "what", "tried", "failed", "share at most")
-    head = _HEAD.format(option=" --quick" if quick else "", version=version("uas-coverage-env"))
+    head = _HEAD.format(version=version("uas-coverage-env"))
     return "\n".join([head, _left(markdown(headings, summary)), "", *parts]), failed
 
 

@@ -8,7 +8,7 @@ from small_worlds import mover
 from uas_coverage_env import MissionBrief, World, rollout
 from uas_coverage_env.flight import accomplished, coverage, home, summary
 from uas_coverage_env.vehicle import DOD, LIFT, VX
-from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity
+from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity, Wrench
 
 RESPONSES = pytest.mark.parametrize("then", ["go_on", "hover", "return"])
 
@@ -53,6 +53,16 @@ def test_a_uas_without_a_radio_flies_what_the_scenario_says(then, north_mps):
     assert deaf[VX] == pytest.approx(north_mps, abs=0.1)
     assert world.swarm_state().responds.all()
     assert after(world, 8, Velocity(0.0, 5.0, 20.0)).state.x[0, VX + 1] > 4.0
+
+
+def test_a_wrench_is_not_held_on_without_a_radio():
+    world = hovering(event("radio_lost", 3.0, uas="uas_1", for_s=20.0, then="go_on"))
+    after(world, 3, Wrench(0.0, 0.0005, 0.0005, 0.0))
+    assert np.linalg.norm(world.state.x[0, VX : VX + 3]) > 1.0
+    for _ in range(12):
+        outcome = world.step(dict.fromkeys(world.active, Velocity(0.0, 0.0, 20.0)))
+        assert not outcome["limits_exceeded"].any()
+    assert np.linalg.norm(world.state.x[0, VX : VX + 3]) < 0.5
 
 
 def test_a_uas_without_a_radio_may_return():

@@ -60,7 +60,7 @@ PUBLIC = {
 }
 HIDDEN = {
     # a brief is that of one sortie
-    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "sorties"},
+    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "sorties", "relaunch"},
     MovingObstacle: {"schedule"},
 }
 

@@ -113,7 +113,8 @@ class FlightLog:
         """The fields of `Flight` that follow from what was kept."""
         samples = [self._start, *(step.sample for step in self._steps)]
         x = np.array([sample.x for sample in samples])
-        mode = self._mode(np.array([sample.status for sample in samples]))
+        flies = self._flies()
+        mode = self._mode(np.array([sample.status for sample in samples]), flies)
         u = np.zeros((*mode.shape, N_INPUTS))
         current_A, voltage_V = np.zeros(mode.shape), np.zeros(mode.shape)
         for k, step in enumerate(self._steps):
@@ -122,9 +123,11 @@ class FlightLog:
             current_A[k, flying] = step.outcome["current_A"][flying]
             voltage_V[k, flying] = step.outcome["voltage_V"][flying]
         for i, k in enumerate(last_samples(mode)):
-            # nothing is drawn any more: the battery shows what it has
-            vehicle = self._world.arena.vehicles[i]
             x[k:, i] = x[k, i]
+            # while nothing is drawn the battery shows what it has
+            vehicle = self._world.arena.vehicles[i]
+            for j in np.flatnonzero(~flies[:k, i]):
+                voltage_V[j, i] = open_circuit_V(vehicle, x[j, i, DOD]) - x[j, i, U_TH]
             voltage_V[k:, i] = open_circuit_V(vehicle, x[k, i, DOD]) - x[k, i, U_TH]
         return {
             **{"x": x, "u": u, "voltage_V": voltage_V, "current_A": current_A, "mode": mode},
@@ -171,13 +174,23 @@ class FlightLog:
         state = self._world.state
         return _Sample(state.x.copy(), state.status.copy(), self._covered)
 
-    def _mode(self, status: NDArray[np.int64]) -> NDArray[np.int8]:
-        """(T, U) the mode of the command that acts from a sample on, or how the UAS has ended."""
+    def _flies(self) -> NDArray[np.bool_]:
+        """(T, U) whether a UAS flies from a sample on."""
+        end = self._steps[-1].sample if self._steps else self._start
+        return np.array([*(step.outcome["flew"] for step in self._steps), end.status == FLYING])
+
+    def _mode(self, status: NDArray[np.int64], flies: NDArray[np.bool_]) -> NDArray[np.int8]:
+        """(T, U) the mode of the command that acts from a sample on, or how the UAS has ended.
+
+        One that has landed and takes off again has not ended yet: it is on its return.
+        """
         modes = [step.modes for step in self._steps]
         # nothing acts from the last sample on; a UAS that still flies there keeps its mode
         final = modes[-1] if modes else [COVERING] * status.shape[1]
         ended = np.where(status == HAS_LANDED, LANDED, LOST)
-        return np.where(status == FLYING, [*modes, final], ended).astype(np.int8)
+        later = np.logical_or.accumulate(flies[::-1])[::-1]
+        resting = np.where(later, RETURN, ended)
+        return np.where(flies, [*modes, final], resting).astype(np.int8)
 
     def _violations(self) -> list[Violation]:
         scenario, known = self._scenario, self._world.known

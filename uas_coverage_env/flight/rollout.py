@@ -20,7 +20,7 @@ from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.planner import Assistants, Planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, Relaunch
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
 from uas_coverage_env.world import Command, SwarmState, Velocity, pack
@@ -179,7 +179,7 @@ def _fly(
     should_stop: Callable[[], bool] | None,
 ) -> str:
     """Fly until the end; returns how it came about, see `Flight.ended`."""
-    swarm, revisions = world.swarm_state(), 0
+    swarm, revisions, relaunch = world.swarm_state(), 0, _relaunch(world)
     tell(swarm, None)
     while not world.done:
         if log.steps >= limit:
@@ -190,11 +190,22 @@ def _fly(
         outcome = world.step(packed)
         log.add(commands, packed, decision, getattr(planner, "last_decision", None), outcome)
         swarm = world.swarm_state()
-        if world.revisions != revisions:
+        changed = world.revisions != revisions
+        if changed:
             revisions = world.revisions
+            relaunch = _relaunch(world)
+        again = relaunch.due(swarm) if relaunch and log.steps < limit else None
+        if again is not None and again.any():
+            world.take_off(again)
+            swarm, changed = world.swarm_state(), True
+        if changed:
             planner.reset(MissionBrief.of(world.known), seed)
         tell(swarm, decision)
     return "complete"
+
+
+def _relaunch(world: World) -> Relaunch | None:
+    return Relaunch(MissionBrief.of(world.known)) if world.known.relaunch else None
 
 
 def _decide(

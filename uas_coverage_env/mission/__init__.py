@@ -8,6 +8,7 @@ from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.refusal import refuse_what_asks
+from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.mission.views import WorldView, first_sight
 from uas_coverage_env.mission.ways import Way, Ways
 
@@ -19,6 +20,7 @@ __all__ = [
     "MissionBrief",
     "MovingObstacleBrief",
     "Range",
+    "Relaunch",
     "ReturnEstimate",
     "Way",
     "Ways",

@@ -38,10 +38,18 @@ class Handover:
         Args:
             swarm: What is seen.
         """
+        works = self.at_work(swarm)
+        return works if works.any() else swarm.status == FLYING
+
+    def at_work(self, swarm: SwarmState) -> BoolArray:
+        """(U,) UAS that fly and take commands, if any; likewise once per sample, instead.
+
+        Args:
+            swarm: What is seen.
+        """
         self._heard_at[swarm.responds] = swarm.step
         flies = swarm.status == FLYING
-        works = flies & (self._dt_s * (swarm.step - self._heard_at) < SILENT_S)
-        return works if works.any() else flies
+        return flies & (self._dt_s * (swarm.step - self._heard_at) < SILENT_S)
 
 
 def without(swarm: SwarmState, uas: BoolArray) -> SwarmState:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.record import LANDED, LIMIT
@@ -134,6 +136,10 @@ def _check_flight(flight: Flight) -> None:
             state = MODES[mode]
             state = "lost" if state == "lost" else "still in the air"
             raise InputError(f"{name} is {state} at the end of the flight; export one that is home")
+    for i, name in enumerate(flight.names):
+        drawn = np.flatnonzero(flight.current_A[:, i] > 0.0)
+        if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
+            raise InputError(f"{name} lands and takes off again; export a flight without that")
     contacts = [violation for violation in flight.violations if violation.kind != LIMIT]
     if contacts:
         raise InputError(f"the flight has a contact ({contacts[0]}); export one without")

@@ -40,6 +40,7 @@ def problems(scenario: UncheckedScenario) -> list[str]:
         *_starts_and_each_other(scenario),
         *_batteries(scenario),
         *_events(scenario),
+        *_relaunch(scenario),
     ]
 
 
@@ -180,6 +181,14 @@ def _batteries(scenario: UncheckedScenario) -> Iterator[str]:
                 f"uas[{index}].soc_0: {uas.soc_0:g} is a depth of discharge of "
                 f"{1.0 - uas.soc_0:.3g}, not below dod_max {uas.dod_max:g}; charge it"
             )
+
+
+def _relaunch(scenario: UncheckedScenario) -> Iterator[str]:
+    if scenario.relaunch and scenario.from_ground:
+        yield (
+            "relaunch: true does not go with from_ground: climbs and descents between flights are "
+            "not counted; leave one of them out"
+        )
 
 
 def _events(scenario: UncheckedScenario) -> Iterator[str]:

@@ -47,6 +47,7 @@ class UncheckedScenario(StrictModel):
     uas_safe_distance_m: Distance_m
     min_height_m: Distance_m = 0.0
     from_ground: bool = False
+    relaunch: bool = False
     geofence: Geofence
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = ()
     moving_obstacles: Annotated[tuple[MovingObstacle, ...], Strict(False)] = ()
@@ -67,7 +68,7 @@ class UncheckedScenario(StrictModel):
         data = serialise(self)
         optional = (
             *("place", "min_height_m", "from_ground", "wind", "uncertainty", "disturbances"),
-            *("sensing", "events", "sorties"),
+            *("sensing", "events", "sorties", "relaunch"),
         )
         for name in optional:
             if not getattr(self, name):

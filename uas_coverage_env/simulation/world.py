@@ -21,7 +21,14 @@ from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, 
 from uas_coverage_env.world.disturbance import checked_disturbances
 from uas_coverage_env.world.events import begin_events, is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.state import FLYING, STATE, SwarmState, WorldState, responding
+from uas_coverage_env.world.state import (
+    FLYING,
+    LANDED,
+    STATE,
+    SwarmState,
+    WorldState,
+    responding,
+)
 
 Dynamics = Literal["lpv", "nonlinear"]
 
@@ -250,10 +257,29 @@ class World:
         for obstacle, hull in zip(self.known.obstacles, self.known.hulls, strict=True):
             if isinstance(obstacle, NoFlyZone):
                 uncovered &= hull.signed_distance(positions_m) >= 0.0
+        if len(uncovered) > len(state.uncovered):
+            # who was called home because nothing was left may have something to do now
+            state.returning[:] = False
         self._state = state._replace(uncovered=uncovered)
         self.revisions += 1
         self._prepare()
         return True
+
+    def take_off(self, uas: NDArray[np.bool_]) -> None:
+        """Let UAS that have landed fly again, at rest where they landed, with what they have.
+
+        Args:
+            uas: (U,) which.
+
+        Raises:
+            ValueError: One of them has not landed; nothing has changed.
+        """
+        state = self._state
+        if (state.status[uas] != LANDED).any():
+            raise ValueError("a UAS that has not landed cannot take off; see swarm_state().status")
+        state.status[uas] = FLYING
+        state.departed[uas] = False
+        state.returning[uas] = False
 
     def _fresh_outcome(self) -> NDArray[np.void]:
         """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""

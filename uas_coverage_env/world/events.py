@@ -15,7 +15,7 @@ from uas_coverage_env.compiled.random import counted, normal, uniform
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.events import EFFECTS, OfUas
 from uas_coverage_env.vehicle import DOD, N_STATES, U_TH, VX, VY, X, Y, open_circuit_V
-from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME
+from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME, WRENCH
 from uas_coverage_env.world.outcome import FAULT, NONE
 
 NO_EFFECT, LOSE, DEAFEN, BLIND, GROUND, DISCHARGE, DROP = range(len(EFFECTS))
@@ -199,13 +199,14 @@ def heed(arena, state, outcome):
             for k in range(4):
                 heard[1 + k] = command.values[k]
             heard[5] = command.returning
-        elif then == GO_ON:
+        elif then == GO_ON and heard[0] != WRENCH:
             command.kind = int(heard[0])
             for k in range(4):
                 command.values[k] = heard[1 + k]
             command.returning = heard[5] > 0.0
         else:
-            command.kind = CLIMB if then == HOVER else GO_TO
+            # torques that are held on would turn it over: it hovers
+            command.kind = GO_TO if then == RETURN else CLIMB
             for k in range(4):
                 command.values[k] = 0.0
             if then == RETURN:

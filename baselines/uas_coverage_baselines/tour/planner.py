@@ -182,7 +182,9 @@ class Tour:
         self._world.update(swarm)
         flies = swarm.status == FLYING
         for i in np.flatnonzero(flies & ~self._returns):
-            self._returns[i] = has_to_return(self._arena, self._world.state, i)
+            self._returns[i] = swarm.returning[i] or has_to_return(
+                self._arena, self._world.state, i
+            )
         return View(
             x=swarm.x,
             may_work=self._handover.workers(swarm) & ~self._returns,
