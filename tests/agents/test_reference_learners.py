@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import torch
+from gymnasium import spaces
+from uas_coverage_agents.reference.central_critic import CentralCriticPolicy
 from uas_coverage_agents.reference.settings import Reference, reference_named, reference_names
-from uas_coverage_agents.reference.training import STATE, lanes_of, train_reference
+from uas_coverage_agents.reference.training import STATE, chosen_of, lanes_of, train_reference
 
-from uas_coverage_env.env import OBSERVATION_SIZE
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.tasks import score
+from uas_coverage_env.tasks import LEVELS, level_named, score
 
 
 def tiny(name: str, **changes) -> Reference:
@@ -31,7 +32,14 @@ def test_every_learner_of_the_package_is_read_and_has_an_environment_on_every_le
     assert names == ["ippo", "mappo", "maskable-ppo", "ppo", "recurrent-ppo", "sac"]
     for name in names:
         assert reference_named(name).summary
-        lanes_of(tiny(name), "medium").close()
+        for level in LEVELS:
+            level_named(level).settings(**chosen_of(reference_named(name), level))
+    lanes = lanes_of(tiny("mappo"), "medium")
+    assert lanes.num_envs == 2 * 3
+    sizes = [
+        sum(b.size for b in chosen_of(tiny(n), "medium")["observation"]) for n in ("ippo", "mappo")
+    ]
+    assert lanes.observation_space.shape == (sizes[1],) > (sizes[0],)
 
 
 @pytest.mark.parametrize("name", ["ppo", "sac"])
@@ -69,19 +77,15 @@ def test_other_settings_and_damaged_states_are_refused_in_a_line(tmp_path):
         train_reference(tiny("ppo", learning={"gama": 1.0}), "easy", 0, tmp_path / "other")
 
 
-def test_a_central_critic_sees_the_whole_mission_and_the_actor_does_not(tmp_path):
-    trained = train_reference(tiny("mappo", rounds=1), "medium", 0, tmp_path)
-    model = trained.player.model
-    rng = np.random.default_rng(0)
-    seen = torch.as_tensor(
-        rng.uniform(-1, 1, (2, *model.observation_space.shape)), dtype=torch.float32
-    )
-    seen[1, :OBSERVATION_SIZE] = seen[0, :OBSERVATION_SIZE]
-    assert seen.shape[1] > OBSERVATION_SIZE
-    actions = model.policy.get_distribution(seen).mode()
-    values = model.policy.predict_values(seen)
-    assert torch.equal(actions[0], actions[1])
-    assert values[0] != values[1]
+def test_a_central_critic_sees_the_whole_mission_and_the_actor_does_not():
+    space = spaces.Box(-1.0, 1.0, (20,), np.float32)
+    policy = CentralCriticPolicy(space, spaces.Box(-1.0, 1.0, (3,)), lambda _: 1e-3, actor_size=12)
+    seen = torch.as_tensor(np.stack([space.sample(), space.sample()]))
+    seen[1, :12] = seen[0, :12]
+    actions = policy.get_distribution(seen).mode()
+    values = policy.predict_values(seen)
+    torch.testing.assert_close(actions[0], actions[1], rtol=0.0, atol=1e-6)
+    assert abs(values[0] - values[1]) > 1e-3
 
 
 def test_a_policy_with_a_memory_begins_each_mission_with_nothing_in_mind(tmp_path):

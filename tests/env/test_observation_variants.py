@@ -191,7 +191,7 @@ def test_pictures_stand_apart_in_every_environment_and_are_the_same_numbers():
     for k in ("observation", "grid"):
         np.testing.assert_array_equal(batch[k][1], joint[k])
     for _ in range(3):
-        batch, _, _, ended, infos = many.step(np.zeros(many.action_space.shape))
+        batch, _, _, ended, infos = many.step(np.zeros((2, 9)))
     assert ended.all()
     assert many.single_observation_space.contains(infos["final_obs"][0])
 

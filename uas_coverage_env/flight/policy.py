@@ -102,6 +102,6 @@ class PolicyFunction:
         rows = np.pad(seen, ((0, lacking), (0, 0))).ravel()
         if masks is not None:
             none = self._settings.kind.masks(np.full((lacking, K_WAYPOINTS), -1))
-            masks = np.concatenate([masks, none]).ravel()
+            masks = np.concatenate([masks, none.astype(np.int8)]).ravel()
         told = shown(self._settings, rows, masks, n_uas)
         return self._cockpit.actions.joint_rows(self._policy(told), n_uas)
