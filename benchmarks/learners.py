@@ -12,7 +12,6 @@ nearest-waypoint on the same towns, and fills what stands between the marks of a
 from __future__ import annotations
 
 import argparse
-import csv
 import os
 import platform
 import shutil
@@ -38,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 README = ROOT / "agents" / "README.md"
 PICTURES = ROOT / "docs" / "pictures"
 SHIPPED = ROOT / "agents" / "uas_coverage_agents" / "shipped"
-COVERAGE, HOME, VIOLATIONS, ENERGY, STEPS, FILTERED = range(len(MEASURES))
+COVERAGE, HOME, VIOLATIONS, ENERGY, STEPS, FILTERED, _ = range(len(MEASURES))
 MEASURED = (
     "covered, %", "all home, %", "violations per mission", "filter changed, % of commands",
     "energy, Wh", "steps", "Δ energy, %", "Δ steps, %",
@@ -216,12 +215,7 @@ def training_of(policy: Policy) -> str:
 
 def curve_of(directory: Path) -> list[CurvePoint]:
     """The learning curve of a training."""
-    lines = (directory / curve.TABLE).read_text(encoding="utf-8").splitlines()
-    whole = {"steps"}
-    return [
-        CurvePoint.model_validate({k: int(v) if k in whole else float(v) for k, v in row.items()})
-        for row in csv.DictReader(lines)
-    ]
+    return curve.read(directory)
 
 
 def machine() -> str:

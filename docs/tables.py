@@ -23,7 +23,13 @@ from gymnasium import spaces
 from uas_coverage_env import load_scenario, uas_coverage_v0
 from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
-from uas_coverage_env.env.observation import OBSERVATION_SIZE, layout_table
+from uas_coverage_env.env.observation import (
+    OBSERVATION_SIZE,
+    full_state,
+    grid,
+    layout_table,
+    local,
+)
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
@@ -66,6 +72,12 @@ def environment_summary() -> str:
         ("Render modes", ", ".join(f"`{mode}`" for mode in RENDER_MODES)),
     ]
     return table((env.metadata["name"], ""), rows)
+
+
+def picture_channels() -> str:
+    """What the channels of a picture are."""
+    rows = [(str(k), f.name, f.meaning) for k, f in enumerate(grid().features)]
+    return table(("channel", "name", "meaning"), rows)
 
 
 def action_tables() -> str:
@@ -285,6 +297,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
+    "observation_local": lambda: layout_table(local()),
+    "observation_grid": picture_channels,
+    "observation_full_state": lambda: layout_table(full_state(2, 3, 1)),
     "actions": action_tables,
     "rewards": rewards_table,
     "infos": docstring_section("Infos"),

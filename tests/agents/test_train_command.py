@@ -17,17 +17,21 @@ from stable_baselines3 import PPO
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.training import command
 from uas_coverage_agents.training.config import load_config
+from uas_coverage_agents.training.loop import curve_scenarios
 from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
 from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import evaluate
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
+ASSISTED = {"return_mode": True, "safety_filter": True}
 
 
 def train(directory, *arguments: str) -> int:
-    return main(["train", TINY, "--missions", "1", "--out", str(directory), *arguments])
+    usual = ["--missions", "1", "--baselines", "nearest-waypoint"]
+    return main(["train", TINY, *usual, "--out", str(directory), *arguments])
 
 
 @pytest.fixture(scope="module")
@@ -64,12 +68,32 @@ def test_a_training_leaves_a_policy_a_curve_and_its_logs(trained):
     assert not list(trained.rglob("*.pkl"))
 
 
+def test_the_curve_has_the_default_return_and_stands_beside_players_that_do_not_learn(trained):
+    job = TrainingJob("tiny", load_config(TINY), seed=0, missions=1)
+    town = curve_scenarios(job)[0]
+    (beside,) = read_curve(trained / "baselines" / "nearest-waypoint")
+    flown = evaluate("nearest-waypoint", town, seeds=[0])
+    assert float(beside["return"]) == flown.mean("episode_return")
+    returns = [float(row["return"]) for row in read_curve(trained)]
+    last = evaluate(f"policy:{trained / 'policy'}", town, seeds=[0], **ASSISTED)
+    assert returns[-1] == last.mean("episode_return")
+    score = load_policy(trained / "policy").description.score
+    assert score.measures["episode_return"].mean == returns[-1]
+
+
+def test_a_baseline_that_is_no_planner_is_refused_before_anything_is_begun(tmp_path, capsys):
+    out = ["--out", str(tmp_path / "run")]
+    assert "unknown planner" in refusal(capsys, TINY, *out, "--baselines", "nearest-waypiont")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_killed_training_goes_on_to_the_same_weights(trained, tmp_path, capsys):
     script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
     command_line = [sys.executable, "-c", script, "train", TINY]
+    usual = ["--missions", "1", "--baselines", "none", "--checkpoint-s", "0"]
     directory = tmp_path / "killed"
     process = subprocess.Popen(
-        [*command_line, "--missions", "1", "--out", str(directory), "--checkpoint-s", "0"],
+        [*command_line, *usual, "--out", str(directory)],
         stdout=subprocess.DEVNULL,
     )
     while not (directory / "checkpoints" / "000003.json").exists():

@@ -16,10 +16,16 @@ from sb3_contrib.common.maskable.callbacks import MaskableEvalCallback
 from sb3_contrib.common.maskable.evaluation import evaluate_policy as evaluate_masked
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import EvalCallback
+from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.torch_layers import NatureCNN
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
+
+from uas_coverage_env.env import CoverageSwarmEnv, grid
+from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
+from uas_coverage_env.env.observation.waypoints import WAYPOINTS
 
 torch.set_num_threads(1)
 QUICK: dict[str, Any] = {"n_steps": 24, "batch_size": 24, "n_epochs": 1, "device": "cpu", "seed": 0}
@@ -87,6 +93,29 @@ def test_what_a_lane_has_seen_last_has_its_mask():
         last = info["terminal_observation"]
         np.testing.assert_array_equal(last["observation"], other["terminal_observation"])
         assert env.observation_space.contains(last)
+
+
+@pytest.mark.parametrize(
+    ("policy", "observation"), [("CnnPolicy", (grid(),)), ("MultiInputPolicy", "grid")]
+)
+def test_pictures_are_learned_from(policy, observation):
+    settings: dict[str, Any] = {"observation": observation, "images_apart": True}
+    check_env(CoverageSwarmEnv(**SHORT, **settings))
+    model = PPO(policy, swarms(**settings), **QUICK).learn(48)
+    assert any(isinstance(part, NatureCNN) for part in model.policy.modules())
+
+
+def test_lanes_show_pictures_apart_to_the_last():
+    # 236 numbers, as in tests/env/test_blocks.py: a batch is compiled once for each size
+    env = lanes(observation=(WAYPOINTS, SURROUNDINGS, grid(4, 80.0)), images_apart=True)
+    seen = env.reset()
+    for _ in range(12):
+        seen, _, dones, infos = env.step(np.zeros((4, 3)))
+    assert seen["grid"].shape == (4, 5, 4, 4)
+    assert seen["grid"].dtype == np.uint8
+    assert dones.all()
+    for info in infos:
+        assert env.observation_space.contains(info["terminal_observation"])
 
 
 def test_lanes_are_filmed():

@@ -31,6 +31,7 @@ SETTINGS = [
     {"action": "waypoint", "mask_in_observation": True},
     {"scenario": generate_scenario(0, n_uas=5, n_waypoints=30, n_obstacles=6)},
 ]
+SEEN = [{"observation": "local"}, {"observation": "grid", "images_apart": True}]
 DRAWN = [{"scenario": "generated"}, {"scenario": "generated", "action": "waypoint"}]
 
 
@@ -41,7 +42,7 @@ def named(settings):
 all_settings = pytest.mark.parametrize("settings", SETTINGS + DRAWN, ids=named)
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=named)
+@pytest.mark.parametrize("settings", SETTINGS + SEEN, ids=named)
 def test_parallel_api(settings, capsys):
     parallel_api_test(uas_coverage_v0.parallel_env(**settings), num_cycles=150)
 
@@ -56,7 +57,7 @@ def test_parallel_api_of_drawn_missions(settings, capsys):
 # it warns of every observation that is no array, as those with a mask beside it
 @pytest.mark.filterwarnings("ignore:Observation space for each agent probably:UserWarning")
 @pytest.mark.filterwarnings("ignore:Observation is not a NumPy array:UserWarning")
-@all_settings
+@pytest.mark.parametrize("settings", SETTINGS + DRAWN + SEEN, ids=named)
 def test_aec_api(settings, capsys):
     api_test(uas_coverage_v0.env(**settings), num_cycles=60)
 

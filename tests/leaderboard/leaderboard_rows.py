@@ -35,6 +35,7 @@ def row(scenario="a", player="p", seed=0, **changes) -> Row:
         "versions": "{}",
         "source_sha256": "22",
         "finished_at": "2026-01-01T00:00:00+00:00",
+        "episode_return": 50.0,
     }
     return Row(**{**usual, **changes})
 
@@ -42,7 +43,14 @@ def row(scenario="a", player="p", seed=0, **changes) -> Row:
 def failed_row(scenario="a", player="p", seed=0, reason="refused") -> Row:
     """A flight that there is none of."""
     nothing = dict.fromkeys(
-        ("steps", "energy_Wh", "decision_p50_s", "decision_p95_s", "trajectory_sha256")
+        (
+            "steps",
+            "energy_Wh",
+            "decision_p50_s",
+            "decision_p95_s",
+            "trajectory_sha256",
+            "episode_return",
+        )
     )
     return row(
         *(scenario, player, seed),

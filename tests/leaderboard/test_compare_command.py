@@ -9,7 +9,7 @@ import pytest
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import PlannerError, load_planner
+from uas_coverage_env.flight import PlannerError, evaluate, load_planner
 from uas_coverage_env.leaderboard import TIMES, workers
 from uas_coverage_env.world import Velocity
 
@@ -65,6 +65,8 @@ def test_a_sweep_prints_tables_and_writes_its_files(two_yards, elsewhere, capsys
     hover = frame.filter(player="hover")
     assert hover["accomplished"].to_list() == [False] * 4
     assert hover["steps"].to_list() == [60] * 4
+    own = evaluate("hover", two_yards.partition(",")[0], seeds=[0]).mean("episode_return")
+    assert hover.filter(scenario="yard")["episode_return"].to_list() == [own] * 2
 
 
 def test_the_same_sweep_goes_on_and_flies_nothing_twice(yard, elsewhere, capsys, monkeypatch):

@@ -224,3 +224,26 @@ def test_what_is_no_comparison_of_this_version_is_refused(tmp_path):
         table.write_text(text)
         with pytest.raises(InputError, match=r"table\.json: cannot be read"):
             published(tmp_path)
+
+
+def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
+    rows = [
+        row("a", "p", 0, episode_return=10.0),
+        row("a", "p", 1, episode_return=30.0, violations=1, accomplished=False),
+        row("a", "p", 2, episode_return=None),
+        failed_row("b", "p"),
+    ]
+    one = by_player(rows, "p")["p"]
+    assert (one.episode_return.value, one.episode_return.n) == (20.0, 2)
+    assert one.flat()["episode_return_high"] == 30.0
+    headings, (cells,) = outcome_cells([one])
+    assert cells[headings.index("return")] == "20.0 [10.0, 30.0]"
+
+
+def test_a_comparison_of_a_version_without_returns_can_still_be_drawn(tmp_path):
+    write(Comparison.of([row("a", "p")], 1, "p", "a command", "1"), tmp_path)
+    file = tmp_path / "flights.parquet"
+    polars.read_parquet(file).drop("episode_return").write_parquet(file)
+    rows, reference = published(tmp_path)
+    assert [one.episode_return for one in rows] == [None]
+    assert leaderboard_figure(scores_of(rows, reference), rows, reference).axes

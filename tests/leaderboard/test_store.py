@@ -163,3 +163,22 @@ def test_every_column_of_a_row_is_a_column_of_the_store(tmp_path):
         columns = [name for _, name, *_ in reader.execute("PRAGMA table_info(flights)")]
         reader.close()
     assert columns == [field.name for field in dataclasses.fields(Row)]
+
+
+def older(path):
+    """Make the store one of a version that kept no returns."""
+    with sqlite3.connect(path) as connection:
+        connection.execute("ALTER TABLE flights DROP COLUMN episode_return")
+    connection.close()
+
+
+def test_a_store_of_a_version_without_returns_is_read_and_gone_on_with(tmp_path):
+    with opened(tmp_path, SWEEP) as store:
+        store.add(row())
+    older(tmp_path / STORE)
+    before = dataclasses.replace(row(), episode_return=None)
+    assert flights_in(tmp_path) == [before], "and reading changes nothing"
+    assert flights_in(tmp_path) == [before]
+    with opened(tmp_path, SWEEP) as store:
+        store.add(row(seed=1))
+        assert store.rows() == [before, row(seed=1)]

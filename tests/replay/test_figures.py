@@ -19,6 +19,7 @@ from uas_coverage_env.replay.figures import (
     modes_figure,
     save_figure,
     training_figure,
+    with_baselines,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
 from uas_coverage_env.scenario import Sensor
@@ -211,6 +212,20 @@ def test_the_return_has_a_panel_where_all_tables_have_it_and_players_are_level_l
     assert list(level.get_ydata()) == [0.5, 0.5]
     without = training_figure({**runs, "old": learning_curve(curve_in(tmp_path / "c"))})
     assert "Return" not in [axis.get_ylabel() for axis in without.axes]
+
+
+def test_baselines_beside_trainings_are_drawn_once_unless_they_flew_other_missions(tmp_path):
+    once = "\n".join(CURVE.splitlines()[:2])
+    for name in "abc":
+        curve_in(tmp_path / name)
+        folder = tmp_path / name / "baselines"
+        folder.mkdir()
+        curve_in(folder / "tour", once if name < "c" else once.replace("60.0", "61.0"))
+    runs = with_baselines({name: tmp_path / name for name in "abc"})
+    assert list(runs) == ["a", "b", "c", "tour", "tour, c"]
+    assert [len(curve["coverage"]) for curve in runs.values()] == [2, 2, 2, 1, 1]
+    assert list(with_baselines({"": tmp_path / "a"})) == ["a", "tour"]
+    assert list(with_baselines({"": curve_in(tmp_path / "d")})) == [""]
 
 
 def test_a_training_alone_needs_no_legend(tmp_path):

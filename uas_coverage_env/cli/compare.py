@@ -45,7 +45,7 @@ from uas_coverage_env.simulation import Dynamics
 _REFERENCE = "nearest-waypoint"
 _MOST_FLIGHTS = 1_000_000
 _SECONDS_BETWEEN_LINES = 5.0
-_NARROWEST_TABLE = 140
+_NARROWEST_TABLE = 160
 
 
 def compare(

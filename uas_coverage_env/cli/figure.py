@@ -59,10 +59,10 @@ def figure(
         from uas_coverage_env.replay.figures import (
             CURVE,
             KINDS,
-            learning_curve,
             map_figure,
             save_figure,
             training_figure,
+            with_baselines,
         )
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
@@ -77,9 +77,7 @@ def figure(
         rows, reference = published(directories[0])
         drawn = leaderboard_figure(scores_of(rows, reference), rows, reference)
     elif kind == _TRAINING:
-        drawn = training_figure(
-            {name: learning_curve(path) for name, path in _named(directories).items()}
-        )
+        drawn = training_figure(with_baselines(_named(directories)))
     elif step is not None:
         drawn = map_figure(Flight.load(directories[0]), step=step)
     else:

@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import action_of
 from uas_coverage_env.env.global_state import global_space
-from uas_coverage_env.env.interface import LastKnown, observation_space, with_mask
+from uas_coverage_env.env.interface import LastKnown, observation_space, shown
 from uas_coverage_env.env.memory import REWARD, STATUS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.sequence import MissionSequence
@@ -61,8 +61,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     Observation Space:
         A float32 `Box`, the same for all agents and all scenarios; with `mask_in_observation` a
-        `Dict` of it and the mask. What lies beyond its bounds is
-        clipped. Directions are those of the map: they do not turn with the UAS.
+        `Dict` of it and the mask, with `images_apart` of it and pictures. What lies beyond its
+        bounds is clipped. Directions are those of the map: they do not turn with the UAS.
 
         {observations}
 
@@ -135,7 +135,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._begun = False
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
         flown = self._episode.settings
-        self._masks = flown.mask_in_observation
+        self._rows_alone = flown.rows_alone
         self._told: tuple[Observations, Infos] = ({}, {})
         # one object per agent: a learner seeds them one by one
         self._observation_spaces = {
@@ -203,7 +203,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             for i, (agent, report, amounts) in enumerate(rows)
         }
         self._told = ({}, {})
-        return self._with_masks(observations, infos) if self._masks else (observations, infos)
+        return (observations, infos) if self._rows_alone else self._shown(observations, infos)
 
     def step(
         self, actions: Mapping[str, Any]
@@ -262,8 +262,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         if self.render_mode is not None:
             self._screen.see(episode.positions_m)
             self._show()
-        if self._masks:
-            observations, infos = self._with_masks(observations, infos)
+        if not self._rows_alone:
+            observations, infos = self._shown(observations, infos)
         return observations, rewards, terminations, truncations, infos
 
     def check_action(self, agent: str, action: Any) -> None:
@@ -323,10 +323,14 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         """Close the window, if there is one; closing twice does no harm."""
         self._screen.close()
 
-    def _with_masks(self, seen: Observations, infos: Infos) -> tuple[Observations, Infos]:
-        mask_of, index, before = self._episode.infos.action_mask, self._index, self._told
-        masked = {agent: with_mask(seen[agent], mask_of(index[agent])) for agent in seen}
-        self._told = LastKnown(masked, before[0]), LastKnown(infos, before[1])
+    def _shown(self, seen: Observations, infos: Infos) -> tuple[Observations, Infos]:
+        settings, index, before = self._episode.settings, self._index, self._told
+        mask_of = self._episode.infos.action_mask if settings.mask_in_observation else None
+        as_shown = {
+            agent: shown(settings, row, mask_of and mask_of(index[agent]))
+            for agent, row in seen.items()
+        }
+        self._told = LastKnown(as_shown, before[0]), LastKnown(infos, before[1])
         return self._told
 
     def _show(self) -> None:

@@ -11,13 +11,14 @@ from uas_coverage_env.compiled.blocks import checked_blocks
 from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.actions.kinds import kind_of
-from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
+from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, observation_named
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, weights_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.world.disturbance import checked_disturbances
 
 _LONGEST = 100_000
+_SWITCHES = ("return_mode", "safety_filter", "mask_in_observation", "images_apart", "flat_infos")
 
 
 class UnknownArgumentError(ValueError, TypeError):
@@ -39,13 +40,17 @@ class MissionSettings:
         safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
-        observation: Blocks that the observation is made of, see `ObservationBlock`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; or the name of
+            an observation (`default`, `local`, `grid`).
         reward: Terms that the reward is made of, see `RewardTerm`.
         disturbances: What pushes back, see `Disturbance`; None: what each scenario says; with ()
             nothing does.
         mask_in_observation: With choices (waypoint), an observation is a dictionary of
             `observation` and `action_mask`, for libraries that do not read infos; the mask is not
             in the infos then.
+        images_apart: Blocks that are pictures (`grid`) stand beside the observation: it is a
+            dictionary of `observation` and of a uint8 `Box` (channels, rows, columns) for each of
+            them, 255 for 1; a picture without other blocks is that `Box`.
         flat_infos: Infos have no sub-dictionaries, but `reward_terms_home` and so on, for libraries
             that make an array of every info (TorchRL).
 
@@ -63,6 +68,7 @@ class MissionSettings:
     reward: tuple[RewardTerm, ...] = REWARD
     disturbances: tuple[Disturbance, ...] | None = None
     mask_in_observation: bool = False
+    images_apart: bool = False
     flat_infos: bool = False
 
     def __post_init__(self) -> None:
@@ -70,7 +76,7 @@ class MissionSettings:
         if self.dynamics not in get_args(Dynamics):
             allowed = ", ".join(get_args(Dynamics))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
-        for name in ("return_mode", "safety_filter", "mask_in_observation", "flat_infos"):
+        for name in _SWITCHES:
             switch = getattr(self, name)
             if not isinstance(switch, bool | np.bool_):
                 raise ValueError(f"{name} is {switch!r}; it is True or False")
@@ -89,6 +95,11 @@ class MissionSettings:
             "observation",
             checked_blocks("observation", "blocks", self.observation, ObservationBlock),
         )
+        if self.images_apart and not any(block.shape for block in self.observation):
+            raise ValueError(
+                "images_apart is True, and no block of the observation is a picture; "
+                'take observation="grid", or leave it out'
+            )
         object.__setattr__(
             self, "reward", checked_blocks("reward", "terms", self.reward, RewardTerm)
         )
@@ -109,6 +120,9 @@ class MissionSettings:
                 raise UnknownArgumentError(
                     f"unexpected keyword argument {name!r}; there are {', '.join(known)}"
                 )
+        named = given.get("observation")
+        if isinstance(named, str):
+            given = {**given, "observation": observation_named(named)}
         return cls(**given)
 
     @property
@@ -125,6 +139,11 @@ class MissionSettings:
     def observation_size(self) -> int:
         """Numbers in the observation of one UAS."""
         return sum(block.size for block in self.observation)
+
+    @property
+    def rows_alone(self) -> bool:
+        """Whether observations are shown as the rows that they are computed as."""
+        return not (self.mask_in_observation or self.images_apart)
 
     @property
     def kind(self) -> ActionKind:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import joint_action_of
-from uas_coverage_env.env.interface import absent, flat, observation_space, with_mask
+from uas_coverage_env.env.interface import absent, flat, observation_space, shown
 from uas_coverage_env.env.memory import COVERED, ENERGY, FIRST_TERM, STATUS
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen, offered
@@ -39,7 +39,8 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
 
     Observation Space:
         The observations of all UAS one after the other, flying or not; zero for UAS that the
-        mission does not have. With `mask_in_observation` a `Dict` of it and the masks. Of each UAS:
+        mission does not have. With `mask_in_observation` a `Dict` of it and the masks; with
+        `images_apart` of it and pictures, those of all UAS as channels of one. Of each UAS:
 
         {observations}
 
@@ -209,8 +210,9 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         seen = self._episode.observation.ravel()
         missing = self._n_uas * self._episode.observation.shape[1] - len(seen)
         seen = np.pad(seen, (0, missing)) if missing else seen
-        masks = self._episode.settings.mask_in_observation
-        return with_mask(seen, self._action_mask()) if masks else seen
+        settings = self._episode.settings
+        masks = self._action_mask() if settings.mask_in_observation else None
+        return shown(settings, seen, masks, self._n_uas)
 
     def _action_mask(self) -> NDArray[np.int8]:
         """(U · choices,) of all UAS."""

@@ -18,7 +18,7 @@ from uas_coverage_env.env.batch_kernel import (
     SWARM_FIRST_TERM,
     SWARM_REWARD,
 )
-from uas_coverage_env.env.interface import flat, observation_space, with_mask
+from uas_coverage_env.env.interface import flat, observation_space, shown
 from uas_coverage_env.env.memory import (
     CONTACT,
     CONTACT_WITH,
@@ -323,7 +323,8 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     def _shown(self, observation: NDArray[np.float32]) -> Any:
         seen = observation.reshape(self.num_envs, -1)
         seen = seen.copy() if self.copy else seen
-        return with_mask(seen, self.action_masks()) if self._masks_seen else seen
+        masks = self.action_masks() if self._masks_seen else None
+        return shown(self._batch.settings, seen, masks, self._batch.n_uas)
 
     def _infos(
         self,
@@ -373,7 +374,8 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         masks = self._masks_of(final.candidates) if self._masks_seen else None
         for lane in np.flatnonzero(ended):
             seen = final.observation[lane].ravel().copy()
-            final_obs[lane] = seen if masks is None else with_mask(seen, masks[lane])
+            mask = None if masks is None else masks[lane]
+            final_obs[lane] = shown(self._batch.settings, seen, mask, self._batch.n_uas)
         infos["final_obs"], infos["_final_obs"] = final_obs, ended
         infos["final_info"] = self._infos(final.report, final.swarm, final.candidates, ended)
         infos["_final_info"] = ended

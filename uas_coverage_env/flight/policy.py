@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.cockpit import Cockpit
-from uas_coverage_env.env.interface import with_mask
+from uas_coverage_env.env.interface import shown
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.planner import Assistants
@@ -88,16 +88,20 @@ class PolicyFunction:
         if self._swarm_of is not None:
             rows = self._joint_rows(self._swarm_of, seen, masks)
             return cockpit.commands({name: rows[i] for i, name in active.items()})
-        shown = seen if masks is None else [*map(with_mask, seen, masks)]
-        return cockpit.commands({name: self._policy(shown[i]) for i, name in active.items()})
+        told = {
+            name: shown(self._settings, seen[i], None if masks is None else masks[i])
+            for i, name in active.items()
+        }
+        return cockpit.commands({name: self._policy(each) for name, each in told.items()})
 
     def _joint_rows(
         self, n_uas: int, seen: NDArray[np.float32], masks: NDArray[np.int8] | None
     ) -> Any:
         """The actions of all UAS; what the mission lacks is shown as `CoverageSwarmEnv` does."""
         lacking = n_uas - len(seen)
-        shown: Any = np.pad(seen, ((0, lacking), (0, 0))).ravel()
+        rows = np.pad(seen, ((0, lacking), (0, 0))).ravel()
         if masks is not None:
             none = self._settings.kind.masks(np.full((lacking, K_WAYPOINTS), -1))
-            shown = with_mask(shown, np.concatenate([masks, none]).ravel())
-        return self._cockpit.actions.joint_rows(self._policy(shown), n_uas)
+            masks = np.concatenate([masks, none.astype(np.int8)]).ravel()
+        told = shown(self._settings, rows, masks, n_uas)
+        return self._cockpit.actions.joint_rows(self._policy(told), n_uas)

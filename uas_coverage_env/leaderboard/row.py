@@ -7,7 +7,13 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from typing import Any, Self, get_args
 
-from uas_coverage_env.flight import Flight, accomplished, filtered_share, summary
+from uas_coverage_env.flight import (
+    Flight,
+    accomplished,
+    episode_return,
+    filtered_share,
+    summary,
+)
 from uas_coverage_env.leaderboard.sweep import Entry
 
 FLOWN, FAILED = "flown", "failed"
@@ -53,6 +59,8 @@ class Row:
         versions: Package -> version, as JSON.
         source_sha256: Hash of the source code that flew it.
         finished_at: When, UTC.
+        episode_return: Sum of the rewards of all UAS, as the environments pay by default, not
+            discounted; None where a version flew it that did not keep it.
     """
 
     key: str
@@ -84,6 +92,7 @@ class Row:
     versions: str
     source_sha256: str
     finished_at: str
+    episode_return: float | None = None
 
     @classmethod
     def of(cls, entry: Entry, flight: Flight, source_sha256: str) -> Self:
@@ -111,6 +120,7 @@ class Row:
             versions=json.dumps(result["versions"], sort_keys=True),
             source_sha256=source_sha256,
             finished_at=_now(),
+            episode_return=episode_return(flight),
         )
 
     @classmethod
@@ -171,6 +181,9 @@ class Row:
 
 COLUMNS = {field.name: get_args(field.type) or (field.type,) for field in fields(Row)}
 """What a row holds: name -> the types of its values, None's last."""
+
+ADDED = ("episode_return",)
+"""Columns that older sweeps do not have; there, they are None."""
 
 
 def _identity(entry: Entry) -> dict[str, Any]:

@@ -57,6 +57,8 @@ class Scores:
         improves_energy: Probability of needing less energy than the reference; a flight that is
             not accomplished is worse than any that is.
         improves_steps: The same of the makespan.
+        episode_return: Interquartile mean of the sum of all rewards, as the environments pay by
+            default; over all flights that there are, violating ones included.
     """
 
     player: str
@@ -83,6 +85,7 @@ class Scores:
     steps_difference_percent: Estimate
     improves_energy: Estimate
     improves_steps: Estimate
+    episode_return: Estimate
 
     def flat(self) -> dict[str, Any]:
         """Plain columns: an estimate becomes NAME, NAME_low, NAME_high and NAME_n."""
@@ -173,6 +176,7 @@ def _scores(
         steps_difference_percent=_paired(mine, theirs, lambda row: row.steps),
         improves_energy=_improves(mine, theirs, lambda row: row.energy_Wh, compared),
         improves_steps=_improves(mine, theirs, lambda row: row.steps, compared),
+        episode_return=estimate(_values(mine, lambda row: row.episode_return), over),
     )
 
 

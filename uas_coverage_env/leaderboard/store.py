@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard.row import COLUMNS, Row
+from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, Row
 from uas_coverage_env.leaderboard.sweep import difference
 
 STORE = "flights.sqlite"
@@ -56,8 +56,10 @@ class Store:
 
     def rows(self) -> list[Row]:
         """All flights, in an order that does not depend on when they were flown."""
+        lacking = _lacking(self._connection)
+        columns = ", ".join("NULL" if name in lacking else name for name in COLUMNS)
         found = self._connection.execute(
-            f"SELECT {', '.join(COLUMNS)} FROM flights ORDER BY scenario, player, seed, key"
+            f"SELECT {columns} FROM flights ORDER BY scenario, player, seed, key"
         )
         try:
             return [Row.checked(dict(zip(COLUMNS, values, strict=True))) for values in found]
@@ -191,6 +193,8 @@ def _connection(path: Path) -> sqlite3.Connection:
                 connection.execute(f"PRAGMA user_version = {_SCHEMA_VERSION}")
         elif version != _SCHEMA_VERSION:
             raise sqlite3.DatabaseError(f"its schema is {version}, this is {_SCHEMA_VERSION}")
+        for name in _lacking(connection):
+            connection.execute(f"ALTER TABLE flights ADD COLUMN {_column(name)}")
         (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if verdict != "ok":
             raise sqlite3.DatabaseError(" ".join(verdict.split()))
@@ -199,11 +203,19 @@ def _connection(path: Path) -> sqlite3.Connection:
 
 
 def _schema() -> str:
-    columns = []
-    for name, (kind, *optional) in COLUMNS.items():
-        key = " PRIMARY KEY" if name == "key" else ""
-        columns.append(f"{name} {_SQL_TYPES[kind]}{'' if optional else ' NOT NULL'}{key}")
-    return ", ".join(columns)
+    return ", ".join(map(_column, COLUMNS))
+
+
+def _column(name: str) -> str:
+    kind, *optional = COLUMNS[name]
+    key = " PRIMARY KEY" if name == "key" else ""
+    return f"{name} {_SQL_TYPES[kind]}{'' if optional else ' NOT NULL'}{key}"
+
+
+def _lacking(connection: sqlite3.Connection) -> list[str]:
+    """The columns that the store of an older version does not have."""
+    there = {name for _, name, *_ in connection.execute("PRAGMA table_info(flights)")}
+    return [name for name in ADDED if name not in there]
 
 
 def _remove(path: Path) -> None:

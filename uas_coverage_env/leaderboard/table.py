@@ -17,7 +17,7 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
     """Headings and rows: what was achieved, and what went wrong."""
     headings = [
         *("planner", "flights", "accomplished", "covered, %", "worst", "all home"),
-        *("violations", "breaches", "fallbacks", "filtered, %"),
+        *("violations", "breaches", "fallbacks", "filtered, %", "return"),
     ]
     return headings, [
         [
@@ -31,6 +31,7 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
             str(one.breaches),
             str(one.fallbacks),
             f"{one.filtered_percent:.1f}",
+            _text(one.episode_return, ".1f"),
         ]
         for one in scores
     ]
@@ -98,6 +99,8 @@ def notes(rows: Sequence[Row], reference: str) -> list[str]:
     return [
         f"Interquartile means with 95 % intervals [{over}]; no interval where the flights cannot "
         "tell. A flight with a violation has no energy, one that is not accomplished no steps.",
+        "Return: the sum of the rewards of all UAS, not discounted, with the environments' default "
+        "terms and weights (docs/environment.md#rewards), whatever a policy was trained with.",
         "Above the bound: mean over accomplished flights of the energy beyond the least with which "
         "the mission can be flown in as many steps (docs/bound.md); intervals are over scenarios.",
         f"Against {reference}, intervals are over scenarios. Δ: mean paired difference where both "

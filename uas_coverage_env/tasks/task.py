@@ -20,7 +20,9 @@ SPLITS: Mapping[str, range] = {
 """What the seeds of missions are for. Learn on the first, choose on the second; scores that are
 published are of the third, on which nothing is chosen."""
 
-LEARNERS_CHOICE = ("action", "observation", "reward", "reward_weights", "mask_in_observation")
+LEARNERS_CHOICE = (
+    *("action", "observation", "reward", "reward_weights", "mask_in_observation", "images_apart"),
+)
 """Settings that are a learner's affair: how it acts, what it sees and what it is paid for."""
 
 _LIBRARIES_CHOICE = ("flat_infos", "render_mode")

@@ -26,7 +26,11 @@ Seconds = Annotated[float, Field(ge=0.0)]
 
 
 class CurvePoint(StrictModel):
-    """How the policy flew the validation scenarios at one moment of its training; means."""
+    """How the policy flew the validation scenarios at one moment of its training; means.
+
+    The return is that of the environments' default reward, whatever is learned from; None where a
+    version flew it that did not keep it.
+    """
 
     steps: Count
     process_s: Seconds
@@ -36,6 +40,7 @@ class CurvePoint(StrictModel):
     violations: float
     energy_Wh: float
     flight_steps: float
+    episode_return: float | None = None
 
 
 class TrainingState(StrictModel):

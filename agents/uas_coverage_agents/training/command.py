@@ -27,7 +27,10 @@ ORDER = "order.json"
 
 _FAILED = 1
 _SECONDS_BETWEEN_LINES = 10.0
-_OURS = (ORDER, "checkpoints", "tensorboard", "learning_curve.csv", "learning_curve.png", "policy")
+_OURS = (
+    *(ORDER, "checkpoints", "tensorboard", "learning_curve.csv", "learning_curve.png", "policy"),
+    "baselines",
+)
 
 
 def train(
@@ -62,6 +65,13 @@ def train(
     checkpoint_s: Annotated[
         float, typer.Option(min=0.0, help="Seconds between two checkpoints.")
     ] = 60.0,
+    baselines: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME,...",
+            help="Planners whose flights stand beside the learning curve; `none` for nobody.",
+        ),
+    ] = "nearest-waypoint,trajectory",
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Delete the training in --out and restart.")
     ] = False,
@@ -92,6 +102,9 @@ def train(
             f"add --trust-pickle if you trust its author"
         )
     loop, filelock = _learn_extra()
+    from uas_coverage_agents.training.baselines import fly_baselines, planners_of
+
+    beside = planners_of(baselines)
     name = Path(algorithm).stem
     job = loop.TrainingJob(name, config, seed, minutes, missions, checkpoint_s)
     directory = out or Path("trainings") / f"{name}-{seed}"
@@ -105,6 +118,7 @@ def train(
             if zip_file is not None:
                 policy = loop.import_zip(job, zip_file, directory)
             else:
+                fly_baselines(beside, loop.curve_scenarios(job), directory, screen.print)
                 policy = loop.train(job, directory, on_progress)
     except filelock.Timeout:
         raise InputError(f"{directory}: another training is at work there") from None

@@ -21,8 +21,9 @@ from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
 from uas_coverage_agents.training.scenarios import validation_scenarios
 from uas_coverage_agents.training.score import MEASURES
 from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
+from uas_coverage_env.scenario import Scenario
 
-__all__ = ["TrainingJob", "TrainingProgress", "import_zip", "train"]
+__all__ = ["TrainingJob", "TrainingProgress", "curve_scenarios", "import_zip", "train"]
 
 CHECKPOINTS = "checkpoints"
 POLICY = "policy"
@@ -93,6 +94,11 @@ def import_zip(job: TrainingJob, zip_file: Path, directory: Path) -> Policy:
     return training_run.publish(directory / POLICY)
 
 
+def curve_scenarios(job: TrainingJob) -> list[Scenario]:
+    """The missions of the learning curve."""
+    return validation_scenarios(job.config.scenarios.family, min(job.missions, _CURVE_MISSIONS))
+
+
 class _TrainingCallback(BaseCallback):
     """Looks up between two updates: the only moments at which a training can be put aside."""
 
@@ -114,9 +120,7 @@ class _TrainingCallback(BaseCallback):
         self._process_before_s = (standing.process_s if standing else 0.0) - time.process_time()
         self._wall_before_s = (standing.wall_s if standing else 0.0) - time.monotonic()
         self._saved_at_s = time.monotonic()
-        self._scenarios = validation_scenarios(
-            job.config.scenarios.family, min(job.missions, _CURVE_MISSIONS)
-        )
+        self._scenarios = curve_scenarios(job)
         self._share = 0.0
         self._look_at_the_clock()
 

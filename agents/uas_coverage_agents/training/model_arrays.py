@@ -29,7 +29,7 @@ def to_arrays(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
 
     To be called between two updates: what a rollout has collected so far is not kept.
     """
-    arrays = {name: tensor.detach().cpu().numpy().copy() for name, tensor in _tensors(model)}
+    arrays = learned(model)
     # Stable-Baselines3 draws from the global generators
     numbers = np.random.get_state(legacy=False)  # noqa: NPY002
     arrays["random/torch"] = torch.get_rng_state().numpy().copy()
@@ -38,9 +38,15 @@ def to_arrays(model: BaseAlgorithm, lanes: VecEnv) -> Arrays:
     arrays["random/numpy.gauss"] = np.array([numbers["gauss"]])
     arrays["last/observation"] = np.array(model._last_obs)
     arrays["last/episode_starts"] = np.array(model._last_episode_starts)
-    arrays["last/counters"] = np.array([model.num_timesteps, model._n_updates, model._episode_num])
     for name, array in cast(StatefulVecEnv, lanes).state_dict().items():
         arrays[f"lanes/{name}"] = np.array(array)
+    return arrays
+
+
+def learned(model: BaseAlgorithm) -> Arrays:
+    """What a model has learned so far: weights, optimisers, counters, and what it remembers."""
+    arrays = {name: tensor.detach().cpu().numpy().copy() for name, tensor in _tensors(model)}
+    arrays["last/counters"] = np.array([model.num_timesteps, model._n_updates, model._episode_num])
     if isinstance(model, OffPolicyAlgorithm):
         buffer = cast(Any, model.replay_buffer)
         filled = buffer.buffer_size if buffer.full else buffer.pos
@@ -65,20 +71,33 @@ def from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
         ) from error
 
 
-def _check(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
+def take_over(arrays: Arrays, model: BaseAlgorithm) -> None:
+    """Give a freshly made model what another one of its kind has learned.
+
+    Raises:
+        InputError: The arrays are those of another model.
+    """
+    try:
+        _check(arrays, model, None)
+        _take_over(arrays, model)
+    except (KeyError, ValueError, IndexError, RuntimeError, TypeError, OverflowError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"the weights do not fit this learner ({reason})") from error
+
+
+def _check(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv | None) -> None:
     """Refuse what no later check finds: NumPy reads its keys at whatever position is stored."""
-    seen = (lanes.num_envs, *cast(tuple[int, ...], model.observation_space.shape))
-    expected = {
-        "last/observation": (seen, "f"),
-        "last/episode_starts": ((lanes.num_envs,), "b"),
-        "last/counters": ((3,), "i"),
-        "random/numpy": ((_KEYS,), "u"),
-        "random/numpy.place": ((2,), "i"),
-    }
-    limits: dict[str, Any] = {
-        "last/counters": (0, np.inf),
-        "random/numpy.place": (0, [_KEYS, 1]),
-    }
+    expected: dict[str, tuple[tuple[int, ...], str]] = {"last/counters": ((3,), "i")}
+    limits: dict[str, Any] = {"last/counters": (0, np.inf)}
+    if lanes is not None:
+        seen = (lanes.num_envs, *cast(tuple[int, ...], model.observation_space.shape))
+        expected |= {
+            "last/observation": (seen, "f"),
+            "last/episode_starts": ((lanes.num_envs,), "b"),
+            "random/numpy": ((_KEYS,), "u"),
+            "random/numpy.place": ((2,), "i"),
+        }
+        limits["random/numpy.place"] = (0, [_KEYS, 1])
     if isinstance(model, OffPolicyAlgorithm):
         buffer = cast(Any, model.replay_buffer)
         expected["memory/place"] = ((2,), "i")
@@ -92,15 +111,7 @@ def _check(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
 
 def _from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     _check(arrays, model, lanes)
-    with torch.no_grad():
-        _make_optimiser_state(arrays, model)
-        for name, tensor in _tensors(model):
-            array = arrays[name]
-            if array.shape != tuple(tensor.shape):
-                raise ValueError(f"{name} has shape {array.shape}, not {tuple(tensor.shape)}")
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} holds a number that is not finite")
-            tensor.copy_(torch.from_numpy(array.copy()))
+    _take_over(arrays, model)
     torch.set_rng_state(torch.from_numpy(arrays["random/torch"].copy()))
     pos, has_gauss = arrays["random/numpy.place"].tolist()
     np.random.set_state(  # noqa: NPY002
@@ -113,15 +124,28 @@ def _from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     )
     model._last_obs = arrays["last/observation"].copy()
     model._last_episode_starts = arrays["last/episode_starts"].copy()
-    steps, updates, episodes = arrays["last/counters"].tolist()
-    model.num_timesteps, model._n_updates, model._episode_num = steps, updates, episodes
     state = {name[6:]: array for name, array in arrays.items() if name.startswith("lanes/")}
     cast(StatefulVecEnv, lanes).load_state_dict(state)
+    if isinstance(model, OffPolicyAlgorithm):
+        model._last_original_obs = model._last_obs
+
+
+def _take_over(arrays: Arrays, model: BaseAlgorithm) -> None:
+    with torch.no_grad():
+        _make_optimiser_state(arrays, model)
+        for name, tensor in _tensors(model):
+            array = arrays[name]
+            if array.shape != tuple(tensor.shape):
+                raise ValueError(f"{name} has shape {array.shape}, not {tuple(tensor.shape)}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name} holds a number that is not finite")
+            tensor.copy_(torch.from_numpy(array.copy()))
+    steps, updates, episodes = arrays["last/counters"].tolist()
+    model.num_timesteps, model._n_updates, model._episode_num = steps, updates, episodes
     if isinstance(model, OffPolicyAlgorithm):
         buffer = cast(Any, model.replay_buffer)
         pos, full = arrays["memory/place"].tolist()
         buffer.pos, buffer.full = pos, bool(full)
-        model._last_original_obs = model._last_obs
         for name in _REMEMBERED:
             remembered = arrays[f"memory/{name}"]
             filled = getattr(buffer, name)[: buffer.buffer_size if full else pos]

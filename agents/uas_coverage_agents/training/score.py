@@ -13,15 +13,20 @@ from uas_coverage_env.flight import (
     Flight,
     coverage,
     energy_Wh,
+    episode_return,
     filtered_share,
     home,
     rollout,
 )
 from uas_coverage_env.scenario import Scenario
 
-MEASURES = ("coverage", "all_home", "violations", "energy_Wh", "flight_steps", "filtered_share")
+MEASURES = (
+    *("coverage", "all_home", "violations", "energy_Wh", "flight_steps", "filtered_share"),
+    "episode_return",
+)
 """Share covered, whether all are home, violations, energy of the swarm, steps until all are home,
-share of the commands that the safety filter replaced; means over missions."""
+share of the commands that the safety filter replaced, return by the default reward of the
+environments (not that of the training); means over missions."""
 
 _RESAMPLES = 2000
 
@@ -59,6 +64,7 @@ def measured(flight: Flight) -> tuple[float, ...]:
         float(energy_Wh(flight).sum()),
         float(flight.steps),
         filtered_share(flight),
+        episode_return(flight) or 0.0,
     )
 
 

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from uas_coverage_env.env import ActionKind, CoverageBatch
-from uas_coverage_env.env.interface import observation_space, with_mask
+from uas_coverage_env.env.interface import observation_space, shown
 from uas_coverage_env.env.memory import STATUS
 from uas_coverage_env.env.state_dict import check_like, check_values
 from uas_coverage_env.env.tiles import Tiles
@@ -56,7 +56,8 @@ class CoverageVecEnv(VecEnv):
         render_mode: None; "rgb_array": `render` returns one picture of the first 16 missions side
             by side, as `VecVideoRecorder` asks for; "human": a window with it (extra `human`).
         **settings: See `uas_coverage_env.env.CoverageBatch`: dynamics, return_mode, safety_filter,
-            reward_weights, max_cycles, mask_in_observation (then "MultiInputPolicy").
+            reward_weights, max_cycles, observation, mask_in_observation and images_apart (then
+            "MultiInputPolicy"; "CnnPolicy" for a picture alone).
 
     Attributes:
         autoreset_mode: A mission that ends begins anew in the same step.
@@ -279,15 +280,15 @@ class CoverageVecEnv(VecEnv):
         batch = self.batch
         last = batch.missions.final.observation if over else batch.observation
         seen = last[lane, i].copy()
-        if not batch.settings.mask_in_observation:
-            return seen
-        kept = batch.missions.final.candidates if over else batch.learners.candidates
-        return with_mask(seen, batch.actions.kind.masks(kept[lane, i]))
+        if batch.settings.mask_in_observation:
+            kept = batch.missions.final.candidates if over else batch.learners.candidates
+            return shown(batch.settings, seen, batch.actions.kind.masks(kept[lane, i]))
+        return shown(batch.settings, seen)
 
     def _flat(self, observation: NDArray[np.float32]) -> Any:
         seen = observation.reshape(self.num_envs, -1)
-        masks = self.batch.settings.mask_in_observation
-        return with_mask(seen, self.action_masks()) if masks else seen
+        settings = self.batch.settings
+        return shown(settings, seen, self.action_masks() if settings.mask_in_observation else None)
 
     def _episode(self, lane: int, i: int) -> dict[str, float]:
         return {

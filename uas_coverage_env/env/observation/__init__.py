@@ -1,6 +1,8 @@
 """What a UAS observes: blocks, each one file that holds its table and the kernel that writes it."""
 
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
+from uas_coverage_env.env.observation.full_state import full_state, full_state_of
+from uas_coverage_env.env.observation.grid import grid
 from uas_coverage_env.env.observation.layout import (
     OBSERVATION,
     OBSERVATION_SIZE,
@@ -8,6 +10,8 @@ from uas_coverage_env.env.observation.layout import (
     observation_bounds,
     observation_columns,
 )
+from uas_coverage_env.env.observation.local import local
+from uas_coverage_env.env.observation.named import OBSERVATIONS, observation_named
 from uas_coverage_env.env.observation.scales import K_MOVING, K_UAS, K_WAYPOINTS, SCALES
 
 __all__ = [
@@ -15,13 +19,19 @@ __all__ = [
     "K_UAS",
     "K_WAYPOINTS",
     "OBSERVATION",
+    "OBSERVATIONS",
     "OBSERVATION_SIZE",
     "SCALES",
     "Feature",
     "Group",
     "ObservationBlock",
     "flag",
+    "full_state",
+    "full_state_of",
+    "grid",
     "layout_table",
+    "local",
     "observation_bounds",
     "observation_columns",
+    "observation_named",
 ]

@@ -1,5 +1,6 @@
 """What an observation is made of: blocks, each a table of numbers and a kernel that writes them."""
 
+import math
 from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -79,16 +80,24 @@ class ObservationBlock(Group):
     Attributes:
         write: The kernel.
         parameters: Finite numbers that it is handed.
+        shape: (channels, rows, columns) where the numbers, from 0 to 1, are a picture; see
+            `images_apart` of the environments. Empty where they are none.
 
     Raises:
-        ValueError: A parameter is not finite.
+        ValueError: A parameter is not finite, or the shape has another size than the group.
     """
 
     write: Any
     parameters: tuple[float, ...] = ()
+    shape: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         check_parameters(f"observation block {self.name}", self.parameters)
+        if self.shape and (len(self.shape) != 3 or math.prod(self.shape) != self.size):
+            raise ValueError(
+                f"observation block {self.name}: shape is {self.shape}; give (channels, rows, "
+                f"columns) of {self.size} numbers"
+            )
 
 
 def flag(name: str, meaning: str) -> Feature:

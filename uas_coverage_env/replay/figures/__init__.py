@@ -17,7 +17,15 @@ from uas_coverage_env.replay.figures.decision_time import decision_time_figure
 from uas_coverage_env.replay.figures.map import map_figure
 from uas_coverage_env.replay.figures.modes import modes_figure
 from uas_coverage_env.replay.figures.style import printed
-from uas_coverage_env.replay.figures.training import CURVE, learning_curve, training_figure
+from uas_coverage_env.replay.figures.training import (
+    BASELINES,
+    CURVE,
+    Curve,
+    baseline_curves,
+    learning_curve,
+    training_figure,
+    with_baselines,
+)
 
 KINDS: dict[str, Callable[[Flight], Figure]] = {
     "map": map_figure,
@@ -27,8 +35,11 @@ KINDS: dict[str, Callable[[Flight], Figure]] = {
 }
 
 __all__ = [
+    "BASELINES",
     "CURVE",
     "KINDS",
+    "Curve",
+    "baseline_curves",
     "battery_figure",
     "decision_time_figure",
     "learning_curve",
@@ -38,6 +49,7 @@ __all__ = [
     "published_battery",
     "save_figure",
     "training_figure",
+    "with_baselines",
 ]
 
 

@@ -16,6 +16,10 @@ from uas_coverage_env.replay.figures.style import WIDTH_IN, line_style, printed,
 
 CURVE = "learning_curve.csv"
 
+BASELINES = "baselines"
+"""In the directory of a training: a folder for each player that does not learn, with a curve of one
+row, on the same missions."""
+
 Curve = Mapping[str, Sequence[float] | NDArray[np.float64]]
 """Column of `learning_curve.csv` -> its values, a row for each time that the policy was tried."""
 
@@ -100,6 +104,39 @@ def learning_curve(directory: Path) -> dict[str, NDArray[np.float64]]:
         for column in wanted:
             curve[column][k] = _number(row[column], f"{path}, line {k + 2}, {column}")
     return curve
+
+
+def baseline_curves(directory: Path) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """The players that do not learn beside a training: name -> curve of one row.
+
+    Raises:
+        InputError: A curve cannot be read.
+    """
+    tables = sorted((directory / BASELINES).glob(f"*/{CURVE}"))
+    return {table.parent.name: learning_curve(table.parent) for table in tables}
+
+
+def with_baselines(directories: Mapping[str, Path]) -> dict[str, Curve]:
+    """The curves of trainings and, once each, those of the baselines that lie beside them.
+
+    Args:
+        directories: What a training is called in the legend, "" where it is alone -> its directory.
+
+    Raises:
+        InputError: A curve cannot be read.
+    """
+    beside: dict[str, Curve] = {}
+    for name, directory in directories.items():
+        for player, curve in baseline_curves(directory).items():
+            known = beside.get(player)
+            if known is None:
+                beside[player] = curve
+            elif any(known[column][0] != curve[column][0] for column in curve if column in known):
+                beside[f"{player}, {name}"] = curve  # other missions
+    curves: dict[str, Curve] = {}
+    for name, directory in directories.items():
+        curves[name or (directory.resolve().name if beside else "")] = learning_curve(directory)
+    return {**curves, **{name: each for name, each in beside.items() if name not in curves}}
 
 
 def _number(text: str | None, place: str) -> float:

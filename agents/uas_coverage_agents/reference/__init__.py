@@ -1,0 +1,1 @@
+"""Reference learners for the levels: known libraries, with settings as data (`learners/`)."""

@@ -1,0 +1,65 @@
+"""Players that do not learn, beside a learning curve: flown once, on the same missions."""
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from uas_coverage_agents.training import curve
+from uas_coverage_agents.training.checkpoint import CurvePoint
+from uas_coverage_agents.training.score import MEASURES, measured
+from uas_coverage_env.files.errors import PlannerError
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.replay.figures import BASELINES
+from uas_coverage_env.scenario import Scenario
+
+NOBODY = "none"
+
+
+def planners_of(names: str) -> list[str]:
+    """The planners of `--baselines`.
+
+    Args:
+        names: With commas; `none` for nobody.
+
+    Raises:
+        InputError: There is no such planner.
+    """
+    if names == NOBODY:
+        return []
+    planners = [name.strip() for name in names.split(",")]
+    for name in planners:
+        load_planner(name)
+    return planners
+
+
+def fly_baselines(
+    planners: Sequence[str],
+    scenarios: Sequence[Scenario],
+    directory: Path,
+    say: Callable[[str], object],
+) -> None:
+    """Fly what was not flown before: each leaves a learning curve of one row.
+
+    Args:
+        planners: Their names; they fly with their default options and assistants.
+        scenarios: Those of the learning curve.
+        directory: Of the training.
+        say: Told what is flown, and who cannot fly these missions.
+    """
+    for name in planners:
+        folder = directory / BASELINES / re.sub(r"[/:\\]", "-", name)
+        if (folder / curve.TABLE).exists():
+            continue
+        say(f"flying the {len(scenarios)} missions of the learning curve with {name}")
+        try:
+            flown = [measured(rollout(scenario, name)) for scenario in scenarios]
+        except (InputError, PlannerError) as error:
+            say(f"no baseline {name}: {error}")
+            continue
+        means = dict(zip(MEASURES, np.mean(flown, axis=0).tolist(), strict=True))
+        fields = {key: value for key, value in means.items() if key in CurvePoint.model_fields}
+        folder.mkdir(parents=True, exist_ok=True)
+        curve.write_table([CurvePoint(steps=0, process_s=0.0, wall_s=0.0, **fields)], folder)

@@ -1,0 +1,158 @@
+"""Reference learners on the levels: trains and scores them, writes the table of docs/levels.md.
+
+    python benchmarks/reference_learners.py --out reference             # the budgets of their files
+    python benchmarks/reference_learners.py --out reference --share 0.1 # a tenth of the steps
+    python benchmarks/reference_learners.py --out reference --publish   # and the table
+
+Learners are the files of `agents/uas_coverage_agents/reference/learners`, or a .toml of your own.
+Whatever is finished is not repeated: a kill costs the round of a training that is under way, and
+the mission that is flown. Needs the extra `learn`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from uas_coverage_agents.reference.settings import Reference, reference_named, reference_names
+
+from uas_coverage_env.files.plain_files import write_atomically
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.tasks import LEVELS, Score, score, scored
+from uas_coverage_env.tasks.scoring import MissionScore
+
+PAGE = Path(__file__).parents[1] / "docs" / "levels.md"
+FIRST, LAST = "<!-- reference learners -->\n", "<!-- end of reference learners -->"
+HEAD = (
+    "learner", "steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
+    "lost or not home", "energy, %", "return", "missions",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Result:
+    """A learner on a level: all of its trainings."""
+
+    name: str
+    reference: Reference
+    steps: int
+    process_s: float
+    trainings: int
+    score: Score
+
+
+def main() -> int:
+    """Train, score, publish; the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--levels", default="easy", help=f"of {', '.join(LEVELS)}")
+    parser.add_argument("--learners", default=",".join(reference_names()))
+    parser.add_argument("--seeds", type=int, default=1, help="trainings of each learner")
+    parser.add_argument("--share", type=float, default=1.0, help="of the steps of their files")
+    parser.add_argument("--missions", type=int, default=20, help="test missions of each training")
+    parser.add_argument("--out", type=Path, default=Path("reference"))
+    parser.add_argument("--publish", action="store_true", help="write the table of docs/levels.md")
+    given = parser.parse_args()
+    if given.seeds < 1 or not 0.0 < given.share <= 100.0 or not 1 <= given.missions <= 50:
+        parser.error("--seeds: 1 or more; --share: above 0, at most 100; --missions: 1 to 50")
+    levels, parts = given.levels.split(","), []
+    try:
+        learners = {Path(n).stem: reference_named(n) for n in given.learners.split(",")}
+        for level in levels:
+            if level not in LEVELS:
+                raise InputError(f"--levels {level}: is none of {', '.join(LEVELS)}")
+            results = [
+                result_of(name, shortened(each, given.share), level, given)
+                for name, each in learners.items()
+            ]
+            parts.append(f"`{LEVELS[level].id}`\n\n{table(results)}")
+    except InputError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+    text = f"\n`{command(given)}`\n\n" + "\n\n".join(parts) + "\n\n"
+    sys.stdout.write(text)
+    if given.publish:
+        before, first, rest = PAGE.read_text("utf-8").partition(FIRST)
+        _, last, after = rest.partition(LAST)
+        if not first or not last:
+            raise SystemExit(f"{PAGE}: has no {FIRST.strip()} ... {LAST}")
+        PAGE.write_text(before + first + text + last + after, encoding="utf-8")
+    return 0
+
+
+def shortened(reference: Reference, share: float) -> Reference:
+    """The same with a part of the budget."""
+    steps = max(1, round(share * reference.steps))
+    return reference.model_copy(update={"steps": steps})
+
+
+def result_of(name: str, reference: Reference, level: str, given: argparse.Namespace) -> Result:
+    """Train and score what was not before."""
+    from uas_coverage_agents.reference.training import train_reference
+
+    steps, process_s, missions = 0, 0.0, []
+    for seed in range(given.seeds):
+        directory = given.out / level / f"{name}-{seed}"
+
+        def told(done: int, steps: int, seconds: float, at: Path = directory) -> None:
+            sys.stderr.write(f"{at}: round {done}, {steps} steps, {seconds:.0f} s\n")
+
+        trained = train_reference(reference, level, seed, directory, told)
+        steps, process_s = steps + trained.steps, process_s + trained.process_s
+        kept = directory / "missions.json"
+        rows = json.loads(kept.read_text("utf-8")) if kept.exists() else []
+        known = [MissionScore(**row) for row in rows]
+
+        def keep(mission: MissionScore, known: list = known, kept: Path = kept) -> None:
+            known.append(mission)
+            write_atomically(kept, json.dumps([asdict(each) for each in known]).encode())
+
+        flown = score(
+            trained.player, level, missions=given.missions, known=tuple(known), on_mission=keep
+        )
+        missions += flown.missions
+    mean_steps = round(steps / given.seeds)
+    mean_s = process_s / given.seeds
+    return Result(name, reference, mean_steps, mean_s, given.seeds, scored(level, missions))
+
+
+def table(results: list[Result]) -> str:
+    """A Markdown table; steps and processor time are those of one training."""
+    lines = [HEAD, ("---", *["---:"] * (len(HEAD) - 1))]
+    for one in results:
+        found, flown = one.score.score, one.score
+        value = "–" if found.value is None else f"{found.value:.2f}"
+        if found.low is not None:
+            value += f" [{found.low:.2f}, {found.high:.2f}]"
+        n_uas = sum(mission.n_uas for mission in flown.missions)
+        home = sum(mission.home for mission in flown.missions)
+        lines.append(
+            (
+                f"`{one.name}`: {one.reference.summary}",
+                f"{one.steps:,}".replace(",", " "),
+                f"{one.process_s:.0f}",
+                str(one.trainings),
+                value,
+                f"{100.0 * flown.mean('coverage'):.1f}",
+                f"{n_uas - home} of {n_uas}",
+                f"{100.0 * flown.mean('energy_share'):.1f}",
+                f"{flown.mean('episode_return'):.1f}",
+                str(len(flown.missions)),
+            )
+        )
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def command(given: argparse.Namespace) -> str:
+    """The line that makes the table again."""
+    parts = ["python benchmarks/reference_learners.py"]
+    for name, usual in (("levels", "easy"), ("seeds", 1), ("share", 1.0), ("missions", 20)):
+        if getattr(given, name) != usual:
+            parts.append(f"--{name} {getattr(given, name)}")
+    return " ".join([*parts, "--out reference --publish"])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,27 @@
+"""Observations that have a name: `observation="local"`."""
+
+from collections.abc import Mapping
+
+from uas_coverage_env.env.observation.block import ObservationBlock
+from uas_coverage_env.env.observation.grid import grid
+from uas_coverage_env.env.observation.layout import OBSERVATION
+from uas_coverage_env.env.observation.local import local
+
+OBSERVATIONS: Mapping[str, tuple[ObservationBlock, ...]] = {
+    "default": OBSERVATION,
+    "local": local(),
+    "grid": (*OBSERVATION, grid()),
+}
+"""Name -> blocks."""
+
+
+def observation_named(name: str) -> tuple[ObservationBlock, ...]:
+    """The blocks of a named observation.
+
+    Raises:
+        ValueError: There is none of this name.
+    """
+    if name not in OBSERVATIONS:
+        known = ", ".join(OBSERVATIONS)
+        raise ValueError(f"observation is {name!r}; give one of {known}, or a tuple of blocks")
+    return OBSERVATIONS[name]
