@@ -95,8 +95,8 @@ def rollout(
     if max_steps is not None and max_steps < 1:
         raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
     assistants: Assistants = getattr(planner, "assistants", Assistants())
-    # no plan is verified against what pushes back
-    uncertain = _is_uncertain(scenario, disturbances)
+    # no plan is verified against what pushes back, nor one of legs against what moves
+    uncertain = _is_uncertain(scenario, disturbances) or scenario.execution is not None
     if return_mode is None:
         return_mode = assistants.return_mode or uncertain
     if safety_filter is None:

@@ -31,6 +31,7 @@ from uas_coverage_env.operations.town import Town, read_town
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.endurance import back_and_forth
 
+FLOWN_BY = ("autopilot",)
 UAS_SAFE_DISTANCE_M = 5.0
 _SPARE_M = 1.0
 """Between a waypoint and the nearest place that a UAS may take."""
@@ -59,6 +60,7 @@ class ImportOptions:
         ceiling_m: Top of the fence above the ground; None: 30 m above the waypoints [m].
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
         town: GeoJSON of buildings.
+        flown_by: Who flies it in the end, `autopilot`; None: nobody in particular.
     """
 
     fleet: str = "s500_v2:2"
@@ -71,6 +73,7 @@ class ImportOptions:
     ceiling_m: float | None = None
     homes: tuple[tuple[float, float], ...] = ()
     town: Path | None = None
+    flown_by: str | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         "waypoints": [table for tables in waypoints.values() for table in tables],
         "decorations": _decorations(seen, several=len(looks) > 1),
         "place": site.frame.place.model_dump(),
+        **({"execution": {"flown_by": options.flown_by}} if options.flown_by else {}),
     }
     scenario = _finite(parse(tables, Scenario, name))
     notes = [
@@ -187,6 +191,8 @@ def _look_notes(
 
 
 def _check(options: ImportOptions) -> None:
+    if options.flown_by not in (None, *FLOWN_BY):
+        raise InputError(f"--flown-by {options.flown_by[:40]!r}: take {', '.join(FLOWN_BY)}")
     _within("--height", options.height_m, 1.0, 1_000.0)
     _within("--radius", options.radius_m, 0.5, 1_000.0)
     _within("--overlap", options.overlap, 0.0, 0.9)

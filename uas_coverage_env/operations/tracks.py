@@ -43,7 +43,8 @@ class Leg:
     Attributes:
         end_m: (3,) where it ends [m].
         sample: Of the flight, at its end.
-        speed_mps: Mean of the flight on it [m/s].
+        speed_mps: Mean of the flight on it; where it was planned for an autopilot, which flies it
+            from rest to rest, the largest [m/s].
         room: On the leg, and on what cuts the corner at its end.
         stop: Whether the autopilot stops at its end.
     """
@@ -209,6 +210,7 @@ class _Builder:
     def __init__(self, flight: Flight, uas: int, path: FloatArray, tolerances: Tolerances) -> None:
         self.path, self.tolerances, self.dt_s = path, tolerances, flight.scenario.dt_s
         self.around = Surroundings(flight.scenario, uas)
+        self._rests_between = flight.scenario.execution is not None
         self.steps = [self.around.room(a, b) for a, b in pairwise(path)]
         first_at = covered_at(flight)
         self.waypoints: list[int] = []
@@ -255,11 +257,11 @@ class _Builder:
         return enough and room.contact_m > 0.0
 
     def speed_mps(self, i: int, j: int) -> float:
-        """Mean speed of the flight between two samples."""
+        """Mean speed of the flight between two samples, or the largest."""
         if j <= i:
             return 1.0
-        way_m = np.linalg.norm(np.diff(self.path[i : j + 1], axis=0), axis=1).sum()
-        return float(way_m) / ((j - i) * self.dt_s)
+        steps_m = np.linalg.norm(np.diff(self.path[i : j + 1], axis=0), axis=1)
+        return float(steps_m.max() if self._rests_between else steps_m.mean()) / self.dt_s
 
     def with_stops(self, corners: FloatArray, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
         """The legs with stops at the corners that must not be cut."""
