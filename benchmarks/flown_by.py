@@ -1,11 +1,11 @@
-"""Times that flights promise, and the times of the files made of them, with and without `--flown-by`.
+"""Times that flights promise and times of the files made of them, with and without `--flown-by`.
 
     python benchmarks/flown_by.py
     python benchmarks/flown_by.py --missions 3 --planners tour
 
-`karhula` with its buildings at several heights, in turns with areas of four corners drawn at random,
-is imported for one to three UAS, flown and exported; a file's time is that of the leg model.
-Deviations are those of single UAS that fly, (file - flight) / flight, as median and range.
+`karhula` with its buildings at several heights, in turns with areas of four corners drawn at
+random, is imported for one to three UAS, flown and exported; a file's time is that of the leg
+model. Deviations are those of single UAS that fly, (file - flight) / flight, as median and range.
 
 Exits 0 where all files planned with `--flown-by autopilot` are within 15 %, 1 otherwise. Needs the
 extra `ops`.

@@ -34,7 +34,7 @@ _FROM_HERE = 64
 """Likewise from where a UAS is."""
 _STOP_DEG = np.array([0.0, 10.0, 25.0, 90.0, 180.0])
 _STOP_SHARE = np.array([0.0, 0.0, 0.6, 1.0, 1.1])
-"""What an autopilot loses in a corner, in corners of 90 degrees; nearly straight on is no corner."""
+"""What an autopilot loses in a corner, in corners of 90 degrees; a few degrees are no corner."""
 _COSINES = np.linspace(-1.0, 1.0, 257)
 _OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 

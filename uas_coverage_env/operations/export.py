@@ -1,6 +1,7 @@
 """Files for autopilots and maps from a flight, checked before any of them is written."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +16,7 @@ from uas_coverage_env.operations.exported import Exported, exported, followed, w
 from uas_coverage_env.operations.formats import FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.layers import Apart, in_layers
 from uas_coverage_env.operations.report import report
 from uas_coverage_env.operations.report_page import report_page
 from uas_coverage_env.operations.tracks import Tolerances, Track, make_track
@@ -174,19 +176,33 @@ def _kept_apart(
     pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
     if not _short(pairs, settled.min_slack_s):
         return exports, pairs
-    fleet = [
-        (track.uas, partial(followed, track, scenario.vehicles[track.uas], tolerances))
-        for track in tracks
-    ]
-    waits = separate(scenario, fleet, settled.min_slack_s)
-    if waits is not None:
+    settle = partial(_apart, flight, settled)
+    apart = in_layers(flight, settle(tracks), tolerances, settle)
+    if apart.waits is not None:
         exports = [
             exported(flight, track, frame, tolerances, one)
-            for track, one in zip(tracks, waits, strict=True)
+            for track, one in zip(apart.tracks, apart.waits, strict=True)
         ]
         pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
     _check_slack(pairs, frame, settled.min_slack_s)
     return exports, pairs
+
+
+def _apart(flight: Flight, settled: _Settled, tracks: Sequence[Track]) -> Apart:
+    """Tracks with waits."""
+    scenario = flight.scenario
+    fleet = [
+        (
+            track.uas,
+            partial(followed, track, scenario.vehicles[track.uas], settled.tolerances),
+        )
+        for track in tracks
+    ]
+    waits = separate(scenario, fleet, settled.min_slack_s)
+    home_s = math.inf
+    if waits is not None:
+        home_s = max(fly(one).duration_s for (_, fly), one in zip(fleet, waits, strict=True))
+    return Apart(list(tracks), waits, home_s)
 
 
 def _short(pairs: Sequence[Pair], min_slack_s: float) -> list[Pair]:
@@ -206,7 +222,8 @@ def _check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) -
         f"{worst.names[0]} and {worst.names[1]} come closer than {worst.kept_m:.1f} m at "
         f"{latitude:.6f}, {longitude:.6f}, {height:.0f} m high, if one is {worst.slack_s:.1f} s "
         f"late, less than --min-slack {min_slack_s:g}{more}, and no wait on the ground or at a "
-        f"corner changes that; plan them further apart, or accept it with a smaller --min-slack"
+        f"corner, and no height layer, changes that; plan them further apart, or accept it with a "
+        f"smaller --min-slack"
     )
 
 

@@ -222,6 +222,8 @@ def _charges(
 def waiting(one: Exported) -> list[str]:
     """What a UAS does for others to be out of its way, as phrases that follow its name."""
     lines, waits = [], one.waits
+    if one.track.layer:
+        lines.append(one.track.layer)
     if waits.start_s:
         lines.append(f"takes off {waits.start_s} s after the start of its mission")
     if waits.leg is not None:

@@ -70,6 +70,7 @@ class Track:
         waypoints: Which this UAS covers.
         passed_m: (len(waypoints),) how close the legs, corners cut, come to each centre [m].
         flown_m: (T, 3) the samples that the legs stand for [m].
+        layer: How heights differ from those of the flight, in words; empty: they do not.
     """
 
     uas: int
@@ -81,6 +82,7 @@ class Track:
     waypoints: tuple[int, ...]
     passed_m: FloatArray
     flown_m: FloatArray
+    layer: str = ""
 
     @property
     def corners_m(self) -> FloatArray:
@@ -164,6 +166,43 @@ def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None
             f"make it smaller"
         )
     return track
+
+
+def relaid(
+    flight: Flight,
+    track: Track,
+    corners: FloatArray,
+    leg_of: list[int],
+    tolerances: Tolerances,
+    layer: str,
+) -> Track | None:
+    """A track with other corners; None where it is not as clear, or misses a waypoint.
+
+    Args:
+        flight: The flight.
+        track: The track as it is.
+        corners: (C, 3) the new ones [m].
+        leg_of: (C - 1,) the leg of the track that each new one stands for.
+        tolerances: How far legs may be from the flight.
+        layer: What is different, in words.
+    """
+    builder = _Builder(flight, track.uas, track.flown_m, tolerances)
+    legs = tuple(
+        replace(track.legs[n], end_m=end_m, room=builder.around.room(start_m, end_m), stop=False)
+        for (start_m, end_m), n in zip(pairwise(corners), leg_of, strict=True)
+    )
+    legs = builder.with_stops(corners, legs)
+    new = replace(
+        track,
+        legs=legs,
+        passed_m=builder.passed_m(corners, [leg.stop for leg in legs]),
+        layer=layer,
+    )
+    radii = np.array([flight.scenario.waypoints[w].radius_m for w in track.waypoints])
+    passes = new.passed_m <= np.maximum(radii - tolerances.path_m, track.passed_m) + 1e-9
+    spent_m = min(SPENT_M, tolerances.path_m)
+    clear = new.room.contact_m > 0.0 and new.room.spare_m >= min(-spent_m, track.room.spare_m)
+    return new if clear and passes.all() else None
 
 
 def distances_m(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ _LIFT_M = 3.5
 """Height at which a take-off ends and a landing begins: above that of exports."""
 
 _ABOVE_FLOOR_M = 1.0
+_ABOVE_OTHERS_M = 1.5
+"""Above what UAS keep from each other: legs begin so high that none waits below another's."""
+
 _HEADROOM_M = 0.5
 _TRACKING_M = 1.0
 """How far a flight may be from its legs, taken off the radius of waypoints that legs pass."""
@@ -78,6 +82,10 @@ class CoursePlanner:
         self._waypoints_m = self.terrain.legs.waypoints_m
         floor_m = max(float(self.terrain.arena.rules[0].floor_m), brief.min_height_m)
         self._lift_m = max(_LIFT_M, floor_m + _ABOVE_FLOOR_M)
+        if len(brief.uas) > 1:
+            apart_m = 2.0 * max(uas.radius_m for uas in brief.uas) + brief.uas_safe_distance_m
+            highest_m = max(-uas.start_m[2] for uas in brief.uas)
+            self._lift_m = max(self._lift_m, highest_m + apart_m + _ABOVE_OTHERS_M)
         spent_m = self._execution.tolerance_m + _TRACKING_M
         self._passed_m = np.array([w.radius_m - spent_m for w in brief.waypoints])
         anything = (-np.inf, np.inf)
@@ -184,7 +192,7 @@ class CoursePlanner:
     def _over(self, row: int, way_m: FloatArray) -> FloatArray:
         """A way, raised where it leads over roofs."""
         points = [way_m[0]]
-        for a, b in zip(way_m, way_m[1:], strict=False):
+        for a, b in pairwise(way_m):
             if not self._is_clear(row, a, b):
                 top_m = min(self._top_m(a, b), a[2], b[2])
                 up = [np.array([*place[:2], top_m]) for place in (a, b)]

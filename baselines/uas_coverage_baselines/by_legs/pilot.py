@@ -1,4 +1,4 @@
-"""Flying legs in time: each UAS is where an autopilot would be, and time stops for one that is late."""
+"""Flying legs in time: where an autopilot would be; time stops for a UAS that is late."""
 
 from __future__ import annotations
 
