@@ -98,9 +98,7 @@ def test_planners_fly_to_the_time_of_the_legs_and_accomplish_the_mission(planner
 def test_a_uas_that_is_late_finds_time_stopped_where_it_is():
     scenario = by_autopilot(meadow(waypoints=ROW))
     brief = MissionBrief.of(scenario)
-    pilot = LegPilot(brief)
-    pilot.begin([[0, 1, 2]])
-    flight = rollout(scenario, Held(pilot, until_s=40.0))
+    flight = rollout(scenario, Held(pilot_of(brief), until_s=40.0))
     assert coverage(flight) == 1.0
     assert flight.last_sample[0] > rollout(scenario, Held(pilot_of(brief), 0.0)).last_sample[0] + 15
 
@@ -126,3 +124,19 @@ class Held:
         if 20.0 < swarm.time_s < self._until_s:
             return {name: Velocity(0.0, 0.0, -swarm.x[0, 2]) for name in commands}
         return commands
+
+
+def test_a_pilot_that_takes_over_in_the_air_flies_on_from_where_the_uas_is():
+    scenario = by_autopilot(meadow(waypoints=ROW))
+    brief = MissionBrief.of(scenario)
+
+    class Replaced(Held):
+        def act(self, swarm):
+            if swarm.step == 25:
+                self._pilot = pilot_of(brief)
+            return super().act(swarm)
+
+    flight = rollout(scenario, Replaced(pilot_of(brief), 0.0))
+    whole = rollout(scenario, Held(pilot_of(brief), 0.0))
+    assert coverage(flight) == 1.0
+    assert flight.last_sample[0] < whole.last_sample[0] + 15

@@ -76,7 +76,7 @@ class Autopilot:
         straight = np.array([(0.0, 0.0, 0.0), (2.0 * leg_m, 0.0, 0.0)])
         turning: list[FloatArray] = []
         _fly(_legs(corners, [self.speed_mps] * 2, self), self, turning)
-        return DT_S * len(turning) - _Leg(*straight, self.speed_mps, self).total_s
+        return DT_S * len(turning) - _Leg(straight[0], straight[1], self.speed_mps, self).total_s
 
 
 class _Leg:

@@ -47,7 +47,7 @@ class LegMission:
         ]
         self._order = min(orders, key=lambda order: order.cost_s)
         self._worked = works
-        self._pilot.begin(self._order.routes)
+        self._pilot.begin([route.tolist() for route in self._order.routes])
 
     def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
         """A command for each active UAS.
@@ -68,7 +68,7 @@ class LegMission:
             )
         self._worked = works
         routes = [
-            route[swarm.uncovered[route]] if works[u] else route[:0]
+            route[swarm.uncovered[route]].tolist() if works[u] else []
             for u, route in enumerate(self._order.routes)
         ]
         return self._pilot.commands(swarm, routes)

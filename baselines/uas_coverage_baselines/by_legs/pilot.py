@@ -43,6 +43,7 @@ class LegPilot:
         n_uas = len(brief.uas)
         self._courses: list[Course | None] = [None] * n_uas
         self._clock_s, self._held_s = np.zeros(n_uas), np.zeros(n_uas)
+        self._begun = False
         self._guided: dict[int, tuple[int | None, float]] = {}
         self._missed = np.zeros((n_uas, len(brief.waypoints)), np.int64)
 
@@ -71,6 +72,9 @@ class LegPilot:
             swarm: What is seen.
             routes: Waypoints of each UAS, what is covered left out.
         """
+        if not self._begun and swarm.step > 0:  # planned anew in mid-mission: not from the starts
+            self._courses = [None] * len(self._courses)
+        self._begun = True
         result: dict[str, Command] = {}
         for name in swarm.active:
             u = swarm.names.index(name)
