@@ -80,8 +80,8 @@ def make_export(flight: Flight, options: ExportOptions) -> Export:
     """
     settled = _settled(flight, options)
     _check(options, settled)
-    frame = LocalFrame(_place(flight, options))
-    _check_flight(flight)
+    frame = LocalFrame(place_of_flight(flight, options.place))
+    check_flight(flight)
     tracks, grounded = [], []
     for i, uas in enumerate(flight.scenario.uas):
         track = make_track(flight, i, settled.tolerances)
@@ -141,22 +141,31 @@ def _check(options: ExportOptions, settled: _Settled) -> None:
         raise InputError(f"--min-slack {settled.min_slack_s:g}: should be between 0 and 3600")
 
 
-def _place(flight: Flight, options: ExportOptions) -> Place:
-    place = flight.scenario.place
-    if place is None and options.place is None:
-        raise InputError(
-            f"scenario {flight.scenario.name!r} has no [place] on the Earth; give --place LAT,LON"
-        )
-    if place is not None and options.place is not None:
-        raise InputError(
-            f"--place: scenario {flight.scenario.name!r} has a [place] already; leave it out"
-        )
-    place = place or options.place
-    assert place is not None
-    return place
+def place_of_flight(flight: Flight, given: Place | None) -> Place:
+    """Where on the Earth the origin of a flight is.
+
+    Args:
+        flight: The flight.
+        given: For a scenario that does not say.
+
+    Raises:
+        InputError: Nobody says where, or both do.
+    """
+    place, name = flight.scenario.place, flight.scenario.name
+    if place is not None and given is not None:
+        raise InputError(f"--place: scenario {name!r} has a [place] already; leave it out")
+    found = place or given
+    if found is None:
+        raise InputError(f"scenario {name!r} has no [place] on the Earth; give --place LAT,LON")
+    return found
 
 
-def _check_flight(flight: Flight) -> None:
+def check_flight(flight: Flight) -> None:
+    """Refuse a flight that is not home, or not without harm.
+
+    Raises:
+        InputError: It is.
+    """
     for name, mode in zip(flight.names, flight.mode[-1], strict=True):
         if mode != LANDED:
             state = MODES[mode]
