@@ -21,6 +21,7 @@ class Lawnmower:
     """Flies back and forth over the rows of waypoints, each UAS its own part; home in the end."""
 
     Options = AssistedOptions
+    comes_home_by_legs = True
 
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()
@@ -49,12 +50,13 @@ class Lawnmower:
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly each run in order; a UAS that has finished helps with the nearest waypoints."""
         if self._by_legs is not None:
-            return self._by_legs.commands(swarm, self._routes(swarm))
+            routes = self._routes(swarm, ~self._by_legs.returns)
+            return self._by_legs.commands(swarm, routes)
         return self._targets.commands(swarm, self._next)
 
-    def _routes(self, swarm: SwarmState) -> list[list[int]]:
+    def _routes(self, swarm: SwarmState, may_work: NDArray[np.bool_]) -> list[list[int]]:
         """What is left of the runs; one that is lost leaves its run to the one that has least."""
-        works = self._handover.workers(swarm) & ~swarm.returning
+        works = self._handover.workers(swarm) & ~swarm.returning & may_work
         left = [[w for w in run if swarm.uncovered[w]] for run in self._runs]
         for u in np.flatnonzero(~works & (np.array([len(run) for run in left]) > 0)):
             for w in left[u]:

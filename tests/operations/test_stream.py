@@ -82,9 +82,9 @@ def test_time_passes_more_slowly_for_all_while_one_lags_and_both_stay_on_their_p
     assert ended.late_s > 5.0
     assert any("uas_1 is behind: time passes more slowly for all" in line for line in loop.said)
     assert max(off_m(vehicle, flight, u) for u, vehicle in enumerate(loop.vehicles)) < 1.5
-    # side by side in the plan, they stay so: the other one waits on the way
+    # side by side in the plan: by 5 m and what is flown in half a second they may come apart
     one, other = (np.array(vehicle.path)[:, 1] for vehicle in loop.vehicles)
-    assert np.abs(one - other).max() < 7.0
+    assert np.abs(one - other).max() < 12.0
 
 
 @pytest.mark.parametrize(("reaction", "mode"), [("hold", BRAKE), ("rtl", RTL), ("land", LAND)])

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.mission.lateness import Pair, pairs_of
-from uas_coverage_env.mission.separation import separate
+from uas_coverage_env.mission.separation import Waits, separate
 from uas_coverage_env.operations.exported import Exported, exported, followed, waiting
 from uas_coverage_env.operations.formats import FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
@@ -19,7 +21,7 @@ from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.layers import Apart, in_layers
 from uas_coverage_env.operations.report import report
 from uas_coverage_env.operations.report_page import report_page
-from uas_coverage_env.operations.tracks import Tolerances, Track, make_track
+from uas_coverage_env.operations.tracks import LIFT_M, Tolerances, Track, make_track
 from uas_coverage_env.scenario import Place
 
 MOST_TOLERANCE_M = 50.0
@@ -185,6 +187,14 @@ def _kept_apart(
     pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
     if not _short(pairs, settled.min_slack_s):
         return exports, pairs
+    if scenario.execution is not None:  # waits were planned then
+        waits = [_flown_wait(flight, one) for one in exports]
+        flown = [
+            exported(flight, t, frame, tolerances, w) for t, w in zip(tracks, waits, strict=True)
+        ]
+        found = pairs_of(scenario, [(one.track.uas, one.followed) for one in flown])
+        if not _short(found, settled.min_slack_s):
+            return flown, found
     settle = partial(_apart, flight, settled)
     apart = in_layers(flight, settle(tracks), tolerances, settle)
     if apart.waits is not None:
@@ -195,6 +205,13 @@ def _kept_apart(
         pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
     _check_slack(pairs, frame, settled.min_slack_s)
     return exports, pairs
+
+
+def _flown_wait(flight: Flight, one: Exported) -> Waits:
+    """How long a UAS waited in the flight before it took off."""
+    first = int(np.flatnonzero(-one.track.flown_m[:, 2] >= LIFT_M)[0])
+    began_s = float(one.followed.corner_s[0])
+    return Waits(max(math.floor(first * flight.scenario.dt_s - began_s), 0))
 
 
 def _apart(flight: Flight, settled: _Settled, tracks: Sequence[Track]) -> Apart:

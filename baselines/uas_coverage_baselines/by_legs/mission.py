@@ -55,7 +55,7 @@ class LegMission:
         Args:
             swarm: What is seen.
         """
-        works = self._handover.workers(swarm) & ~swarm.returning
+        works = self._handover.workers(swarm) & ~swarm.returning & ~self._pilot.returns
         routed = np.zeros(len(swarm.uncovered), np.bool_)
         routed[self._order.left_out] = True
         for u, route in enumerate(self._order.routes):

@@ -8,16 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs.course import Course, CoursePlanner
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.separation import separate
-from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
+from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.mission import MissionBrief, WorldView
+from uas_coverage_env.mission.separation import Waits, separate
+from uas_coverage_env.world import FLYING, Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 
-_LEAD_S = 1.6
-"""The inner loop follows a velocity with about this delay."""
+_LEAD_S, _PULL_PER_S = 2.4, 0.4
+"""How far ahead velocities are, and how hard a UAS is pulled to its place: of twelve pairs those
+with the least error."""
 
-_PULL_PER_S = 0.25
 _SLOWER_FROM_M, _STOPS_AT_M = 3.0, 6.0
 """Behind by so much, the time of a UAS passes more slowly, and not at all."""
 
@@ -25,6 +26,9 @@ _HELD_UP_S = 15.0
 """So long without time passing, and guidance flies on, past what is in the way."""
 
 _GUIDED_S = 40.0
+_SPARE_SLACK_S = 10.0
+"""Planned beyond the slack that is asked: the legs of a file are not quite those of the plan."""
+
 _MISSED = 3
 """So often a waypoint is missed before it is left out."""
 
@@ -43,7 +47,8 @@ class LegPilot:
         n_uas = len(brief.uas)
         self._courses: list[Course | None] = [None] * n_uas
         self._clock_s, self._held_s = np.zeros(n_uas), np.zeros(n_uas)
-        self._begun = False
+        self._view, self._begun = WorldView(brief), False
+        self._returns = np.zeros(n_uas, np.bool_)
         self._guided: dict[int, tuple[int | None, float]] = {}
         self._missed = np.zeros((n_uas, len(brief.waypoints)), np.int64)
 
@@ -56,7 +61,10 @@ class LegPilot:
         flying = [u for u, route in enumerate(routes) if len(route)]
         corners = {u: self.planner.corners(u, routes[u]) for u in flying}
         fleet = [(u, lambda waits, u=u: self.planner.follow(u, corners[u], waits)) for u in flying]
-        waits = separate(self._brief.as_scenario(), fleet, self._slack_s) or [None] * len(flying)
+        scenario, waits = self._brief.as_scenario(), None
+        for spare_s in (_SPARE_SLACK_S, 0.0):
+            waits = waits or separate(scenario, fleet, self._slack_s + spare_s)
+        waits = waits or [Waits()] * len(flying)
         for u, one in zip(flying, waits, strict=True):
             self._courses[u] = self.planner.course(u, corners[u], one)
 
@@ -64,6 +72,11 @@ class LegPilot:
     def courses(self) -> tuple[Course | None, ...]:
         """(U,) what each UAS flies; None: nothing yet."""
         return tuple(self._courses)
+
+    @property
+    def returns(self) -> NDArray[np.bool_]:
+        """(U,) who has been called home for its charge."""
+        return self._returns
 
     def commands(self, swarm: SwarmState, routes: Sequence[Sequence[int]]) -> Mapping[str, Command]:
         """A command for each active UAS: on along its legs, new ones where its route is another.
@@ -75,6 +88,7 @@ class LegPilot:
         if not self._begun and swarm.step > 0:  # planned anew in mid-mission: not from the starts
             self._courses = [None] * len(self._courses)
         self._begun = True
+        self._call_home(swarm)
         result: dict[str, Command] = {}
         for name in swarm.active:
             u = swarm.names.index(name)
@@ -82,8 +96,14 @@ class LegPilot:
             result[name] = self._command(swarm, u, route)
         return result
 
+    def _call_home(self, swarm: SwarmState) -> None:
+        """Note whose charge suffices for nothing more than the way home."""
+        self._view.update(swarm)
+        for u in np.flatnonzero((swarm.status == FLYING) & ~self._returns & swarm.departed):
+            self._returns[u] = has_to_return(self._view.arena, self._view.state, u)
+
     def _command(self, swarm: SwarmState, u: int, route: list[int]) -> Command:
-        if not route and not swarm.departed[u]:
+        if self._returns[u] or (not route and not swarm.departed[u]):
             return GoTo(None, "return")
         if u in self._guided:
             target, until_s = self._guided[u]
@@ -124,7 +144,7 @@ class LegPilot:
         passes_s = dt_s * min(max(passes, 0.0), 1.0)
         self._clock_s[u] += passes_s
         self._held_s[u] = 0.0 if passes_s > 0.0 else self._held_s[u] + dt_s
-        mode = "covering" if route else "return"
+        mode = "covering" if route else "transit"
         if self._held_s[u] >= _HELD_UP_S:
             self._guided[u] = (route[0] if route else None, swarm.time_s + _GUIDED_S)
         ahead_m = _at(course, clock_s + _LEAD_S + 0.5 * passes_s)

@@ -59,6 +59,7 @@ class Tour:
     """
 
     Options = TourOptions
+    comes_home_by_legs = True
 
     def __init__(self, options: TourOptions | None = None) -> None:
         self.options = options or TourOptions()

@@ -106,6 +106,7 @@ class Trajectory:
     """
 
     Options = TrajectoryOptions
+    comes_home_by_legs = True
 
     def __init__(self, options: TrajectoryOptions | None = None) -> None:
         self.options = options or TrajectoryOptions()
