@@ -184,17 +184,17 @@ def _kept_apart(
     """The UAS with the waits that they need, and how late they may be then."""
     scenario, tolerances = flight.scenario, settled.tolerances
     exports = [exported(flight, track, frame, tolerances) for track in tracks]
-    pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
-    if not _short(pairs, settled.min_slack_s):
-        return exports, pairs
-    if scenario.execution is not None:  # waits were planned then
+    if scenario.execution is not None:  # waits are part of the plan then
         waits = [_flown_wait(flight, one) for one in exports]
         flown = [
             exported(flight, t, frame, tolerances, w) for t, w in zip(tracks, waits, strict=True)
         ]
-        found = pairs_of(scenario, [(one.track.uas, one.followed) for one in flown])
-        if not _short(found, settled.min_slack_s):
-            return flown, found
+        pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in flown])
+        if not _short(pairs, settled.min_slack_s):
+            return flown, pairs
+    pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
+    if not _short(pairs, settled.min_slack_s):
+        return exports, pairs
     settle = partial(_apart, flight, settled)
     apart = in_layers(flight, settle(tracks), tolerances, settle)
     if apart.waits is not None:
