@@ -90,7 +90,7 @@ def check(
     place, tolerances = place_of(number, rng), Tolerances()
     files: dict[str, str] = {}
     for kind in ("qgc", "ardupilot"):
-        options = ExportOptions(kind, min_slack_s=0.0, tolerances=tolerances, place=place)
+        options = ExportOptions(kind, min_slack_s=0.0, place=place)
         files |= make_export(flight, options).files
     corners, worst_plan, worst_text = 0, 0.0, 0.0
     for i, uas in enumerate(scenario.uas):

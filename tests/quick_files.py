@@ -15,6 +15,10 @@ QUICK = {
     "autopilot/test_guidance.py": "",
     "autopilot/test_return_mode.py": "",
     "autopilot/test_safety_filter.py": "",
+    "baselines/test_by_legs.py": (
+        "only test_waypoints_in_a_row_are_one_leg "
+        "test_corners_cost_what_the_leg_model_loses_in_them_and_straight_on_costs_nothing"
+    ),
     "baselines/test_simple_planners.py": "",
     "baselines/test_tour.py": (
         "but test_who_flies_slower_than_thought_hands_over_what_its_battery_does_not_last_for"
@@ -84,6 +88,7 @@ QUICK = {
     "operations/test_lateness.py": "",
     "operations/test_layout.py": "",
     "operations/test_leg_model.py": "",
+    "operations/test_layers.py": "",
     "operations/test_logs.py": (
         "only test_telemetry_holds_places_attitude_and_charge "
         "test_a_data_flash_log_holds_places_attitude_and_charge"

@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.by_legs import LegPilot
 from uas_coverage_baselines.targets import Targets
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import Handover, MissionBrief
 from uas_coverage_env.vehicle import dod_per_s
 from uas_coverage_env.vehicle.range import LAWNMOWER, level_seconds, speeds_of
 from uas_coverage_env.world import Command, SwarmState
@@ -20,6 +21,7 @@ class Lawnmower:
     """Flies back and forth over the rows of waypoints, each UAS its own part; home in the end."""
 
     Options = AssistedOptions
+    comes_home_by_legs = True
 
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()
@@ -27,7 +29,8 @@ class Lawnmower:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Order the waypoints and cut the order into runs of about equal time."""
-        self._targets = Targets(brief)
+        self._targets, self._handover = Targets(brief), Handover(brief)
+        self._can_cover = brief.can_cover
         waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         self._runs: list[list[int]] = [[] for _ in brief.uas]
         kinds = np.unique(brief.can_cover, axis=1)
@@ -39,10 +42,32 @@ class Lawnmower:
             if team:
                 for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
                     self._runs[u] += run
+        self._by_legs: LegPilot | None = None
+        if brief.execution is not None:
+            self._by_legs = LegPilot(brief)
+            self._by_legs.begin(self._runs)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly each run in order; a UAS that has finished helps with the nearest waypoints."""
+        if self._by_legs is not None:
+            routes = self._routes(swarm, ~self._by_legs.returns)
+            return self._by_legs.commands(swarm, routes)
         return self._targets.commands(swarm, self._next)
+
+    def _routes(self, swarm: SwarmState, may_work: NDArray[np.bool_]) -> list[list[int]]:
+        """What is left of the runs; one that is lost leaves its run to the one that has least."""
+        works = self._handover.workers(swarm) & ~swarm.returning & may_work
+        left = [[w for w in run if swarm.uncovered[w]] for run in self._runs]
+        for u in np.flatnonzero(~works & (np.array([len(run) for run in left]) > 0)):
+            for w in left[u]:
+                able = np.flatnonzero(works & self._can_cover[:, w])
+                if len(able):
+                    heir = min(able, key=lambda v: len(left[v]))
+                    self._runs[u].remove(w)
+                    self._runs[heir].append(w)
+                    left[heir].append(w)
+            left[u] = []
+        return left
 
     def _next(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         own = [waypoint for waypoint in self._runs[uas] if candidates[waypoint]]

@@ -44,7 +44,7 @@ PUBLIC = {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
         *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
         *("geofence", "obstacles"),
-        *("moving_obstacles", "uas", "waypoints", "decorations", "place"),
+        *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
     },
     MovingObstacle: {"name", "kind", "radius_m", "height_m", "safe_distance_m", "start_m"},
     # these are handed over as they are

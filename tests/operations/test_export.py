@@ -62,7 +62,7 @@ def place(number):
 
 
 def exported(flight, place, kind, **changes):
-    options = {"min_slack_s": 0.0, "tolerances": TOLERANCES, "place": place} | changes
+    options = {"min_slack_s": 0.0, "place": place} | changes
     return make_export(flight, ExportOptions(kind, **options))
 
 

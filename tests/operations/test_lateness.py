@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.mission.lateness import pairs_of
+from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.operations.export import _check_slack
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.lateness import pairs_of
-from uas_coverage_env.operations.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.scenario import Place, load_scenario
 
 FIELD = load_scenario("open_field")

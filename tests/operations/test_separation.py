@@ -13,9 +13,9 @@ from test_lateness import FIELD, HOMES, KEPT_M, PLACES, least_m, pair_of
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
+from uas_coverage_env.mission.separation import Waits, separate
 from uas_coverage_env.operations import ExportOptions, make_export
-from uas_coverage_env.operations.leg_model import DT_S, Autopilot, follow
-from uas_coverage_env.operations.separation import Waits, separate
 from uas_coverage_env.scenario import Place
 
 SLACK_S = 20.0

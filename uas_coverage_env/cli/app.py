@@ -84,6 +84,11 @@ COMMANDS = (
         "Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`).",
     ),
     CommandEntry(
+        "stream",
+        at(f"{_CLI}.stream:stream"),
+        "Fly a plan in time on ArduPilot vehicles, by MAVLink position targets (extra `ops`).",
+    ),
+    CommandEntry(
         "import-log",
         at(f"{_CLI}.logs:import_log"),
         "Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`).",

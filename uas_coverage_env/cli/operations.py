@@ -86,6 +86,13 @@ def import_area(
             help="Top of the fence, m; default: 30 m above the waypoints.", show_default=False
         ),
     ] = None,
+    flown_by: Annotated[
+        str | None,
+        typer.Option(
+            help="`autopilot`: planners lay long straight legs, as an autopilot flies them from a "
+            "file, so that the file takes as long as the flight."
+        ),
+    ] = None,
     home: Annotated[
         list[str] | None,
         typer.Option(
@@ -116,6 +123,7 @@ def import_area(
         ceiling_m=ceiling,
         homes=tuple(place_of("--home", text) for text in home or ()),
         town=town,
+        flown_by=flown_by,
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
     made = make_scenario(read_drawings(areas), name, options)
@@ -136,16 +144,28 @@ def export(
     ],
     out: Annotated[Path, typer.Option(help="Directory for one file per UAS and the report.")],
     min_slack: Annotated[
-        float,
+        float | None,
         typer.Option(
             help="Seconds that any UAS may be late before two come too close; files wait for "
-            "each other until they allow it."
+            "each other until they allow it; default: 20, or that of the scenario.",
+            show_default=False,
         ),
-    ] = 20.0,
-    tolerance: Annotated[float, typer.Option(help="How far legs may be from the flight, m.")] = 2.0,
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            help="How far legs may be from the flight, m; default: 2, or that of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
     corner: Annotated[
-        float, typer.Option(help="How far from a corner an autopilot may pass, m.")
-    ] = 2.0,
+        float | None,
+        typer.Option(
+            help="How far from a corner an autopilot may pass, m; default: 2, or that of the "
+            "scenario.",
+            show_default=False,
+        ),
+    ] = None,
     autopilot: Annotated[
         str, typer.Option(help="Whose plans `qgc` writes: ardupilot or px4.")
     ] = "ardupilot",
@@ -162,14 +182,15 @@ def export(
 ) -> None:
     """Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`)."""
     with extra():
-        from uas_coverage_env.operations import ENDINGS, ExportOptions, Tolerances, make_export
+        from uas_coverage_env.operations import ENDINGS, ExportOptions, make_export
     if out.is_dir() and any(out.iterdir()) and not overwrite:
         raise InputError(f"--out {out}: is not empty; give another or add --overwrite")
     latitude, longitude = place_of("--place", place) if place else (0.0, 0.0)
     options = ExportOptions(
         kind=kind,
         min_slack_s=min_slack,
-        tolerances=Tolerances(path_m=tolerance, corner_m=corner),
+        path_m=tolerance,
+        corner_m=corner,
         autopilot=autopilot,
         place=Place(latitude_deg=latitude, longitude_deg=longitude) if place else None,
     )

@@ -46,6 +46,8 @@ class Planner(Protocol):
     - `warm_up(brief)`: compiles what needs compiling; called once, before `reset`, untimed.
     - `last_decision`: a `Decision` about the last `act`, or None.
     - `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
+    - `comes_home_by_legs`: whether, where an autopilot is to fly the mission (`[execution]`), it
+      brings UAS home by itself, so that return mode is not needed.
     - `options`: the pydantic model it was made with; goes into the record.
     - `fingerprint`: text that changes with the data it flies by (a policy's weights); part of the
       identity of its flights in a comparison.

@@ -95,12 +95,15 @@ def rollout(
     if max_steps is not None and max_steps < 1:
         raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
     assistants: Assistants = getattr(planner, "assistants", Assistants())
-    # no plan is verified against what pushes back
+    # no plan is verified against what pushes back, nor one of legs against what moves
     uncertain = _is_uncertain(scenario, disturbances)
+    by_legs = scenario.execution is not None
     if return_mode is None:
-        return_mode = assistants.return_mode or uncertain
+        # return mode would fly home another way than the file
+        comes_home = by_legs and getattr(planner, "comes_home_by_legs", False)
+        return_mode = uncertain or (assistants.return_mode and not comes_home)
     if safety_filter is None:
-        safety_filter = assistants.safety_filter or uncertain
+        safety_filter = assistants.safety_filter or uncertain or by_legs
     world = World(
         scenario,
         dynamics=dynamics,

@@ -13,6 +13,7 @@ from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import (
     Conditions,
     Decoration,
+    Execution,
     Geofence,
     MovingObstacle,
     Obstacle,
@@ -74,6 +75,7 @@ class MissionBrief(StrictModel):
         place: Where on the Earth it is; None where the scenario does not say.
         conditions: Stated bounds of wind and of the true vehicles, never what is drawn; None where
             nothing pushes back.
+        execution: Who flies it in the end, and how exactly; None where the scenario does not say.
     """
 
     schema_version: int
@@ -94,6 +96,7 @@ class MissionBrief(StrictModel):
     decorations: tuple[Decoration, ...]
     place: Place | None = None
     conditions: Conditions | None = None
+    execution: Execution | None = None
 
     if not TYPE_CHECKING:
 

@@ -2,7 +2,7 @@
 
 A leg goes straight where the way is free, round tall obstacles along the corners that the world's
 routes turn at, and over low ones. It takes as long as the slower of its horizontal and its
-vertical part.
+vertical part. Where an autopilot flies the mission, what a corner costs is the time to stop at it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
+from uas_coverage_env.mission.leg_model import Autopilot
 from uas_coverage_env.vehicle.range import (
     ROUTED,
     Speeds,
@@ -31,6 +32,10 @@ _NEIGHBOURS = 24
 """Legs to so many nearest waypoints are routed past obstacles; longer ones are taken straight."""
 _FROM_HERE = 64
 """Likewise from where a UAS is."""
+_STOP_DEG = np.array([0.0, 10.0, 25.0, 90.0, 180.0])
+_STOP_SHARE = np.array([0.0, 0.0, 0.6, 1.0, 1.1])
+"""What an autopilot loses in a corner, in corners of 90 degrees; a few degrees are no corner."""
+_COSINES = np.linspace(-1.0, 1.0, 257)
 _OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
@@ -49,7 +54,10 @@ class Legs:
         neighbours: (W, K) the nearest other waypoints of each, nearest first.
         speed_mps: (U,) of each UAS.
         acceleration_mps2: (U,) horizontal, what a turn uses of it on average.
-        turn_s: (U, W) time that the radius of a waypoint is worth.
+        turn_s: (U, W) time that the radius of a waypoint is worth; where an autopilot flies, what
+            a corner of 90 degrees costs.
+        turn_of_cosine: (257,) what turning at a waypoint costs, in `turn_s`, by the cosine of the
+            angle from -1 to 1; None: of flights that cut through waypoints.
     """
 
     def __init__(self, brief: MissionBrief) -> None:
@@ -70,6 +78,13 @@ class Legs:
         )
         radius_m = np.array([w.radius_m for w in brief.waypoints])
         self.turn_s = radius_m / self.speed_mps[:, None]
+        self.turn_of_cosine: FloatArray | None = None
+        if brief.execution is not None:
+            corner_m = brief.execution.corner_m
+            stops_s = [Autopilot.of(vehicle, corner_m).turn_s for vehicle in brief.vehicles]
+            self.turn_s = np.tile(np.array(stops_s)[:, None], len(radius_m))
+            turned_deg = np.degrees(np.arccos(_COSINES))
+            self.turn_of_cosine = np.interp(turned_deg, _STOP_DEG, _STOP_SHARE)
         n = len(self.waypoints_m)
         nearest = min(_NEIGHBOURS, n - 1)
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission import MissionBrief, Range
+from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
+from uas_coverage_env.mission.separation import Waits
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.operations.room import Surroundings
-from uas_coverage_env.operations.separation import Waits
 from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VehicleParams
@@ -91,17 +91,6 @@ class Exported:
         return self.frame.to_geodetic(places_m)
 
 
-def autopilot_of(vehicle: VehicleParams, tolerances: Tolerances) -> Autopilot:
-    """An ArduCopter that is set to the limits of a vehicle."""
-    limits = vehicle.limits
-    return Autopilot(
-        speed_mps=limits.v_xy_max_mps,
-        up_mps=limits.v_up_max_mps,
-        down_mps=limits.v_down_max_mps,
-        corner_m=tolerances.corner_m,
-    )
-
-
 def followed(
     track: Track, vehicle: VehicleParams, tolerances: Tolerances, waits: Waits
 ) -> Followed:
@@ -117,7 +106,7 @@ def followed(
         track.corners_m,
         file_speeds(track),
         file_holds(track, waits),
-        autopilot_of(vehicle, tolerances),
+        Autopilot.of(vehicle, tolerances.corner_m),
         waits.start_s,
     )
 
@@ -236,6 +225,8 @@ def _charges(
 def waiting(one: Exported) -> list[str]:
     """What a UAS does for others to be out of its way, as phrases that follow its name."""
     lines, waits = [], one.waits
+    if one.track.layer:
+        lines.append(one.track.layer)
     if waits.start_s:
         lines.append(f"takes off {waits.start_s} s after the start of its mission")
     if waits.leg is not None:

@@ -12,7 +12,7 @@ MOST_UAS = 50
 START_HEIGHT_M = 1.0
 """Of a start above the ground, as in the shipped scenarios [m]."""
 
-_SPARE_M = 1.0
+SPARE_M = 1.0
 """Between two UAS that share a take-off place, beyond what they keep from each other."""
 
 
@@ -60,7 +60,10 @@ def radius_m(vehicle: VehicleParams) -> float:
 
 
 def fleet_tables(
-    fleet: Sequence[str], places_m: Sequence[tuple[float, float]], safe_distance_m: float
+    fleet: Sequence[str],
+    places_m: Sequence[tuple[float, float]],
+    safe_distance_m: float,
+    spare_m: float = SPARE_M,
 ) -> list[dict[str, Any]]:
     """The tables `[[uas]]`; UAS that share a place stand in a row to the east of it.
 
@@ -68,9 +71,10 @@ def fleet_tables(
         fleet: Vehicle of each.
         places_m: East and north of the take-off places [m]; at least one.
         safe_distance_m: Kept between two UAS in addition to their radii [m].
+        spare_m: Between two that share a place, beyond that [m].
     """
     vehicles = [load_vehicle(name) for name in fleet]
-    step_m = 2.0 * max(map(radius_m, vehicles)) + safe_distance_m + _SPARE_M
+    step_m = 2.0 * max(map(radius_m, vehicles)) + safe_distance_m + spare_m
     tables = []
     for n, (name, vehicle) in enumerate(zip(fleet, vehicles, strict=True)):
         row, place = divmod(n, len(places_m))

@@ -15,7 +15,7 @@ from uas_coverage_env.flight.seen import SEARCH_AREA
 from uas_coverage_env.operations.cameras import named_camera
 from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.operations.drawing import Drawn
-from uas_coverage_env.operations.fleet import Member, fleet_tables, parse_fleet
+from uas_coverage_env.operations.fleet import SPARE_M, Member, fleet_tables, parse_fleet
 from uas_coverage_env.operations.layout import MOST_WAYPOINTS, lay_waypoints
 from uas_coverage_env.operations.looks import Look, look_at, look_of
 from uas_coverage_env.operations.site import (
@@ -31,7 +31,11 @@ from uas_coverage_env.operations.town import Town, read_town
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.endurance import back_and_forth
 
+FLOWN_BY = ("autopilot",)
 UAS_SAFE_DISTANCE_M = 5.0
+_FILES_OFF_M = 3.0
+"""How much wider UAS that share a take-off place stand where files fly them."""
+
 _SPARE_M = 1.0
 """Between a waypoint and the nearest place that a UAS may take."""
 
@@ -59,6 +63,7 @@ class ImportOptions:
         ceiling_m: Top of the fence above the ground; None: 30 m above the waypoints [m].
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
         town: GeoJSON of buildings.
+        flown_by: Who flies it in the end, `autopilot`; None: nobody in particular.
     """
 
     fleet: str = "s500_v2:2"
@@ -71,6 +76,7 @@ class ImportOptions:
     ceiling_m: float | None = None
     homes: tuple[tuple[float, float], ...] = ()
     town: Path | None = None
+    flown_by: str | None = None
 
 
 @dataclass(frozen=True)
@@ -129,10 +135,13 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
             }
             for n, wall in enumerate(walls)
         ],
-        "uas": _fleet_tables(fleet, looks, site),
+        "uas": _fleet_tables(
+            fleet, looks, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0)
+        ),
         "waypoints": [table for tables in waypoints.values() for table in tables],
         "decorations": _decorations(seen, several=len(looks) > 1),
         "place": site.frame.place.model_dump(),
+        **({"execution": {"flown_by": options.flown_by}} if options.flown_by else {}),
     }
     scenario = _finite(parse(tables, Scenario, name))
     notes = [
@@ -162,10 +171,12 @@ def _ceiling_m(looks: Sequence[Look], options: ImportOptions) -> float:
 
 
 def _fleet_tables(
-    fleet: Sequence[Member], looks: Sequence[Look], site: Site
+    fleet: Sequence[Member], looks: Sequence[Look], site: Site, spare_m: float
 ) -> list[dict[str, Any]]:
     """The tables `[[uas]]`, each with its camera."""
-    tables = fleet_tables([one.vehicle for one in fleet], site.homes_m, UAS_SAFE_DISTANCE_M)
+    tables = fleet_tables(
+        [one.vehicle for one in fleet], site.homes_m, UAS_SAFE_DISTANCE_M, spare_m
+    )
     for table, member in zip(tables, fleet, strict=True):
         name = named_camera(member.camera)[0] if member.camera else None
         table["sensors"] = [look_at(looks, name, "--fleet").sensor()]
@@ -187,6 +198,8 @@ def _look_notes(
 
 
 def _check(options: ImportOptions) -> None:
+    if options.flown_by not in (None, *FLOWN_BY):
+        raise InputError(f"--flown-by {options.flown_by[:40]!r}: take {', '.join(FLOWN_BY)}")
     _within("--height", options.height_m, 1.0, 1_000.0)
     _within("--radius", options.radius_m, 0.5, 1_000.0)
     _within("--overlap", options.overlap, 0.0, 0.9)

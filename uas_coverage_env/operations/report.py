@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from uas_coverage_env.flight import Flight
+from uas_coverage_env.mission.lateness import Pair
 from uas_coverage_env.operations.exported import Exported, waiting, waypoint_margins
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.lateness import Pair
 from uas_coverage_env.operations.tracks import Tolerances
 
 

@@ -34,6 +34,8 @@ SPENT_M = 1.0
 STOP_S = 1.0
 _PATIENCE = 6
 _CUTS = (0.25, 0.5, 1.0)
+_CUT_SEEN = 5.0
+_SHORTEST_M, _PARALLEL = 0.5, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,8 @@ class Leg:
     Attributes:
         end_m: (3,) where it ends [m].
         sample: Of the flight, at its end.
-        speed_mps: Mean of the flight on it [m/s].
+        speed_mps: Mean of the flight on it; where it was planned for an autopilot, which flies it
+            from rest to rest, the largest [m/s].
         room: On the leg, and on what cuts the corner at its end.
         stop: Whether the autopilot stops at its end.
     """
@@ -69,6 +72,7 @@ class Track:
         waypoints: Which this UAS covers.
         passed_m: (len(waypoints),) how close the legs, corners cut, come to each centre [m].
         flown_m: (T, 3) the samples that the legs stand for [m].
+        layer: How heights differ from those of the flight, in words; empty: they do not.
     """
 
     uas: int
@@ -80,6 +84,7 @@ class Track:
     waypoints: tuple[int, ...]
     passed_m: FloatArray
     flown_m: FloatArray
+    layer: str = ""
 
     @property
     def corners_m(self) -> FloatArray:
@@ -131,6 +136,8 @@ def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None
     take_off_m = np.array([*home_m[:2], path[first, 2]])
     above_m = np.array([*home_m[:2], path[last, 2]])
     points = [(take_off_m, first), (path[first], first), *builder.legs(first, last)]
+    if flight.scenario.execution is not None:
+        points = builder.sharpened(points)
     if np.linalg.norm(points[0][0] - points[1][0]) <= 0.1:
         del points[1]
     if len(points) == 1 or np.linalg.norm(points[-1][0] - above_m) > 0.1:
@@ -163,6 +170,43 @@ def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None
             f"make it smaller"
         )
     return track
+
+
+def relaid(
+    flight: Flight,
+    track: Track,
+    corners: FloatArray,
+    leg_of: list[int],
+    tolerances: Tolerances,
+    layer: str,
+) -> Track | None:
+    """A track with other corners; None where it is not as clear, or misses a waypoint.
+
+    Args:
+        flight: The flight.
+        track: The track as it is.
+        corners: (C, 3) the new ones [m].
+        leg_of: (C - 1,) the leg of the track that each new one stands for.
+        tolerances: How far legs may be from the flight.
+        layer: What is different, in words.
+    """
+    builder = _Builder(flight, track.uas, track.flown_m, tolerances)
+    legs = tuple(
+        replace(track.legs[n], end_m=end_m, room=builder.around.room(start_m, end_m), stop=False)
+        for (start_m, end_m), n in zip(pairwise(corners), leg_of, strict=True)
+    )
+    legs = builder.with_stops(corners, legs)
+    new = replace(
+        track,
+        legs=legs,
+        passed_m=builder.passed_m(corners, [leg.stop for leg in legs]),
+        layer=layer,
+    )
+    radii = np.array([flight.scenario.waypoints[w].radius_m for w in track.waypoints])
+    passes = new.passed_m <= np.maximum(radii - tolerances.path_m, track.passed_m) + 1e-9
+    spent_m = min(SPENT_M, tolerances.path_m)
+    clear = new.room.contact_m > 0.0 and new.room.spare_m >= min(-spent_m, track.room.spare_m)
+    return new if clear and passes.all() else None
 
 
 def distances_m(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
@@ -209,6 +253,7 @@ class _Builder:
     def __init__(self, flight: Flight, uas: int, path: FloatArray, tolerances: Tolerances) -> None:
         self.path, self.tolerances, self.dt_s = path, tolerances, flight.scenario.dt_s
         self.around = Surroundings(flight.scenario, uas)
+        self._rests_between = flight.scenario.execution is not None
         self.steps = [self.around.room(a, b) for a, b in pairwise(path)]
         first_at = covered_at(flight)
         self.waypoints: list[int] = []
@@ -254,12 +299,73 @@ class _Builder:
         enough = room.spare_m >= min(-spent_m, flown.spare_m)
         return enough and room.contact_m > 0.0
 
+    def sharpened(self, points: list[tuple[FloatArray, int]]) -> list[tuple[FloatArray, int]]:
+        """Corners as they were before they were flown: one for two at which a corner was cut."""
+        result = points[:1]
+        k = 1
+        while k < len(points):
+            corner = None
+            if k + 2 < len(points):
+                corner = self._met(result[-1], points[k], points[k + 1], points[k + 2])
+            result.append(points[k] if corner is None else corner)
+            k += 1 if corner is None else 2
+        return result
+
+    def _met(self, *points: tuple[FloatArray, int]) -> tuple[FloatArray, int] | None:
+        """Where the first of three legs and the last one meet, if they may stand for all."""
+        (a, i), (b, _), (c, _), (d, j) = points
+        short_m = 3.0 * _CUT_SEEN * self.tolerances.corner_m
+        if np.linalg.norm(c - b) > short_m:
+            return None
+        legs = b - a, c - d
+        lengths = [float(np.linalg.norm(leg)) for leg in legs]
+        if min(lengths) < _SHORTEST_M:
+            return None
+        u, v = (leg / length for leg, length in zip(legs, lengths, strict=True))
+        across = 1.0 - float(u @ v) ** 2
+        if across < _PARALLEL:
+            return None
+        ahead = float((d - a) @ (u - (u @ v) * v)) / across
+        back = float((a - d) @ (v - (u @ v) * u)) / across
+        p, q = a + ahead * u, d + back * v
+        if np.linalg.norm(p - q) > 0.5 * self.tolerances.path_m:
+            return None
+        past_m = ahead - lengths[0], back - lengths[1]
+        if min(past_m) < -short_m or max(past_m) > short_m or min(ahead, back) <= _SHORTEST_M:
+            return None
+        corner = 0.5 * (p + q)
+        sample = i + int(np.linalg.norm(self.path[i : j + 1] - corner, axis=1).argmin())
+        return (corner, sample) if self._may_stand(a, corner, d, i, sample, j) else None
+
+    def _may_stand(
+        self, a: FloatArray, corner: FloatArray, d: FloatArray, i: int, sample: int, j: int
+    ) -> bool:
+        """Whether two legs may stand for a part of the flight."""
+        for start, end, first, last in ((a, corner, i, sample), (corner, d, sample, j)):
+            if distances_m(self.path[first : last + 1], start, end).max() > self.tolerances.path_m:
+                return False
+        flown = self.steps[i]
+        for step in self.steps[i + 1 : j]:
+            flown = flown.least(step)
+        room = self.around.room(a, corner).least(self.around.room(corner, d))
+        spent_m = min(SPENT_M, self.tolerances.path_m)
+        if room.contact_m <= 0.0 or room.spare_m < min(-spent_m, flown.spare_m):
+            return False
+        for s in range(i, j + 1):
+            for w in self._covered.get(s, ()):
+                centre = self._centres[[w]]
+                away_m = min(distances_m(centre, a, corner)[0], distances_m(centre, corner, d)[0])
+                wanted_m = self._radii[w] - self.tolerances.path_m
+                if away_m > max(wanted_m, np.linalg.norm(self.path[s] - self._centres[w])):
+                    return False
+        return True
+
     def speed_mps(self, i: int, j: int) -> float:
-        """Mean speed of the flight between two samples."""
+        """Mean speed of the flight between two samples, or the largest."""
         if j <= i:
             return 1.0
-        way_m = np.linalg.norm(np.diff(self.path[i : j + 1], axis=0), axis=1).sum()
-        return float(way_m) / ((j - i) * self.dt_s)
+        steps_m = np.linalg.norm(np.diff(self.path[i : j + 1], axis=0), axis=1)
+        return float(steps_m.max() if self._rests_between else steps_m.mean()) / self.dt_s
 
     def with_stops(self, corners: FloatArray, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
         """The legs with stops at the corners that must not be cut."""

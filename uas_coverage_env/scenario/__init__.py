@@ -4,6 +4,7 @@ from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.checks import out_of_reach, warnings
 from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
+from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.families import Family, Size, installed_families
 from uas_coverage_env.scenario.family import (
     FAMILIES,
@@ -46,6 +47,7 @@ __all__ = [
     "Conditions",
     "Decoration",
     "DisturbanceTable",
+    "Execution",
     "Family",
     "GeneratedScenarios",
     "Geofence",

@@ -46,6 +46,7 @@ class Scenario(UncheckedScenario):
         sensing: How well UAS are known to planners and autopilots; without it, exactly.
         events: What happens during the mission; a table `[[events]]` for each.
         sorties: Battery packs of each UAS; without it, one.
+        execution: Who flies it in the end; without it, nobody in particular.
     """
 
     def __getstate__(self) -> dict[Any, Any]:

@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.events import EVENT_KINDS
+from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
@@ -28,7 +29,7 @@ from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 _TABLES = (
     *(Geofence, Uas, Sensor, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
-    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties),
+    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties, Execution),
     *EVENT_KINDS,
 )
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)

@@ -13,6 +13,7 @@ from uas_coverage_env.scenario.air import Wind
 from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
 from uas_coverage_env.scenario.events import Events, EventTable
+from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Distance_m,
@@ -61,6 +62,7 @@ class UncheckedScenario(StrictModel):
     sensing: Sensing | None = None
     events: Events = ()
     sorties: Sorties | None = None
+    execution: Execution | None = None
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -68,7 +70,7 @@ class UncheckedScenario(StrictModel):
         data = serialise(self)
         optional = (
             *("place", "min_height_m", "from_ground", "wind", "uncertainty", "disturbances"),
-            *("sensing", "events", "sorties", "relaunch"),
+            *("sensing", "events", "sorties", "relaunch", "execution"),
         )
         for name in optional:
             if not getattr(self, name):

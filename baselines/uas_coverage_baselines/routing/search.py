@@ -150,6 +150,7 @@ def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
 
 
 def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
+    turning = _TURN_OF_COSINE if task.turn_of_cosine is None else task.turn_of_cosine
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
     return RoutingArrays(
         first=task.first_s,
@@ -166,7 +167,7 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         budget=task.budget_s,
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
-        turn_of_cosine=_TURN_OF_COSINE,
+        turn_of_cosine=turning,
     )
 
 

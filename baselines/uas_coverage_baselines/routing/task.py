@@ -32,6 +32,8 @@ class RoutingTask:
         weight: (W,) worth of a waypoint.
         not_before_s: (W,) from now on; 0 where the waypoint can be visited at any time.
         budget_s: (U,) how long each UAS may fly; -inf (with `idle_s` 0) where it may not at all.
+        turn_of_cosine: What turning costs, in `turn_s`, by cosine from -1 to 1; None: of flights
+            that cut through waypoints.
     """
 
     open_waypoints: NDArray[np.int64]
@@ -51,6 +53,7 @@ class RoutingTask:
     weight: FloatArray
     not_before_s: FloatArray
     budget_s: FloatArray
+    turn_of_cosine: FloatArray | None = None
 
     @property
     def n_uas(self) -> int:

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from uas_coverage_baselines.by_legs import LegMission
+from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
@@ -28,6 +30,7 @@ _FROM_WITHIN = 0.8  # share of the radius from within which a waypoint is covere
 _WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
 _PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putting one off
 _MOVING_MARGIN_M = 6.0
+_LEG_SEARCHES = 3
 _SURPRISE_MPS = 0.3  # a larger deviation means that another flew: the filter, return mode
 
 
@@ -56,6 +59,7 @@ class Tour:
     """
 
     Options = TourOptions
+    comes_home_by_legs = True
 
     def __init__(self, options: TourOptions | None = None) -> None:
         self.options = options or TourOptions()
@@ -70,6 +74,11 @@ class Tour:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Search the order from the starts."""
+        self._by_legs: LegMission | None = None
+        if brief.execution is not None:
+            effort = SearchEffort(self.options.moves)
+            self._by_legs = LegMission(brief, _LEG_SEARCHES, effort, seed)
+            return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._arena = self._world.arena
         n_uas = len(brief.uas)
@@ -91,6 +100,9 @@ class Tour:
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Plan for each flying UAS, in order, and fly the first command of each plan."""
+        if self._by_legs is not None:
+            self.last_decision = None
+            return self._by_legs.commands(swarm)
         view = self._view(swarm)
         self._schedule.update(view)
         others_m = self._where_others_go(view)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY
 from uas_coverage_baselines.trajectory.program import Flight, FlightProgram
 from uas_coverage_baselines.trajectory.space import Space
-from uas_coverage_baselines.trajectory.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

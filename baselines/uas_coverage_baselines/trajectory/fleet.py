@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import RoutingTask
+from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
 from uas_coverage_baselines.trajectory.retiming import quickest, retimed, shifted, stretches
 from uas_coverage_baselines.trajectory.space import Body, space_of
-from uas_coverage_baselines.trajectory.terrain import Terrain
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD, VX, VY
 

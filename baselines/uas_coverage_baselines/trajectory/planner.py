@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
@@ -105,6 +106,7 @@ class Trajectory:
     """
 
     Options = TrajectoryOptions
+    comes_home_by_legs = True
 
     def __init__(self, options: TrajectoryOptions | None = None) -> None:
         self.options = options or TrajectoryOptions()
@@ -116,17 +118,24 @@ class Trajectory:
         quick.reset(brief, 0)
         swarm = first_sight(brief)
         quick.act(swarm)
+        if brief.execution is not None:
+            return
         quick._safeguard.evade([0], {}, [0])
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts."""
         self._brief, self._seed = brief, seed
+        self._by_legs: LegMission | None = None
+        self.mission_plan: MissionPlan | None = None
+        if brief.execution is not None:
+            effort = SearchEffort(self.options.moves, total_weight=self._total_weight)
+            self._by_legs = LegMission(brief, self.options.orders, effort, seed)
+            return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
-        self.mission_plan: MissionPlan | None = None
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
         self._without_plan_since = np.full(len(brief.uas), -1)
@@ -140,6 +149,9 @@ class Trajectory:
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
+        if self._by_legs is not None:
+            self.last_decision = None
+            return self._by_legs.commands(swarm)
         self._world.update(swarm)
         self._silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
         movers = self._seen_movers(swarm)

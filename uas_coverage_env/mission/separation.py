@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.operations.lateness import encounters, kept_m
-from uas_coverage_env.operations.leg_model import DT_S, Followed
+from uas_coverage_env.mission.lateness import encounters, kept_m
+from uas_coverage_env.mission.leg_model import DT_S, Followed
 from uas_coverage_env.scenario import Scenario
 
 LONGEST_WAIT_S = 3_600

@@ -10,12 +10,16 @@ Times of recorded flights of ArduCopter 4.7-dev in its simulator are met within 
 (tests/operations/test_leg_model.py).
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from uas_coverage_env.vehicle import VehicleParams
 
 FloatArray = NDArray[np.float64]
 
@@ -52,6 +56,27 @@ class Autopilot:
     jerk_mps3: float = 0.8
     corner_m: float = 2.0
     corner_mps2: float = 5.0
+
+    @classmethod
+    def of(cls, vehicle: VehicleParams, corner_m: float) -> Autopilot:
+        """One that is set to the limits of a vehicle, and may pass a corner so far from it [m]."""
+        limits = vehicle.limits
+        return cls(
+            speed_mps=limits.v_xy_max_mps,
+            up_mps=limits.v_up_max_mps,
+            down_mps=limits.v_down_max_mps,
+            corner_m=corner_m,
+        )
+
+    @property
+    def turn_s(self) -> float:
+        """What a corner of 90 degrees takes longer than flying straight on [s]."""
+        leg_m = 5.0 * self.speed_mps
+        corners = np.array([(0.0, 0.0, 0.0), (leg_m, 0.0, 0.0), (leg_m, leg_m, 0.0)])
+        straight = np.array([(0.0, 0.0, 0.0), (2.0 * leg_m, 0.0, 0.0)])
+        turning: list[FloatArray] = []
+        _fly(_legs(corners, [self.speed_mps] * 2, self), self, turning)
+        return DT_S * len(turning) - _Leg(straight[0], straight[1], self.speed_mps, self).total_s
 
 
 class _Leg:
@@ -143,6 +168,8 @@ def follow(
     holds_s: Sequence[float],
     by: Autopilot,
     wait_s: float = 0.0,
+    *,
+    takes_off: bool = True,
 ) -> Followed:
     """Take off to the first corner, fly the others one after the other, land under the last one.
 
@@ -152,11 +179,14 @@ def follow(
         holds_s: (C - 1,) how long it stops at the end of each leg; 0: it flies on.
         by: The autopilot.
         wait_s: How long it waits on the ground before it takes off [s].
+        takes_off: Whether it does; if not, it is at rest at the first corner.
     """
     corners = np.asarray(corners_m, np.float64)
-    ground = corners[0] * (1.0, 1.0, 0.0)
-    places = [ground] * round((wait_s + _SPOOL_UP_S) / DT_S)
-    _fly(_legs([ground, corners[0]], [by.up_mps], by), by, places)
+    places = [corners[0]]
+    if takes_off:
+        ground = corners[0] * (1.0, 1.0, 0.0)
+        places = [ground] * round((wait_s + _SPOOL_UP_S) / DT_S)
+        _fly(_legs([ground, corners[0]], [by.up_mps], by), by, places)
     corner_s = [(len(places) - 1) * DT_S]
     first = 0
     for last in range(len(corners) - 1):

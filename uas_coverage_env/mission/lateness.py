@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.operations.leg_model import Followed
+from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.scenario import Scenario
 
 _FLYING_M = 0.5

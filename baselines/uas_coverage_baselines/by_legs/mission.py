@@ -1,0 +1,106 @@
+"""A whole mission by legs: an order with a cost for corners, searched again where UAS drop out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.by_legs.pilot import LegPilot
+from uas_coverage_baselines.routing import (
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
+from uas_coverage_env.mission import Handover, MissionBrief, first_sight
+from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.world import Command, SwarmState
+
+BoolArray = NDArray[np.bool_]
+
+_LANDING_S = 12.0
+_RESERVE_S = 30.0
+
+
+class LegMission:
+    """Routes of the fleet, flown by a `LegPilot`.
+
+    Args:
+        brief: A mission that an autopilot flies.
+        searches: For an order before take-off.
+        effort: Of each.
+        seed: Of the searches.
+    """
+
+    def __init__(self, brief: MissionBrief, searches: int, effort: SearchEffort, seed: int) -> None:
+        self._brief, self._effort, self._seed = brief, effort, seed
+        self._pilot, self._handover = LegPilot(brief), Handover(brief)
+        self._weight = np.array([w.weight for w in brief.waypoints], float)
+        swarm = first_sight(brief)
+        works = np.ones(len(brief.uas), np.bool_)
+        task = self._task(swarm, works)
+        orders = [
+            improve_routes(task, empty_routes(task.n_uas), effort, seed + attempt)
+            for attempt in range(searches)
+        ]
+        self._order = min(orders, key=lambda order: order.cost_s)
+        self._worked = works
+        self._pilot.begin([route.tolist() for route in self._order.routes])
+
+    def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """A command for each active UAS.
+
+        Args:
+            swarm: What is seen.
+        """
+        works = self._handover.workers(swarm) & ~swarm.returning & ~self._pilot.returns
+        routed = np.zeros(len(swarm.uncovered), np.bool_)
+        routed[self._order.left_out] = True
+        for u, route in enumerate(self._order.routes):
+            routed[route] |= works[u]
+        new = swarm.uncovered & ~routed & self._brief.can_cover[works].any(axis=0)
+        lost = self._worked & ~works
+        if new.any() or (lost.any() and swarm.uncovered[~routed].any()):
+            self._order = improve_routes(
+                self._task(swarm, works), self._order, self._effort, self._seed + swarm.step
+            )
+        self._worked = works
+        routes = [
+            route[swarm.uncovered[route]].tolist() if works[u] else []
+            for u, route in enumerate(self._order.routes)
+        ]
+        return self._pilot.commands(swarm, routes)
+
+    def _task(self, swarm: SwarmState, works: BoolArray) -> RoutingTask:
+        brief, terrain, x = self._brief, self._pilot.planner.terrain, swarm.x
+        legs, uas = terrain.legs, terrain.arena.uas
+        n_uas = len(x)
+        share = 1.0 if brief.conditions is None else brief.conditions.charge_share
+        left_s = share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
+        left_s = np.minimum(left_s, brief.max_steps * brief.dt_s - swarm.time_s) - _RESERVE_S
+        open_ = swarm.uncovered.copy()
+        if works.any():
+            open_ &= brief.can_cover[works].any(axis=0)
+        idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
+        return RoutingTask(
+            open_waypoints=np.flatnonzero(open_),
+            first_s=np.array([terrain.from_here_s(u, x[u, :3]) for u in range(n_uas)]),
+            between_s=terrain.between_s,
+            kind=legs.kind,
+            home_s=terrain.home_s + _LANDING_S,
+            idle_s=np.where(works, idle_s, 0.0),
+            position_m=np.ascontiguousarray(x[:, :2]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
+            speed_mps=legs.speed_mps,
+            acceleration_mps2=legs.acceleration_mps2,
+            start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
+            waypoints_m=legs.waypoints_m,
+            turn_s=legs.turn_s,
+            neighbours=legs.neighbours,
+            weight=self._weight,
+            not_before_s=np.zeros(len(open_)),
+            budget_s=np.where(works, left_s, -np.inf),
+            turn_of_cosine=legs.turn_of_cosine,
+        )

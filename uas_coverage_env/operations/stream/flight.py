@@ -1,0 +1,96 @@
+"""A flight directory's plan, streamed to the vehicles that are connected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, closing
+
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.operations.export import check_flight
+from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.stream.clock import Clock
+from uas_coverage_env.operations.stream.companion import (
+    REACTIONS,
+    Companion,
+    Ended,
+    StreamOptions,
+)
+from uas_coverage_env.operations.stream.link import VehicleLink, check_address
+from uas_coverage_env.operations.stream.timeline import timeline_of
+from uas_coverage_env.scenario import Place
+
+
+def stream_flight(
+    flight: Flight,
+    place: Place,
+    connections: Mapping[str, str],
+    options: StreamOptions,
+    clock: Clock,
+    tell: Callable[[str], None],
+) -> tuple[Ended, str]:
+    """Fly a plan by position targets in time.
+
+    Args:
+        flight: In which all UAS have landed, without a contact.
+        place: Where its origin is on the Earth.
+        connections: Address of each UAS that flies.
+        options: How.
+        clock: What tells the time.
+        tell: Called with lines for the user.
+
+    Returns:
+        How it has ended, and what was flown as a table that `import-log` reads.
+
+    Raises:
+        InputError: The flight, a connection or an option is wrong.
+    """
+    _check(options)
+    for name, address in connections.items():
+        check_address(name, address)
+    check_flight(flight)
+    plans = {}
+    for u, name in enumerate(flight.names):
+        plan = timeline_of(flight, u)
+        if plan is not None:
+            plans[name] = plan
+    if not plans:
+        raise InputError("no UAS flies in this flight; there is nothing to stream")
+    unknown = [name for name in connections if name not in plans]
+    if unknown:
+        raise InputError(
+            f"--connect {unknown[0][:40]}: does not fly in this flight; take {', '.join(plans)}"
+        )
+    missing = [name for name in plans if name not in connections]
+    if missing:
+        raise InputError(f"{missing[0]} has no vehicle; add --connect {missing[0]}=udp:HOST:PORT")
+    frame = LocalFrame(place)
+    with ExitStack() as stack:
+        links = {
+            name: stack.enter_context(closing(VehicleLink(name, connections[name], frame)))
+            for name in plans
+        }
+        companion = Companion(plans, links, options, clock, tell)
+        ended = companion.fly()
+    return ended, _table(companion, frame)
+
+
+def _check(options: StreamOptions) -> None:
+    for name, value, low, high in (
+        ("--lag", options.lag_m, 1.0, 100.0),
+        ("--patience", options.patience_s, 1.0, 3_600.0),
+    ):
+        if not low <= value <= high:
+            raise InputError(f"{name} {value:g}: should be between {low:g} and {high:g}")
+    if options.reaction not in REACTIONS:
+        raise InputError(f"--on-abort {options.reaction[:40]!r}: take {', '.join(REACTIONS)}")
+
+
+def _table(companion: Companion, frame: LocalFrame) -> str:
+    lines = ["t_s,uas,latitude_deg,longitude_deg,height_m"]
+    rows = companion.rows
+    for time_s, name, *place_m in rows:
+        latitude, longitude, height = frame.to_geodetic(place_m).tolist()
+        at_s = time_s - rows[0][0]
+        lines.append(f"{at_s:.2f},{name},{latitude:.8f},{longitude:.8f},{height:.3f}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,167 @@
+"""One autopilot at the other end of a MAVLink connection: what it reports, and what it is told."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.operations.frame import LocalFrame
+
+FloatArray = NDArray[np.float64]
+
+KINDS = ("udp", "udpin", "udpout", "tcp")
+"""Of connections: `udp` (or `udpin`) listens on a port, the others connect to one."""
+
+GUIDED, RTL, LAND, BRAKE = 4, 6, 9, 17
+"""Modes of ArduCopter."""
+
+_SET_MODE, _ARM, _TAKE_OFF, _INTERVAL = 176, 400, 22, 511
+_ARDUPILOT, _ARMED, _CUSTOM_MODE = 3, 128, 1
+_POSITION_MESSAGE, _POSITION_HZ = 33, 10
+_RELATIVE_FRAME = 6
+_TYPE_MASK = 0b1001_1100_0000
+"""Of SET_POSITION_TARGET_GLOBAL_INT: position, velocity and heading count."""
+
+
+class VehicleLink:
+    """A connection to one autopilot.
+
+    Attributes:
+        name: The UAS that it flies.
+        place_m: (3,) where it says it is; None before it has [m].
+        heard_s: When it was heard last, by the clock of the caller; None: never [s].
+        mode: Its mode; None before it has said.
+        armed: Whether it is armed.
+
+    Args:
+        name: The UAS that it flies.
+        address: `udp:HOST:PORT` or another of `KINDS`.
+        frame: Where on the Earth the plan is.
+
+    Raises:
+        InputError: The address is none, or cannot be used.
+    """
+
+    def __init__(self, name: str, address: str, frame: LocalFrame) -> None:
+        self.name, self.address, self._frame = name, address, frame
+        self.place_m: FloatArray | None = None
+        self.heard_s: float | None = None
+        self.mode: int | None = None
+        self.armed = False
+        self._system = 1
+        self._link = _connected(name, address)
+
+    def hear(self, now_s: float) -> None:
+        """Read what has arrived.
+
+        Args:
+            now_s: Time by the caller's clock [s].
+
+        Raises:
+            InputError: It is no ArduPilot.
+        """
+        while (message := self._link.recv_match(blocking=False)) is not None:
+            kind = message.get_type()
+            if message.get_srcComponent() != 1:
+                continue
+            if kind == "HEARTBEAT":
+                if message.autopilot != _ARDUPILOT:
+                    raise InputError(
+                        f"--connect {self.name}={self.address}: is no ArduPilot (autopilot "
+                        f"{message.autopilot}); stream knows only its modes"
+                    )
+                self._system = message.get_srcSystem()
+                self.mode = int(message.custom_mode)
+                self.armed = bool(message.base_mode & _ARMED)
+                self.heard_s = now_s
+            elif kind == "GLOBAL_POSITION_INT":
+                degrees = 1e-7 * message.lat, 1e-7 * message.lon
+                if abs(degrees[0]) <= 90.0 and abs(degrees[1]) <= 180.0:
+                    self.place_m = self._frame.to_ned(*degrees, 1e-3 * message.relative_alt)
+                    self.heard_s = now_s
+
+    def beat(self) -> None:
+        """Say that a ground station is here, and ask for positions often enough."""
+        self._link.mav.heartbeat_send(6, 8, 0, 0, 4)
+        self._command(_INTERVAL, _POSITION_MESSAGE, 1e6 / _POSITION_HZ)
+
+    def set_mode(self, mode: int) -> None:
+        """Ask for a mode."""
+        self._command(_SET_MODE, _CUSTOM_MODE, mode)
+
+    def arm(self) -> None:
+        """Ask it to arm."""
+        self._command(_ARM, 1)
+
+    def take_off(self, height_m: float) -> None:
+        """Ask it to climb to a height above home [m]."""
+        self._command(_TAKE_OFF, 0, 0, 0, 0, 0, 0, height_m)
+
+    def go(self, place_m: FloatArray, velocity_mps: FloatArray) -> None:
+        """Send where it is to be now, facing north, in degrees: its own metres are of a sphere.
+
+        Args:
+            place_m: (3,) [m].
+            velocity_mps: (3,) [m/s].
+        """
+        latitude, longitude, height = self._frame.to_geodetic(place_m).tolist()
+        whole = round(1e7 * latitude), round(1e7 * longitude)
+        velocity = (float(value) for value in velocity_mps)
+        self._link.mav.set_position_target_global_int_send(
+            0, self._system, 1, _RELATIVE_FRAME, _TYPE_MASK, *whole, height,
+            *velocity, 0.0, 0.0, 0.0, 0.0, 0.0,
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """End the connection."""
+        self._link.close()
+
+    def _command(self, command: int, *params: float) -> None:
+        padded = (*params, *(0.0,) * (7 - len(params)))
+        self._link.mav.command_long_send(self._system, 1, command, 0, *padded)
+
+    def off_m(self, place_m: FloatArray) -> float:
+        """How far it is from a place; infinite where it has not said [m]."""
+        if self.place_m is None:
+            return math.inf
+        return float(np.linalg.norm(self.place_m - place_m))
+
+
+def check_address(name: str, address: str) -> None:
+    """Refuse what is no address.
+
+    Args:
+        name: The UAS that it is for.
+        address: `udp:HOST:PORT` or another of `KINDS`.
+
+    Raises:
+        InputError: It is none.
+    """
+    kind, *where = address.split(":")
+    if kind not in KINDS or len(where) != 2 or not where[0] or not _is_port(where[1]):
+        raise InputError(
+            f"--connect {name[:40]}={address[:60]}: should be like udp:127.0.0.1:14550 "
+            f"({', '.join(KINDS)})"
+        )
+
+
+def _connected(name: str, address: str) -> Any:
+    os.environ.setdefault("MAVLINK20", "1")  # before the first import
+    from pymavlink import mavutil
+
+    check_address(name, address)
+    try:
+        return mavutil.mavlink_connection(address, source_system=255, robust_parsing=True)
+    except OSError as error:
+        raise InputError(
+            f"--connect {name}={address[:60]}: cannot be used ({error.strerror or error})"
+        ) from error
+
+
+def _is_port(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) <= 5 and 0 < int(text) < 65_536
