@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from distribution import rank_of, scope_of
+from distribution import rank_of, scope_of, write_seconds
 from quick_files import QUICK, is_quick
 
 TESTS = Path(__file__).parent
@@ -15,6 +15,23 @@ def pytest_addoption(parser):
         action="store_true",
         help="write the golden files of tests/golden anew instead of comparing with them",
     )
+    parser.addoption(
+        "--write-seconds",
+        action="store_true",
+        help="with -n: write how long what stays together took (tests/scope_seconds.json)",
+    )
+
+
+_seconds: dict[str, float] = {}
+
+
+def pytest_runtest_logreport(report):
+    _seconds[report.nodeid] = _seconds.get(report.nodeid, 0.0) + report.duration
+
+
+def pytest_sessionfinish(session):
+    if session.config.option.write_seconds and not hasattr(session.config, "workerinput"):
+        write_seconds(_seconds)
 
 
 def pytest_ignore_collect(collection_path, config):

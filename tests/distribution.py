@@ -1,30 +1,54 @@
 """Which tests stay together where several processes run the suite (`-n 2`), and which come first.
 
 Tests of a folder need the same kernels and fixtures: one process compiles and makes them, instead
-of each. What takes longest comes first, so that all processes end at about the same time.
+of each. What takes longest comes first, so that all processes end at about the same time. How long
+each takes is written by `python -m pytest -n 2 --write-seconds`, on a machine that does nothing
+else.
 """
 
-LONGEST_FIRST = (
-    "agents", "missions", "docs", "env", "test_house.py", "milp_mpc", "baselines", "compiled",
-    "cli",
-)  # fmt: skip
-"""Folders, and files beside them, by processor time; others follow in the order of their names."""
+import json
+from collections import Counter
+from pathlib import Path
+
+SECONDS_FILE = Path(__file__).with_name("scope_seconds.json")
+SECONDS: dict[str, float] = json.loads(SECONDS_FILE.read_text(encoding="utf-8"))
+"""What stays together -> how long it takes; what is not listed is taken for short."""
+
+FIRST = ("missions/test_evasion.py", "test_house.py")
+"""One process compiles what most others need, meanwhile the next one works without kernels."""
 
 APART = ("docs/test_documented_commands.py", "docs/test_notebooks.py")
 """Files whose tests have nothing in common and are long: each goes where there is time for it."""
 
+BY_FILE = ("baselines", "leaderboard", "milp_mpc", "missions")
+"""Folders whose files have nothing in common but kernels, which other folders need as well."""
 
-def scope_of(nodeid):
+
+def scope_of(nodeid: str) -> str:
     """What a test stays together with."""
     path = nodeid.partition("::")[0].removeprefix("tests/")
     if path in APART:
-        return nodeid
+        return nodeid.removeprefix("tests/")
     folder, slash, _ = path.partition("/")
-    return folder if slash else path
+    return folder if slash and folder not in BY_FILE else path
 
 
-def rank_of(nodeid):
+def rank_of(nodeid: str) -> tuple[int, float, str]:
     """Where a test stands in the order of the whole suite."""
-    top = nodeid.partition("::")[0].removeprefix("tests/").partition("/")[0]
-    first = LONGEST_FIRST.index(top) if top in LONGEST_FIRST else len(LONGEST_FIRST)
-    return first, scope_of(nodeid)
+    scope = scope_of(nodeid)
+    first = FIRST.index(scope) if scope in FIRST else len(FIRST)
+    return first, -SECONDS.get(scope, 0.0), scope
+
+
+def write_seconds(of_tests: dict[str, float], file: Path = SECONDS_FILE) -> None:
+    """Write how long each scope took, the longest first.
+
+    Args:
+        of_tests: Node id -> seconds.
+        file: Where to.
+    """
+    total = Counter[str]()
+    for nodeid, seconds in of_tests.items():
+        total[scope_of(nodeid)] += seconds
+    whole = {scope: round(seconds) for scope, seconds in total.most_common() if seconds >= 0.5}
+    file.write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")

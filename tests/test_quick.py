@@ -1,10 +1,11 @@
 """What the suite says of itself: its quick part, and how it is shared between processes."""
 
 import ast
+import json
 import re
 from pathlib import Path
 
-from distribution import APART, LONGEST_FIRST, rank_of, scope_of
+from distribution import APART, BY_FILE, FIRST, SECONDS, rank_of, scope_of, write_seconds
 from quick_files import QUICK, is_quick
 
 TESTS = Path(__file__).parent
@@ -62,18 +63,33 @@ def test_every_package_is_imported_by_a_quick_test():
 
 
 def test_tests_of_a_folder_stay_together_but_for_long_ones_that_share_nothing():
-    assert all((TESTS / name).exists() for name in (*LONGEST_FIRST, *APART))
+    assert all((TESTS / name).exists() for name in (*FIRST, *APART, *BY_FILE))
     one, other = "tests/env/test_batch.py::test_a[x::y]", "tests/env/test_actions.py::test_b"
     assert scope_of(one) == scope_of(other) == "env"
     assert scope_of("tests/test_house.py::test_c") == "test_house.py"
     page, next_page = (f"tests/{APART[0]}::test_d[{page}]" for page in "pq")
     assert scope_of(page) != scope_of(next_page)
+    file, next_file = (f"tests/{BY_FILE[0]}/test_{name}.py::test_e" for name in "ab")
+    assert scope_of(file) != scope_of(next_file)
 
 
 def test_the_longest_come_first_and_what_stays_together_in_one_piece():
-    files = [f"{top}/test_x.py" for top in LONGEST_FIRST if not top.endswith(".py")]
-    files += [top for top in LONGEST_FIRST if top.endswith(".py")]
-    nodes = [f"tests/{file}::test_y" for file in ("world/test_x.py", "routing/test_x.py", *files)]
-    ranked = [scope_of(node) for node in sorted(nodes, key=rank_of)]
-    assert ranked == [*LONGEST_FIRST, "routing", "world"]
-    assert rank_of(f"tests/{APART[0]}::test_d")[0] == LONGEST_FIRST.index("docs")
+    nodes = [f"tests/{s}" if ".py" in s else f"tests/{s}/test_x.py" for s in reversed(SECONDS)]
+    assert [scope_of(node) for node in nodes] == list(reversed(SECONDS))
+    nodes.append("tests/world/test_x.py::test_y")
+    ranked = [scope_of(name) for name in sorted(nodes, key=rank_of)]
+    assert ranked[: len(FIRST)] == list(FIRST)
+    seconds = [SECONDS[scope] for scope in ranked if scope in SECONDS and scope not in FIRST]
+    assert seconds == sorted(seconds, reverse=True)
+
+
+def test_what_is_timed_exists():
+    for scope in SECONDS:
+        assert (TESTS / scope.partition("::")[0]).exists(), f"{scope}: write the seconds anew"
+
+
+def test_seconds_are_added_up_and_read_again(tmp_path):
+    file = tmp_path / "seconds.json"
+    tests = {"tests/env/a.py::b": 1.0, "tests/env/c.py::d": 2.2, "tests/missions/e.py::f": 7.0}
+    write_seconds({**tests, "tests/world/g.py::h": 0.1}, file)
+    assert json.loads(file.read_text()) == {"missions/e.py": 7, "env": 3}

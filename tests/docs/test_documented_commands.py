@@ -8,14 +8,18 @@ from itertools import pairwise
 import pytest
 from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_modules
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
+from uas_coverage_baselines.reproduction import command as reproduction
 
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.cli import main
 
 QUICK = {"nearest-waypoint", "lawnmower", "learned-velocity"}
+FILMED = ["--steps", "72"]  # of what is flown quickly, where the page makes films of it
+SOON = "time_limit_s=0.5"  # of the paper's program, which else takes what it takes
+ALONE = ["--jobs", "1"]  # else each of them starts processes of its own
 SHORTER = {
     "run": ["--steps", "1"],
-    "reproduce": ["--steps", "2", "--seeds", "0:1"],
+    "reproduce": ["--steps", "2", "--seeds", "0:1", *ALONE],
     "score": ["--missions", "1", "--players", "nearest-waypoint"],
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }
@@ -23,15 +27,18 @@ COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--se
 DONE, FAILED = 0, 1
 
 
-def shortened(words):
+def shortened(words, filmed=False):
     """The command, cut short where it would take minutes."""
     if words[0] == "run" and any(word in QUICK for word in words):
-        return words
+        return [*words, *FILMED] if filmed else words
+    if words[0] == "run" and "milp-mpc-paper" in words:
+        limited = [SOON if word.startswith("time_limit_s=") else word for word in words]
+        words = limited if SOON in limited else [*words, "--option", SOON]
     if words[0] == "front":
         one = ["open_field", "--planner", "lawnmower", "--vary", "filter=true"]
-        return ["front", *one, "--out", words[words.index("--out") + 1]]
+        return ["front", *one, "--out", words[words.index("--out") + 1], *ALONE]
     if words[0] == "compare":
-        return [COMPARED.get(option, word) for option, word in pairwise(["", *words])]
+        return [*(COMPARED.get(option, word) for option, word in pairwise(["", *words])), *ALONE]
     return [*words, *SHORTER.get(words[0], [])]
 
 
@@ -52,13 +59,16 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
         monkeypatch.delenv(name, raising=False)
     # nobody is timed here, so nothing has to be compiled before the first decision
     monkeypatch.setattr(MovingHorizon, "warm_up", lambda planner, scenario: None)
+    monkeypatch.setattr(reproduction, "_QUICK_CAP_S", 0.2)  # of each of a dozen programs
     # what the reader brings along: a scenario of one's own, and what the page says to save
     save_modules(page, tmp_path)
     generate_scenario(seed=1, n_uas=1, n_waypoints=4, n_obstacles=2).to_file("my_area.toml")
     for block in blocks(page):
         if block.language == "toml" and block.text.startswith("schema"):
             (tmp_path / "garden.toml").write_text(block.text, encoding="utf-8")
-    for words in commands_of(page):
-        words = shortened(words)
+    commands = commands_of(page)
+    filmed = any({"--gif", "--video"} & set(words) for words in commands)
+    for words in commands:
+        words = shortened(words, filmed)
         # a player may fail its mission, and the text may say so; the command has done its work
         assert main(words) in (DONE, FAILED), f"{words}: {capsys.readouterr().err}"

@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
 from own_actions import CLIMB_RATE
 from own_disturbances import deviating, drained, gusts, push, weak_rotors
 
-SEED, N_LANES, N_STEPS = 7, 2, 13
-GROUND = practice_ground(n_uas=2, max_steps=6)
+SEED, N_LANES, N_STEPS = 7, 2, 11
+GROUND = practice_ground(n_uas=2, max_steps=5)
 OWN = (
     *disturbances_of(with_disturbances(GROUND, "moderate", 1)),
     gusts(),

@@ -15,7 +15,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.vehicle import limit_names
 
-N_LANES, N_STEPS = 2, 25
+N_LANES, N_STEPS = 2, 13
 
 
 def compare(ground):
@@ -71,7 +71,7 @@ def limits_exceeded():
 
 
 if __name__ == "__main__":
-    still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=10)
+    still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=5)
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
     high = with_roles(still.model_copy(update={"min_height_m": 6.0}))
     flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}

@@ -28,6 +28,7 @@ CHEAP = {
     "horizon": "10",
     "time_limit_s": "0.25",
     "threads": "1",
+    "teams": "2",
 }
 
 

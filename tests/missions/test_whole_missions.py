@@ -1,7 +1,9 @@
 """Whole missions of the MILP-MPC, judged by a checker that shares nothing with the world.
 
 The planner flies deterministically: its work is limited by nodes instead of the clock, so that a
-busy machine flies what an idle one flies.
+busy machine flies what an idle one flies. It plans one UAS after the other on a shorter horizon,
+which takes a tenth of the work; how good decisions are with all of it, joint program included, is
+seen in `tests/milp_mpc/test_village_decisions.py`.
 """
 
 import csv
@@ -16,12 +18,16 @@ from uas_coverage_env import Flight, generate_scenario, load_planner, load_scena
 from uas_coverage_env.cli import main
 
 PER_SEGMENT = 20
+IN_TURNS = {
+    "deterministic": "true", "at_once": "1", "horizon": "12", "teams": "2", "threads": "1",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def village(tmp_path_factory):
     directory = tmp_path_factory.mktemp("flights") / "village"
-    code = main(["run", "village", "--option", "deterministic=true", "--out", str(directory)])
+    options = [word for item in IN_TURNS.items() for word in ("--option", "=".join(item))]
+    code = main(["run", "village", *options, "--out", str(directory)])
     return code, directory
 
 
@@ -34,8 +40,8 @@ def test_the_village_is_covered_in_time_and_everybody_comes_home(village):
     assert summary["all_home"]
     assert summary["violations"] == []
     assert summary["breaches"] == 0
-    assert summary["steps"] <= 280
-    assert summary["energy_Wh"] <= 24.0
+    assert summary["steps"] <= 340, "324 when this was written"
+    assert summary["energy_Wh"] <= 27.5, "26.4 when this was written"
 
 
 @pytest.mark.slow
@@ -83,8 +89,7 @@ def test_the_summary_follows_from_the_rows_of_the_flight(village):
 @pytest.mark.parametrize(("seed", "n_uas"), [(11, 1), (13, 3), (14, 4)])
 def test_generated_missions_are_flown_without_a_violation(seed, n_uas):
     scenario = generate_scenario(seed, n_uas=n_uas, n_waypoints=9, n_obstacles=4)
-    planner = load_planner("milp-mpc", {"deterministic": "true", "teams": "3"})
-    flight = rollout(scenario, planner, seed=seed)
+    flight = rollout(scenario, load_planner("milp-mpc", IN_TURNS), seed=seed)
     assert flight.violations == ()
     assert flight.breaches == 0
     assert flight.covered[-1] == len(scenario.waypoints)
@@ -94,8 +99,7 @@ def test_generated_missions_are_flown_without_a_violation(seed, n_uas):
 
 @pytest.mark.slow
 def test_a_mixed_fleet_flies_through_the_corridor():
-    planner = load_planner("milp-mpc", {"deterministic": "true", "teams": "3"})
-    flight = rollout(load_scenario("corridor"), planner)
+    flight = rollout(load_scenario("corridor"), load_planner("milp-mpc", IN_TURNS))
     assert flight.violations == ()
     assert flight.breaches == 0
     assert flight.covered[-1] == len(flight.scenario.waypoints)

@@ -27,7 +27,7 @@ def star(radii, centre=(0.0, 0.0)):
 
 
 RADII = st.lists(st.floats(5.0, 300.0), min_size=3, max_size=12)
-PITCHES = st.tuples(st.floats(10.0, 60.0), st.floats(10.0, 60.0))
+PITCHES = st.tuples(st.floats(20.0, 60.0), st.floats(20.0, 60.0))  # finer takes many times longer
 
 
 def seen_from(places, pitch_m):
