@@ -4,13 +4,15 @@
     python benchmarks/paper_program.py village --out village --option gap=0.02 --option threads=2
 
 Solutions are kept in DIR/solutions as they come: the same command goes on where it was stopped
-(Ctrl-C), and `--page` puts its tables between the marks of a page. DIR/flight is the flight's
-directory, DIR/steps.csv what was solved, DIR/page.md the tables.
+(Ctrl-C), and `--page` puts its tables between the marks of a page, one line for every decision or
+for `--every` so many. DIR/flight is the flight's directory, DIR/steps.csv what was solved,
+DIR/page.md the tables.
 Exits with 1 where the mission is not accomplished or a decision was flown without a solution.
 """
 
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,7 +32,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import accomplished, energy_Wh
 from uas_coverage_env.scenario import Scenario
 
-MARK = "the paper's program, flown"
+MARK = "the paper's program, {mission}"
 console = Console(width=150)
 
 
@@ -98,6 +100,27 @@ def table_of(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def short_table_of(rows: list[dict[str, Any]], every: int) -> str:
+    """One line for so many decisions: median (most)."""
+    cells_of: dict[str, Callable[[dict[str, Any]], float | None]] = {
+        "rows": lambda row: row["rows"],
+        "columns": lambda row: row["columns"],
+        "whole": lambda row: row["whole"],
+        "gap, %": lambda row: None if row["gap"] is None else round(100.0 * row["gap"], 2),
+        "processor time, s": lambda row: round(row["processor_s"], 1),
+    }
+    heads = ["steps", "open", *cells_of]
+    lines = ["| " + " | ".join(heads) + " |", "|---|---|" + "---:|" * len(cells_of)]
+    for first in range(0, len(rows), every):
+        some = rows[first : first + every]
+        cells = [f"{some[0]['step']}–{some[-1]['step']}", f"{some[0]['open']}–{some[-1]['open']}"]
+        for value_of in cells_of.values():
+            values = [value for value in map(value_of, some) if value is not None]
+            cells.append(f"{np.median(values):.4g} ({max(values):g})" if values else "–")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 def _percent(gap: float | None) -> str:
     return "–" if gap is None else f"{100.0 * gap:.2f}"
 
@@ -133,6 +156,7 @@ def main(
     option: Annotated[list[str] | None, typer.Option(help="NAME=VALUE of the planner.")] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Stop after so many.")] = None,
     page: Annotated[Path | None, typer.Option(help="Page whose marks are filled.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Decisions per line of the page.")] = 1,
 ) -> None:
     """Fly a mission with `milp-mpc-paper` and tell every decision."""
     scenario = mission_of(mission)
@@ -179,11 +203,13 @@ def main(
         writer = csv.DictWriter(file, [*heads, "open", "modes", "gap"])
         writer.writeheader()
         writer.writerows(rows)
-    text = f"{summary_of(flight, rows)}\n\n{table_of(rows)}\n"
-    (out / "page.md").write_text(text, encoding="utf-8")
-    console.print(summary_of(flight, rows), highlight=False)
+    summary, table = summary_of(flight, rows), table_of(rows)
+    (out / "page.md").write_text(f"{summary}\n\n{table}\n", encoding="utf-8")
+    console.print(summary, highlight=False)
     if page is not None:
-        page.write_text(filled(page.read_text(encoding="utf-8"), text, MARK), encoding="utf-8")
+        text = f"{summary}\n\n{table if every == 1 else short_table_of(rows, every)}\n"
+        mark = MARK.format(mission=mission)
+        page.write_text(filled(page.read_text(encoding="utf-8"), text, mark), encoding="utf-8")
     if not accomplished(flight) or any(decision.fallback for decision in flight.decisions):
         raise typer.Exit(1)
 
