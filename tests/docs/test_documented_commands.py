@@ -3,6 +3,7 @@
 As they stand, but where a mission, a sweep or a training would take minutes: these are cut short.
 """
 
+from io import StringIO
 from itertools import pairwise
 
 import pytest
@@ -24,7 +25,7 @@ SHORTER = {
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }
 COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}
-DONE, FAILED = 0, 1
+DONE, FAILED, REFUSED = 0, 1, 2
 
 
 def shortened(words, filmed=False):
@@ -70,5 +71,10 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
     filmed = any({"--gif", "--video"} & set(words) for words in commands)
     for words in commands:
         words = shortened(words, filmed)
+        if words[0] == "stream":  # to vehicles that are not there: up to its question
+            monkeypatch.setattr("sys.stdin", StringIO("no\n"))
+            assert main(words) == REFUSED
+            assert "vehicles would arm and take off" in capsys.readouterr().err
+            continue
         # a player may fail its mission, and the text may say so; the command has done its work
         assert main(words) in (DONE, FAILED), f"{words}: {capsys.readouterr().err}"
