@@ -93,6 +93,7 @@ QUICK = {
         "only test_telemetry_holds_places_attitude_and_charge "
         "test_a_data_flash_log_holds_places_attitude_and_charge"
     ),
+    "operations/test_stream.py": "",
     "routing/test_order_search.py": "",
     "paper/test_battery_figure.py": "",
     "reproduction/test_comparison.py": "",

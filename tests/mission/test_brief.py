@@ -50,7 +50,7 @@ PUBLIC = {
     # these are handed over as they are
     Geofence: {"margin_m", "vertices_m"},
     Obstacle: {"name", "kind", "safe_distance_m", "vertices_m"},
-    Uas: {"name", "vehicle", "start_m", "soc_0", "radius_m", "dod_max", "sensors"},
+    Uas: {"name", "vehicle", "start_m", "soc_0", "radius_m", "dod_max", "sensors", "heading"},
     Waypoint: {
         *("kind", "position_m", "radius_m", "weight"),
         *("sensor", "heights_m", "max_speed_mps"),
