@@ -18,7 +18,6 @@ from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.vehicle import PSI
 
 _LEGEND_IN = 0.55
-_SEEN_TINTS = (colours.SKY, colours.ORANGE, colours.PURPLE, colours.YELLOW)
 _SEEN_ALPHA = 0.4
 
 
@@ -93,7 +92,7 @@ def _terrain(axes: Axes, flight: Flight) -> None:
 
 def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
     """The ground that cameras have seen, under waypoints and paths; darker where several have."""
-    for ground, tint in zip(seen, _SEEN_TINTS, strict=False):
+    for ground, tint in zip(seen, colours.SEEN, strict=False):
         if ground.seen.any():
             axes.contourf(
                 *(ground.east_m, ground.north_m, ground.seen.astype(float)),
@@ -212,6 +211,6 @@ def _legend(flight: Flight, seen: Sequence[SeenGround]) -> list[Line2D]:
             ms=7,
             label=f"seen by {ground.sensor}, {ground.share:.0%}",
         )
-        for ground, tint in zip(seen, _SEEN_TINTS, strict=False)
+        for ground, tint in zip(seen, colours.SEEN, strict=False)
     ]
     return [*marks, *charge]
