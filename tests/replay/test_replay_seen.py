@@ -30,8 +30,7 @@ def blind(mapped) -> Flight:
         each.model_copy(
             update={
                 "sensors": tuple(
-                    sensor.model_copy(update={"field_of_view_deg": None})
-                    for sensor in each.sensors
+                    sensor.model_copy(update={"field_of_view_deg": None}) for sensor in each.sensors
                 )
             }
         )
