@@ -1,6 +1,6 @@
 /*
 Built from viewer/ by "npm ci && npm run build"; do not edit.
-sources sha256:4b364b5d0acf33c8fbcb93fe13481d2c3d72065ca5b82d8b4544e0e5dabba44b
+sources sha256:844681a52cf82c41c4f4e638f373d01ae9dc36f1e3f5efe52eaf7e098ff1614d
 
 Contains three.js 0.187.0:
 
