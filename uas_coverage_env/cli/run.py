@@ -14,6 +14,7 @@ from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.options import options_of
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
+from uas_coverage_env.cli.settings import from_settings
 from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
@@ -81,6 +82,14 @@ def run(
             help="Serve the replay page while it is planned, on this machine alone (127.0.0.1).",
         ),
     ] = False,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file with any of these options, and `scenario`; typed ones win.",
+            callback=from_settings,
+            is_eager=True,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Flight directory; default: flights/SCENARIO-PLANNER-SEED, numbered."),
