@@ -60,9 +60,9 @@ def decision_time_figure(flight: Flight) -> Figure:
             )
         shares.xaxis.set_major_formatter(PercentFormatter(1.0))
         shares.set(xlabel="Share of decisions", xlim=(0, 1.02))
-        limit_s = flight.planner_options.get("time_limit_s")
-        limited = isinstance(limit_s, int | float) and bool(np.isfinite(limit_s))
-        if limited:
+        given = flight.planner_options.get("time_limit_s")
+        limit_s = float(given) if isinstance(given, int | float) and np.isfinite(given) else 0.0
+        if limit_s > 0.0:
             for axis in (series, shares):
                 axis.axhline(scale * limit_s, color=shade(colours.RED), linewidth=0.8, ls=":")
             series.annotate(
@@ -75,7 +75,7 @@ def decision_time_figure(flight: Flight) -> Figure:
                 fontsize=8,
             )
         shown_s = later_s if durations_s[0] > _OFF_SCALE * later_s else durations_s.max()
-        drawn = max(scale * shown_s, scale * limit_s if limited else 0.0)
+        drawn = scale * max(float(shown_s), limit_s)
         series.set_ylim(bottom=0, top=1.12 * drawn)
         if durations_s[0] > _OFF_SCALE * later_s:
             series.annotate(

@@ -68,7 +68,7 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         _seen_ground(axes, seen)
         _waypoints(axes, flight, now)
         _heights(axes, flight, float((high - low)[1]) / (width_in() * _PT_PER_IN))
-        _north(axes)
+        _north(figure, axes)
         _moving_obstacles(axes, flight, now)
         for i in range(len(flight.names)):
             _uas(axes, flight, now, i)
@@ -147,7 +147,7 @@ def _heights(axes: Axes, flight: Flight, m_per_pt: float) -> None:
             axes.text(*place, words, color=ink, fontsize=_LABEL_PT, ha="center", va="center")
 
 
-def _north(axes: Axes) -> None:
+def _north(figure: Figure, axes: Axes) -> None:
     """An arrow to the north, beside the upper right corner."""
     axes.annotate(
         "N",
@@ -158,7 +158,7 @@ def _north(axes: Axes) -> None:
         ha="center",
         fontsize=8,
     )
-    corner = offset_copy(axes.transAxes, axes.figure, x=9, y=-12, units="points")
+    corner = offset_copy(axes.transAxes, figure, x=9, y=-12, units="points")
     axes.plot(1.0, 1.0, marker="^", ms=5, color=shade(colours.INK), transform=corner, clip_on=False)
 
 

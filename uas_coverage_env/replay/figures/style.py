@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import matplotlib.style
+from matplotlib import style as styles
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -74,14 +74,12 @@ def columns_of(words: int, most: int) -> int:
 
 
 def _settings(style: str) -> dict[Any, Any]:
-    if style in mpl.style.library:
-        return dict(mpl.style.library[style])
+    if style in styles.library:
+        return dict(styles.library[style])
     path = Path(style)
     if path.suffix != ".mplstyle":
-        known = ", ".join(name for name in mpl.style.available if not name.startswith("_"))
-        close = did_you_mean(
-            style, mpl.style.available, f"take the path of an .mplstyle or {known}"
-        )
+        known = ", ".join(name for name in styles.available if not name.startswith("_"))
+        close = did_you_mean(style, styles.available, f"take the path of an .mplstyle or {known}")
         raise InputError(f"unknown style {style[:80]!r}; {close}")
     try:
         return dict(mpl.rc_params_from_file(path, fail_on_error=True, use_default_template=False))
