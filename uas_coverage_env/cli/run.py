@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 from typing import Annotated
@@ -122,9 +123,11 @@ def run(
     check_directory(directory, overwrite=overwrite)
 
     screen = console(quiet=quiet or as_json)
+    window = ExitStack()
 
     def fly(what: Scenario) -> Flight:
-        with shown(screen, what, watch=player if watch else None, live=live) as on_step:
+        watched, after = player if watch else None, window if sorties is None else None
+        with shown(screen, what, watch=watched, live=live, after=after) as on_step:
             return rollout(
                 what,
                 player,
@@ -150,6 +153,8 @@ def run(
     report_flight(screen, flight, directory)
     if as_json:
         typer.echo(json.dumps(data(flight, str(directory)), indent=2))
+    if flight.ended != "stopped":
+        window.close()
     raise typer.Exit(_exit_code(flight, steps))
 
 
