@@ -1,6 +1,6 @@
 /*
 Built from viewer/ by "npm ci && npm run build"; do not edit.
-sources sha256:844681a52cf82c41c4f4e638f373d01ae9dc36f1e3f5efe52eaf7e098ff1614d
+sources sha256:abcc386a3526b169b095bb09dcebbfcbfd949ab8451b00eac6343d3064ad8533
 
 Contains three.js 0.187.0:
 
