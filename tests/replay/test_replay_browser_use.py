@@ -11,7 +11,6 @@ import pytest
 from chromium import (
     DESKTOP,
     PHONE,
-    SMALL,
     cards,
     complaints,
     needs_chromium,
@@ -174,18 +173,16 @@ def test_a_picture_and_a_table_come_out_of_the_page(browser, page, flight, tmp_p
     assert complaints(browser) == []
 
 
-@pytest.mark.parametrize(
-    ("size", "view"), [(SMALL, "map"), (PHONE, "map"), (PHONE, "3d")], ids=["map", "phone", "3d"]
-)
-def test_a_film_comes_out_of_the_page(browser, page, tmp_path, size, view):
-    opened(browser, page, size, moment=f"#view={view}&t=58")
+@pytest.mark.parametrize("view", ["map", "3d"])
+def test_a_film_comes_out_of_the_page_on_a_phone(browser, page, tmp_path, view):
+    opened(browser, page, PHONE, moment=f"#view={view}&t=58")
     browser.execute_cdp_cmd(
         "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)}
     )
     saved = Select(browser.find_element(By.CSS_SELECTOR, "select[aria-label=Save]"))
     assert "film" in [option.get_attribute("value") for option in saved.options]
     saved.select_by_value("film")
-    deadline_s = time.monotonic() + 20.0
+    deadline_s = time.monotonic() + 60.0
     while not list(tmp_path.glob("*.webm")) and time.monotonic() < deadline_s:
         time.sleep(0.1)
     (film,) = tmp_path.glob("village-nearest-waypoint.webm")
