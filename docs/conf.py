@@ -38,7 +38,7 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 
 html_theme = "furo"
-html_title = project
+html_title = f"{project} {release}"
 html_copy_source = False
 html_show_copyright = False
 html_extra_path = ["scenario.schema.json"]

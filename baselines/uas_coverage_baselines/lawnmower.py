@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegPilot
-from uas_coverage_baselines.targets import Targets
+from uas_coverage_baselines.targets import Targets, warm_up_once
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import Handover, MissionBrief
 from uas_coverage_env.vehicle import dod_per_s
@@ -26,6 +26,10 @@ class Lawnmower:
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()
         self.assistants = self.options.assistants
+
+    def warm_up(self, brief: MissionBrief) -> None:
+        """Compile what the first decision compiles."""
+        warm_up_once(self, brief)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Order the waypoints and cut the order into runs of about equal time."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from uas_coverage_baselines.targets import Targets
+from uas_coverage_baselines.targets import Targets, warm_up_once
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
@@ -16,6 +16,10 @@ class NearestWaypoint:
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()
         self.assistants = self.options.assistants
+
+    def warm_up(self, brief: MissionBrief) -> None:
+        """Compile what the first decision compiles."""
+        warm_up_once(self, brief)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Forget the targets of the mission before."""

@@ -5,8 +5,26 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission import Approach, Attempts, Handover, MissionBrief, WorldView
+from uas_coverage_env.flight import Planner
+from uas_coverage_env.mission import (
+    Approach,
+    Attempts,
+    Handover,
+    MissionBrief,
+    WorldView,
+    first_sight,
+)
 from uas_coverage_env.world import Command, GoTo, SwarmState
+
+_READY: set[type] = set()
+
+
+def warm_up_once(planner: Planner, brief: MissionBrief) -> None:
+    """Let a planner decide before anything counts: its first decision in a process compiles."""
+    if type(planner) not in _READY:
+        planner.reset(brief, 0)
+        planner.act(first_sight(brief))
+        _READY.add(type(planner))
 
 
 class Targets:

@@ -232,3 +232,19 @@ def test_the_village_is_covered_and_everybody_comes_home(village, planner):
     flight = rollout(village, planner)
     assert accomplished(flight)
     assert flight.breaches == 0
+
+
+@pytest.mark.parametrize("planner", [NearestWaypoint, Lawnmower])
+def test_what_the_first_decision_compiles_is_compiled_before_it(planner):
+    class Counting(planner):
+        acted = 0
+
+        def act(self, swarm):
+            Counting.acted += 1
+            return super().act(swarm)
+
+    scenario = load_scenario("open_field")
+    flights = [rollout(scenario, Counting(), max_steps=3) for _ in range(2)]
+    assert [len(flight.decisions) for flight in flights] == [3, 3]
+    assert Counting.acted == 1 + 3 + 3, "once in a process, and no more"
+    assert np.array_equal(flights[0].x, flights[1].x)

@@ -7,7 +7,7 @@ import re
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
@@ -267,6 +267,19 @@ def test_a_watched_flight_is_shown_in_a_window_with_what_is_planned(monkeypatch)
     assert pygame.display.get_surface() is None
     assert isinstance(screen.file, io.StringIO)
     assert "map of letters" not in screen.file.getvalue()
+
+
+def test_the_end_of_a_watched_flight_is_shown_until_the_flight_was_told_of(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    scenario = load_scenario("open_field")
+    planner = load_planner("hover")
+    with ExitStack() as after:
+        with shown(terminal(), scenario, watch=planner, after=after) as on_step:
+            rollout(scenario, planner, max_steps=2, on_step=on_step)
+        assert pygame.display.get_surface() is not None
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_SPACE))
+    assert pygame.display.get_surface() is None
 
 
 def test_a_flight_goes_on_where_a_person_closes_the_window(monkeypatch):

@@ -56,11 +56,11 @@ def blocks(page: Path) -> Iterator[Block]:
     assert start is None, f"{page.name}: the block of line {start} has no end"
 
 
-def save_modules(page: Path, folder: Path) -> None:
-    """Write the modules that a page says to save: Python blocks that begin with `# NAME.py`."""
+def save_files(page: Path, folder: Path) -> None:
+    """Write the files that a page says to save: Python and TOML that begin with `# NAME`."""
     for block in blocks(page):
-        named = re.match(r"# (\w+\.py)\n", block.text)
-        if block.language == "python" and named:
+        named = re.match(r"# (\w+\.(?:py|toml))\n", block.text)
+        if block.language in ("python", "toml") and named:
             (folder / named[1]).write_text(block.text, encoding="utf-8")
 
 

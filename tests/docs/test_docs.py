@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 import typer
-from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_modules
+from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_files
 from typer.core import TyperGroup
 
 from uas_coverage_env.cli.app import command_group
@@ -58,6 +58,8 @@ def test_formulas_are_drawn_by_the_browser(site):
 @pytest.mark.parametrize("page", WITH_CODE, ids=shown)
 def test_the_python_blocks_of_a_page_run_one_after_the_other(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    save_files(page, tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
     names = {"__name__": "page"}
     for block in blocks(page):
         if block.language == "python":
@@ -69,7 +71,7 @@ def test_the_python_blocks_of_a_page_run_one_after_the_other(page, tmp_path, mon
 @pytest.mark.parametrize("page", WITH_COMMANDS, ids=shown)
 def test_the_command_line_understands_every_command_of_a_page(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    save_modules(page, tmp_path)
+    save_files(page, tmp_path)
     for words in command_lines(page):
         if words[0] == "uas-coverage":
             understood(words)

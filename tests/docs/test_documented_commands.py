@@ -7,7 +7,7 @@ from io import StringIO
 from itertools import pairwise
 
 import pytest
-from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_modules
+from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_files
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.reproduction import command as reproduction
 
@@ -62,7 +62,7 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
     monkeypatch.setattr(MovingHorizon, "warm_up", lambda planner, scenario: None)
     monkeypatch.setattr(reproduction, "_QUICK_CAP_S", 0.2)  # of each of a dozen programs
     # what the reader brings along: a scenario of one's own, and what the page says to save
-    save_modules(page, tmp_path)
+    save_files(page, tmp_path)
     generate_scenario(seed=1, n_uas=1, n_waypoints=4, n_obstacles=2).to_file("my_area.toml")
     for block in blocks(page):
         if block.language == "toml" and block.text.startswith("schema"):

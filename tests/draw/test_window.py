@@ -90,6 +90,16 @@ def test_each_press_of_a_step_key_shows_one_picture_more(window, naps, key):
     assert not naps
 
 
+@pytest.mark.parametrize("how", [escape, button, lambda: press(pygame.K_SPACE)])
+def test_the_last_picture_stays_until_a_person_closes_the_window(window, naps, how):
+    naps += [nothing, nothing, how]
+    window.stay()
+    assert not naps
+    assert window.dismissed
+    assert pygame.display.get_surface() is None
+    window.stay()
+
+
 @pytest.mark.parametrize("paused", [False, True])
 @pytest.mark.parametrize("how", [escape, button])
 def test_a_window_that_a_person_closes_never_waits_again(window, naps, how, paused):

@@ -8,7 +8,7 @@ import pytest
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.flight import footprints_m, seen_ground, summary
+from uas_coverage_env.flight import footprints_m, seen_ground, seen_pictures, summary
 from uas_coverage_env.scenario import Decoration, Scenario, Sensor
 from uas_coverage_env.vehicle import PHI, PSI, THETA, Z
 
@@ -124,3 +124,18 @@ def test_without_cameras_nothing_is_said_of_it():
     flight = flown(hovering([Sensor(name="gas")]))
     assert seen_ground(flight) == ()
     assert "seen_ground" not in summary(flight)
+
+
+def test_pictures_with_new_ground_hold_all_that_is_seen_and_say_when():
+    flight = flown(hovering([CAMERA, FIXED.model_copy(update={"name": "fixed"})]), steps=4)
+    x = flight.x.copy()
+    x[2:, 0, 0] += 30.0  # it stands for two samples, jumps, and stands again
+    moved = dataclasses.replace(flight, x=x)
+    for pictures, ground in zip(seen_pictures(moved), seen_ground(moved), strict=True):
+        assert pictures.sensor == ground.sensor
+        assert pictures.sample.tolist() == [0, 2]
+        assert pictures.corners_m[0, :, 0].mean() == pytest.approx(100.0, abs=0.5)
+        assert pictures.corners_m[1, :, 0].mean() == pytest.approx(130.0, abs=0.5)
+        for k, share in enumerate(pictures.share):
+            (until,) = (g for g in seen_ground(moved, k) if g.sensor == pictures.sensor)
+            assert share == pytest.approx(until.share)

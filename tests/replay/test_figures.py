@@ -12,9 +12,11 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, DecisionRecord
 from uas_coverage_env.replay.figures import (
     KINDS,
+    WIDTH_IN,
     battery_figure,
     decision_time_figure,
     learning_curve,
+    look,
     map_figure,
     modes_figure,
     save_figure,
@@ -57,7 +59,7 @@ def test_the_map_shows_what_was_flown_and_predicted_until_a_step(flight):
         predicted = rows["position_m"][:, [1, 0]]
         assert any(line.shape == predicted.shape and (line == predicted).all() for line in drawn)
     assert f"{flight.covered[25]} of 49" in axes.get_title()
-    assert {text.get_text() for text in axes.texts} == {"uas_1", "uas_2"}
+    assert {"uas_1", "uas_2"} <= {text.get_text() for text in axes.texts}
 
 
 def test_the_map_shows_the_last_sample_by_default(flight):
@@ -75,6 +77,66 @@ def test_the_map_shows_the_ground_that_a_camera_has_seen(flight):
     seen = dataclasses.replace(flight, scenario=flight.scenario.model_copy(update={"uas": fleet}))
     texts = [text.get_text() for text in map_figure(seen).legends[0].texts]
     assert any(text.startswith("seen by camera, ") for text in texts)
+
+
+def test_the_map_has_north_heights_and_a_legend_of_all_that_is_on_it(flight):
+    figure = map_figure(flight, step=25)
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    heights = {f"{np.ptp(hull.vertices_m[:, 2]):.0f} m" for hull in flight.scenario.hulls}
+    assert "N" in texts
+    assert heights <= set(texts)
+    entries = [text.get_text() for text in figure.legends[0].texts]
+    kinds = {item.kind.replace("_", " ") for item in flight.scenario.obstacles}
+    assert {"waypoint", "weighs more", "covered", "flown", "predicted", "water"} | kinds <= {
+        *entries
+    }
+    assert len(entries) == len(set(entries))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_figures_are_as_wide_as_asked_and_narrow_ones_hold_their_legends(kind, flight):
+    with look(width_in=88 / 25.4):
+        figure = KINDS[kind](flight)
+    assert figure.get_size_inches()[0] == pytest.approx(88 / 25.4)
+    figure.canvas.draw()
+    for legend in figure.legends:
+        box = legend.get_window_extent()
+        assert box.x0 >= 0
+        assert box.x1 <= figure.bbox.x1
+    assert KINDS[kind](flight).get_size_inches()[0] == pytest.approx(WIDTH_IN)
+
+
+def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path):
+    path = tmp_path / "paper.mplstyle"
+    path.write_text("lines.linewidth: 3.25\n")
+    for style, width in ((str(path), 3.25), (None, 1.1)):
+        with look(style=style):
+            soc, *_ = battery_figure(flight).axes
+        assert soc.get_lines()[-2].get_linewidth() == width
+
+
+@pytest.mark.parametrize(
+    ("style", "message"),
+    [
+        ("ggplott", "unknown style 'ggplott'; did you mean ggplot"),
+        ("missing.mplstyle", "missing.mplstyle: no such file"),
+        ("broken.mplstyle", "broken.mplstyle: is no style of matplotlib"),
+    ],
+)
+def test_a_style_that_cannot_be_taken_is_told_in_a_line(style, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("broken.mplstyle").write_text("font.size: large and red\n")
+    with pytest.raises(InputError, match=message) as refusal, look(style=style):
+        pass
+    assert "\n" not in str(refusal.value)
+
+
+def test_the_first_decision_does_not_set_the_axis(plain):
+    times_s = [30.0, *np.linspace(0.2, 0.4, plain.steps - 1)]
+    decisions = tuple(DecisionRecord(time_s) for time_s in times_s)
+    series, _ = decision_time_figure(dataclasses.replace(plain, decisions=decisions)).axes
+    assert 0.4 < series.get_ylim()[1] < 0.5
+    assert any("first: 30 s" in text.get_text() for text in series.texts)
 
 
 def test_a_step_that_was_not_flown_is_refused(flight):

@@ -8,13 +8,13 @@ import urllib.request
 from urllib.parse import urlsplit
 
 import pytest
-from chromium import complaints, needs_chromium, time_s
+from chromium import SMALL, complaints, emulate, needs_chromium, opened, pixels, settled, time_s
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.flight import load_planner, rollout
-from uas_coverage_env.replay import LivePage
+from uas_coverage_env.replay import LivePage, write_replay
 from uas_coverage_env.scenario import load_scenario
 
 
@@ -148,3 +148,35 @@ def test_a_browser_goes_on_with_the_flight_until_it_ends(browser, plain):
     wait.until(lambda _: browser.find_elements(By.CSS_SELECTOR, "body.ended"))
     assert time_s(browser) == plain.steps
     assert complaints(browser) == []
+
+
+@needs_chromium
+@pytest.mark.parametrize("view", ["map", "3d"])
+def test_a_live_flight_is_drawn_as_it_grows(browser, plain, tmp_path, view):
+    """What is drawn of its first samples is the picture of a replay page of as many."""
+    pictures = {}
+    for samples in (3, 31):
+        begun = write_replay([until(plain, samples)], tmp_path / f"{samples}.html")
+        opened(browser, begun, SMALL, moment=f"#view={view}&t={samples - 1}")
+        pictures[samples] = pixels(browser, ".stage")
+    page = LivePage(until(plain, 3))
+    browser.get("about:blank")
+    emulate(browser, SMALL, "light")
+    browser.get(f"{page.address}#view={view}&t=2")
+    wait = WebDriverWait(browser, 30)
+    for samples in (3, 31):
+        if samples > 3:
+            page.update(until(plain, samples))
+        wait.until(lambda _, k=samples: page_time_is(browser, k - 1))
+        settled(browser)
+        drawn = pixels(browser, ".stage")
+        assert (drawn != pictures[samples]).any(axis=2).mean() < 0.01
+        if samples > 3:
+            # not for being the same all the time
+            assert (drawn != pictures[3]).any(axis=2).mean() > 0.01
+    page.close(plain)
+    assert complaints(browser) == []
+
+
+def page_time_is(driver, k) -> bool:
+    return bool(driver.find_elements(By.CLASS_NAME, "time")) and time_s(driver) == k

@@ -166,3 +166,10 @@ def test_a_mistake_in_a_vehicle_file_is_reported_with_the_field_that_names_it(tm
     (tmp_path / "own.toml").write_text("name = 3\n", encoding="utf-8")
     line = mistake_in(tmp_path, TEXT.replace('"s500_v2"', '"own.toml"', 1))
     assert line.startswith(f"uas[0].vehicle: {tmp_path / 'own.toml'}: ")
+
+
+@pytest.mark.parametrize("name", ["area.kml", "areas/site.GeoJSON", "survey.plan"])
+def test_a_drawn_area_is_no_scenario_yet_and_the_message_says_how_it_becomes_one(name):
+    with pytest.raises(InputError, match="uas-coverage import") as refusal:
+        load_scenario(name)
+    assert f"--out {name.rpartition('/')[2].partition('.')[0]}.toml" in str(refusal.value)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SUFFIXES = (".pdf", ".svg", ".png")
+_MM_PER_IN = 25.4
 _LEADERBOARD, _TRAINING = "leaderboard", "training"
 _FLIGHT_KINDS = "map, battery, modes, decision-time"
 
@@ -34,6 +35,19 @@ def figure(
     ],
     step: Annotated[
         int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")
+    ] = None,
+    width: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", min=40.0, max=1000.0, help="Width in millimetres; default: 160."
+        ),
+    ] = None,
+    style: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="A style of matplotlib, or an .mplstyle file, that wins over ours.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="A .pdf, .svg or .png; default: DIR/KIND.pdf.")
@@ -58,11 +72,9 @@ def figure(
     try:
         from uas_coverage_env.replay.figures import (
             CURVE,
-            KINDS,
-            map_figure,
+            WIDTH_IN,
+            look,
             save_figure,
-            training_figure,
-            with_baselines,
         )
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
@@ -72,18 +84,23 @@ def figure(
         ) from error
     for directory in directories:
         _check_sort(directory, kind, CURVE)
-    drawn: Figure
+    width_in = WIDTH_IN if width is None else width / _MM_PER_IN
+    with look(width_in, style):
+        save_figure(_drawn(directories, kind, step), path)
+    console().print(f"figure in {path}", markup=False)
+
+
+def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
+    from uas_coverage_env.replay.figures import KINDS, map_figure, training_figure, with_baselines
+
     if kind == _LEADERBOARD:
         rows, reference = published(directories[0])
-        drawn = leaderboard_figure(scores_of(rows, reference), rows, reference)
-    elif kind == _TRAINING:
-        drawn = training_figure(with_baselines(_named(directories)))
-    elif step is not None:
-        drawn = map_figure(Flight.load(directories[0]), step=step)
-    else:
-        drawn = KINDS[kind](Flight.load(directories[0]))
-    save_figure(drawn, path)
-    console().print(f"figure in {path}", markup=False)
+        return leaderboard_figure(scores_of(rows, reference), rows, reference)
+    if kind == _TRAINING:
+        return training_figure(with_baselines(_named(directories)))
+    if step is not None:
+        return map_figure(Flight.load(directories[0]), step=step)
+    return KINDS[kind](Flight.load(directories[0]))
 
 
 def _check_sort(directory: Path, kind: str, curve: str) -> None:

@@ -14,6 +14,8 @@ from uas_coverage_env.flight import (
 
 _ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped by hand"}
 NONE = "-"
+_ALIKE = 0.005
+_WORDS = {True: "more energy than", False: "less energy than"}
 
 
 def verdict(flight: Flight) -> str:
@@ -28,6 +30,21 @@ def verdict(flight: Flight) -> str:
         _several(len(flight.violations), "violation"),
     ]
     return f"mission not accomplished: {'; '.join(filter(None, lacks))}"
+
+
+def beside_the_best(flight: Flight) -> str:
+    """A flight beside the best one known of its mission, in a line; empty where none is known."""
+    from uas_coverage_env.leaderboard.best_flown import best_flown
+
+    best = best_flown(flight.scenario) if flight.dynamics == "lpv" else None
+    if best is None:
+        return ""
+    known = f"{best.energy_Wh:.2f} Wh in {best.steps} steps, by {best.planner}"
+    if not accomplished(flight):
+        return f"the best flight known of this mission: {known}"
+    more = sum(energy_Wh(flight)) / best.energy_Wh - 1.0
+    much = "as much energy as" if abs(more) < _ALIKE else f"{abs(more):.0%} {_WORDS[more > 0]}"
+    return f"{much} the best flight known of this mission ({known})"
 
 
 def figures(flight: Flight) -> dict[str, str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from uas_coverage_env.cli.figures_of_flight import by_uas, verdict
+from uas_coverage_env.cli.figures_of_flight import beside_the_best, by_uas, verdict
 from uas_coverage_env.flight import (
     Flight,
     accomplished,
@@ -51,6 +51,8 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         share = filtered_share(flight)
         screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)
     screen.print(verdict(flight), markup=False, style="green" if accomplished(flight) else "red")
+    if best := beside_the_best(flight):
+        screen.print(best, markup=False)
     screen.print(f"flight in {directory}", markup=False)
     screen.print(f"to watch it: uas-coverage replay {directory}", markup=False)
     screen.print(f"beside the least energy: uas-coverage show {directory} --bound", markup=False)

@@ -24,7 +24,12 @@ _NO_CHARGE = {LANDED: "landed", LOST: "lost"}
 
 @contextmanager
 def shown(
-    out: Console, scenario: Scenario, *, watch: Planner | None = None, live: bool = False
+    out: Console,
+    scenario: Scenario,
+    *,
+    watch: Planner | None = None,
+    live: bool = False,
+    after: ExitStack | None = None,
 ) -> Iterator[Callable[[Progress], object]]:
     """Show how a flight goes: gives the function that `rollout` calls in every step.
 
@@ -34,12 +39,14 @@ def shown(
         watch: The planner, if the flight is to be watched: in a window, or as an ASCII map where
             there is no display.
         live: Serve the replay page of the flight while it is flown.
+        after: On a terminal, the window stays open until this ends and a person closes it.
     """
     window = None if watch is None else _window(out, scenario, watch)
     ascii_map = None
     if watch is not None and window is None:
         ascii_map = AsciiMap(scenario, *out.size)
     server = LiveView(out) if live else None
+    flown = False
     try:
         with _lines(out, ascii_map) as write:
 
@@ -51,10 +58,14 @@ def shown(
                     server(progress)
 
             yield update
+        flown = True
     finally:
         if server is not None:
             server.close()
-        if window is not None:
+        if window is not None and flown and after is not None and out.is_terminal:
+            after.callback(window.close)
+            after.callback(window.stay)
+        elif window is not None:
             window.close()
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +15,7 @@ from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.options import options_of
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
+from uas_coverage_env.cli.settings import from_settings
 from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
@@ -81,6 +83,14 @@ def run(
             help="Serve the replay page while it is planned, on this machine alone (127.0.0.1).",
         ),
     ] = False,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file with any of these options, and `scenario`; typed ones win.",
+            callback=from_settings,
+            is_eager=True,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Flight directory; default: flights/SCENARIO-PLANNER-SEED, numbered."),
@@ -113,9 +123,11 @@ def run(
     check_directory(directory, overwrite=overwrite)
 
     screen = console(quiet=quiet or as_json)
+    window = ExitStack()
 
     def fly(what: Scenario) -> Flight:
-        with shown(screen, what, watch=player if watch else None, live=live) as on_step:
+        watched, after = player if watch else None, window if sorties is None else None
+        with shown(screen, what, watch=watched, live=live, after=after) as on_step:
             return rollout(
                 what,
                 player,
@@ -141,6 +153,8 @@ def run(
     report_flight(screen, flight, directory)
     if as_json:
         typer.echo(json.dumps(data(flight, str(directory)), indent=2))
+    if flight.ended != "stopped":
+        window.close()
     raise typer.Exit(_exit_code(flight, steps))
 
 

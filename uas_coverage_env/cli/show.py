@@ -8,7 +8,14 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from uas_coverage_env.cli.figures_of_flight import NONE, by_uas, data, figures, verdict
+from uas_coverage_env.cli.figures_of_flight import (
+    NONE,
+    beside_the_best,
+    by_uas,
+    data,
+    figures,
+    verdict,
+)
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.flight import Flight, accomplished
 
@@ -58,6 +65,8 @@ def show(
         for violation in flight.violations:
             out.print(f"violation: {violation}", markup=False)
         out.print(verdict(flight), markup=False)
+        if best := beside_the_best(flight):
+            out.print(best, markup=False)
 
 
 def _print_json(

@@ -1,5 +1,7 @@
 """What `run --watch` opens where there is a display: the flight as it is planned, in a window."""
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,6 +48,11 @@ class FlightWindow:
                 planned_m=decision.predicted_m if decision is not None else None,
             )
         )
+
+    def stay(self) -> None:
+        """Show the end until a person closes the window, or stops the program."""
+        with suppress(KeyboardInterrupt):
+            self._window.stay()
 
     def close(self) -> None:
         """Close the window; closing it twice does no harm."""

@@ -39,6 +39,9 @@ OTHER_OBSTACLE: Colour = (168, 168, 164)
 DECORATIONS: dict[str, Colour] = {"water": (166, 206, 232), "pad": (208, 208, 204)}
 OTHER_DECORATION: Colour = (222, 216, 200)
 
+SEEN: tuple[Colour, ...] = (SKY, ORANGE, PURPLE, YELLOW)
+"""Ground that cameras have seen, a tint for each kind of camera."""
+
 
 def shaded(colour: Colour, factor: float) -> Colour:
     """The colour darkened (factor < 1) or lightened, within what a byte can hold."""

@@ -38,7 +38,7 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
     draw = ImageDraw.Draw(image)
     fence = _outline(scenario.fence.vertices_m)
     draw.polygon(_flat(frame.pixels(fence)), fill=colours.GROUND)
-    _grid(image, draw, frame, fence)
+    beside_scale = _grid(image, draw, frame, fence)
     for decoration in scenario.decorations:
         fill = colours.DECORATIONS.get(decoration.kind or "", colours.OTHER_DECORATION)
         corners = _flat(frame.pixels(np.array(decoration.polygon_m)))
@@ -53,13 +53,20 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
         _obstacle(image, draw, frame, obstacle.kind or "", hull, marks)
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
+    _north(image, draw, frame, beside_scale)
     _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
     _margins(image, draw, frame, scenario.name)
     return image
 
 
-def _grid(image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]) -> None:
-    """Lines every 1, 2 or 5 × 10^k metres, about five over the map, and how far apart they are."""
+def _grid(
+    image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Lines every 1, 2 or 5 × 10^k metres, about five over the map, and how far apart they are.
+
+    Returns:
+        The place beside the scale bar.
+    """
     extent_m = np.ptp(fence, axis=0).max()
     power = 10.0 ** np.floor(np.log10(extent_m / 4))
     step_m = power * max(factor for factor in (1, 2, 5) if factor * power <= extent_m / 4)
@@ -74,6 +81,16 @@ def _grid(image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.flo
     draw.line(_flat(np.array([start, end])), fill=colours.INK, width=round(2 * frame.unit))
     place = (float(start[0]), float(start[1]) - 7 * frame.unit)
     write(image, place, f"{step_m:g} m", 9 * frame.letter, colours.INK)
+    x, y = (end + np.array([14, 0]) * frame.unit).tolist()
+    return x, y
+
+
+def _north(image: "Image", draw: "ImageDraw", frame: Frame, place: tuple[float, float]) -> None:
+    """A letter with an arrow above it."""
+    (x, y), unit = place, frame.unit
+    arrow = (x, y - 14 * unit, x - 4 * unit, y - 5 * unit, x + 4 * unit, y - 5 * unit)
+    draw.polygon(arrow, fill=colours.INK, outline=colours.WHITE)
+    write(image, (x, y), "N", 9 * frame.letter, colours.INK, align=0.5, halo=1.5 * unit)
 
 
 def _shadows(image: "Image", frame: Frame, hulls: tuple[ConvexPolytope, ...]) -> None:

@@ -115,6 +115,19 @@ class Window:
         self._clock.tick(self._fps)
         self._obey()
 
+    def stay(self) -> None:
+        """Keep the last picture until a person closes the window, by any key or its button."""
+        if not self._opened:
+            return
+        pygame = self._pygame
+        pygame.display.set_caption(f"{self._title} - the end, any key: close")
+        while not self.dismissed:
+            event = pygame.event.wait(_NAP_MS)
+            if event.type in (pygame.QUIT, pygame.KEYDOWN):
+                self._dismiss()
+            elif event.type == pygame.WINDOWEXPOSED:
+                pygame.display.flip()
+
     def close(self) -> None:
         """Close the window; closing it twice does no harm."""
         if self._opened:

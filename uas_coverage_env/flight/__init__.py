@@ -37,7 +37,13 @@ from uas_coverage_env.flight.registry import (
 )
 from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.flight.rollout import Progress, rollout
-from uas_coverage_env.flight.seen import SeenGround, footprints_m, seen_ground
+from uas_coverage_env.flight.seen import (
+    SeenGround,
+    SeenPictures,
+    footprints_m,
+    seen_ground,
+    seen_pictures,
+)
 from uas_coverage_env.flight.sorties import fly_sorties, sorties_summary
 
 __all__ = [
@@ -59,6 +65,7 @@ __all__ = [
     "Policy",
     "Progress",
     "SeenGround",
+    "SeenPictures",
     "Violation",
     "accomplished",
     "as_planner",
@@ -85,6 +92,7 @@ __all__ = [
     "reward_sums",
     "rollout",
     "seen_ground",
+    "seen_pictures",
     "sorties_summary",
     "summary",
 ]

@@ -8,6 +8,7 @@ what buildings hide is not considered.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,23 @@ class SeenGround:
         return float(self.seen[self.asked].mean()) if self.asked.any() else 1.0
 
 
+@dataclass(frozen=True)
+class SeenPictures:
+    """The pictures of a kind of camera that showed ground which was in none before.
+
+    Attributes:
+        sensor: Its name; of all UAS that carry it.
+        sample: (P,) when they were taken, in order of time.
+        corners_m: (P, 4, 2) north and east of their corners, in order round the picture [m].
+        share: (T,) of the ground to be seen, how much was until each sample, 0..1.
+    """
+
+    sensor: str
+    sample: NDArray[np.intp]
+    corners_m: FloatArray
+    share: FloatArray
+
+
 def seen_ground(flight: FlightRecord, until: int | None = None) -> tuple[SeenGround, ...]:
     """What each kind of camera has seen; empty where no UAS carries one.
 
@@ -63,16 +81,36 @@ def seen_ground(flight: FlightRecord, until: int | None = None) -> tuple[SeenGro
         until: The last sample that counts; None: that of the flight.
     """
     samples = slice(None if until is None else until + 1)
-    x, flies = flight.x[samples].copy(), flight.mode[samples] < LANDED
-    x[..., PHI:WX] = flight.attitude_rad[samples]
-    carried: dict[str, list[tuple[int, Sensor]]] = {}
-    for i, uas in enumerate(flight.scenario.uas):
-        for sensor in uas.sensors:
-            if sensor.field_of_view_deg is not None:
-                carried.setdefault(sensor.name, []).append((i, sensor))
-    return tuple(
-        _seen_by(flight.scenario, name, cameras, x, flies) for name, cameras in carried.items()
-    )
+    found = []
+    for name, pictures in _taken(flight, samples).items():
+        north_m, east_m, asked = _ground(flight.scenario, name)
+        seen = np.zeros_like(asked)
+        for _, corners_m in pictures:
+            window, inside = _cells(corners_m, north_m, east_m)
+            seen[window] |= inside
+        found.append(SeenGround(name, north_m, east_m, asked, seen))
+    return tuple(found)
+
+
+def seen_pictures(flight: FlightRecord) -> tuple[SeenPictures, ...]:
+    """What each kind of camera has seen, picture by picture; empty where no UAS carries one."""
+    found = []
+    for name, pictures in _taken(flight, slice(None)).items():
+        north_m, east_m, asked = _ground(flight.scenario, name)
+        seen = np.zeros_like(asked)
+        new_cells = np.zeros(len(flight.x))
+        kept: list[tuple[int, FloatArray]] = []
+        for sample, corners_m in pictures:
+            window, inside = _cells(corners_m, north_m, east_m)
+            new = inside & ~seen[window]
+            if new.any():
+                seen[window] |= new
+                new_cells[sample] += (new & asked[window]).sum()
+                kept.append((sample, corners_m))
+        share = new_cells.cumsum() / asked.sum() if asked.any() else np.ones(len(flight.x))
+        corners = np.array([corners_m for _, corners_m in kept]).reshape(-1, 4, 2)
+        found.append(SeenPictures(name, np.array([k for k, _ in kept], np.intp), corners, share))
+    return tuple(found)
 
 
 def seen_shares(flight: FlightRecord) -> dict[str, float]:
@@ -125,21 +163,42 @@ def _turned(rays: FloatArray, phi: FloatArray, theta: FloatArray, psi: FloatArra
     return np.stack(np.broadcast_arrays(north, east, down), axis=-1)
 
 
-def _seen_by(
+def _taken(flight: FlightRecord, samples: slice) -> dict[str, Iterator[tuple[int, FloatArray]]]:
+    """Camera -> sample and corners (4, 2) of its pictures that count, in order of time."""
+    x, flies = flight.x[samples].copy(), flight.mode[samples] < LANDED
+    x[..., PHI:WX] = flight.attitude_rad[samples]
+    carried: dict[str, list[tuple[int, Sensor]]] = {}
+    for i, uas in enumerate(flight.scenario.uas):
+        for sensor in uas.sensors:
+            if sensor.field_of_view_deg is not None:
+                carried.setdefault(sensor.name, []).append((i, sensor))
+    return {
+        name: _in_time(flight.scenario, name, cameras, x, flies)
+        for name, cameras in carried.items()
+    }
+
+
+def _in_time(
     scenario: Scenario,
     name: str,
     cameras: list[tuple[int, Sensor]],
     x: FloatArray,
     flies: BoolArray,
-) -> SeenGround:
-    north_m, east_m, asked = _ground(scenario, name)
-    seen = np.zeros_like(asked)
-    for i, sensor in cameras:
-        for picture in footprints_m(sensor, x[flies[:, i] & _as_asked(scenario, name, x[:, i]), i]):
-            if np.isfinite(picture).all():
-                rows, columns = _window(north_m, picture[:, 0]), _window(east_m, picture[:, 1])
-                seen[rows, columns] |= _inside(picture, north_m[rows], east_m[columns])
-    return SeenGround(name, north_m, east_m, asked, seen)
+) -> Iterator[tuple[int, FloatArray]]:
+    corners_m = np.full((len(x), len(cameras), 4, 2), np.nan)
+    for c, (i, sensor) in enumerate(cameras):
+        counts = flies[:, i] & _as_asked(scenario, name, x[:, i])
+        corners_m[counts, c] = footprints_m(sensor, x[counts, i])
+    for k, c in np.argwhere(np.isfinite(corners_m).all(axis=(2, 3))).tolist():
+        yield k, corners_m[k, c]
+
+
+def _cells(
+    corners_m: FloatArray, north_m: FloatArray, east_m: FloatArray
+) -> tuple[tuple[slice, slice], BoolArray]:
+    """The cells around a picture, and which of them are in it."""
+    rows, columns = _window(north_m, corners_m[:, 0]), _window(east_m, corners_m[:, 1])
+    return (rows, columns), _inside(corners_m, north_m[rows], east_m[columns])
 
 
 def _as_asked(scenario: Scenario, name: str, x: FloatArray) -> BoolArray:

@@ -133,12 +133,12 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
     """
     from matplotlib.figure import Figure
 
-    from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade
+    from uas_coverage_env.replay.figures.style import printed, shade, width_in
 
     with printed():
         columns = min(len(choices), 3)
         lines = -(-len(choices) // columns)
-        size = (WIDTH_IN, 0.4 + 2.4 * lines)
+        size = (width_in(), 0.4 + 2.4 * lines)
         figure = Figure(figsize=size, layout="constrained")
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes in panels[len(choices) :]:

@@ -33,10 +33,10 @@ def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference:
     """
     from matplotlib.figure import Figure
 
-    from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade
+    from uas_coverage_env.replay.figures.style import printed, shade, width_in
 
     with printed():
-        size = (WIDTH_IN, 1.1 + 0.32 * len(scores))
+        size = (width_in(), 1.1 + 0.32 * len(scores))
         figure = Figure(figsize=size, layout="constrained")
         coverage, energy = figure.subplots(1, 2, sharey=True)
         for place, one in enumerate(scores):

@@ -87,6 +87,9 @@ class Ways:
         self._waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self._led: set[tuple[int, int]] = set()
         self._homes_m = np.array([uas.start_m for uas in brief.uas], float)
+        for obstacle in self._arena.obstacles[:1]:
+            # compiled now, not in the decision that first looks over a roof
+            self._over(obstacle["lower_m"].copy(), obstacle["upper_m"].copy())
 
     def seconds(self, uas: int, target: int, position_m: FloatArray) -> float:
         """Time from a position to a target; the arguments are those of `to`."""

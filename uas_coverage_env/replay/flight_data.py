@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, covered_at, summary
+from uas_coverage_env.flight import MODES, Flight, covered_at, seen_pictures, summary
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.mark_data import marks
 from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.replay.safety_data import floors_m, rooms
-from uas_coverage_env.replay.scene_data import scene_data
+from uas_coverage_env.replay.scene_data import hex_colour, scene_data
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
 
@@ -24,6 +25,8 @@ CURRENT_A = 0.01
 DURATION_S = 0.00001
 ROOM_M = 0.01
 FLOOR_M = 0.1
+SEEN_M = 0.1
+SHARE = 0.0001
 
 
 def flight_data(flight: Flight, source: str) -> dict[str, Any]:
@@ -71,6 +74,7 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "fallbacks": [k for k, decision in enumerate(flight.decisions) if decision.fallback],
         "plan": {"unit": PLAN_M, "steps": _plan(flight, source)},
         "reach": _reach(flight.scenario, source),
+        "seen": _seen(flight, source),
         "room": {kind: _series(room_m, ROOM_M, kind, source) for kind, (room_m, _) in room.items()},
         "min_height_m": flight.scenario.min_height_m,
         "no_return": list(home.no_return),
@@ -96,6 +100,20 @@ def _reach(scenario: Scenario, source: str) -> dict[str, Any]:
         "per_m": found.per_m.tolist(),
         "fixed": found.fixed.tolist(),
     }
+
+
+def _seen(flight: Flight, source: str) -> list[dict[str, Any]]:
+    """By camera, the pictures with new ground: corners as north, east, north, east, ..."""
+    return [
+        {
+            "sensor": seen.sensor,
+            "colour": hex_colour(colours.SEEN[n % len(colours.SEEN)]),
+            "sample": seen.sample.tolist(),
+            "corners": _series(seen.corners_m, SEEN_M, "ground seen", source),
+            "share": _series(seen.share, SHARE, "ground seen", source),
+        }
+        for n, seen in enumerate(seen_pictures(flight))
+    ]
 
 
 def _series(values: NDArray[np.float64], unit: float, name: str, source: str) -> dict[str, Any]:

@@ -26,7 +26,9 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
             {
                 "name": obstacle.name,
                 "kind": obstacle.kind or "",
-                "colour": _hex(colours.OBSTACLES.get(obstacle.kind or "", colours.OTHER_OBSTACLE)),
+                "colour": hex_colour(
+                    colours.OBSTACLES.get(obstacle.kind or "", colours.OTHER_OBSTACLE)
+                ),
                 **_body(hull),
             }
             for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
@@ -34,7 +36,9 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
         "decorations": [
             {
                 "kind": item.kind or "",
-                "colour": _hex(colours.DECORATIONS.get(item.kind or "", colours.OTHER_DECORATION)),
+                "colour": hex_colour(
+                    colours.DECORATIONS.get(item.kind or "", colours.OTHER_DECORATION)
+                ),
                 "outline": _metres(np.array(item.polygon_m)),
             }
             for item in scenario.decorations
@@ -60,7 +64,7 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
         "uas": [
             {
                 "name": uas.name,
-                "colour": _hex(colours.UAS[i % len(colours.UAS)]),
+                "colour": hex_colour(colours.UAS[i % len(colours.UAS)]),
                 "start": _metres(np.array(uas.start_m)),
                 "lowest_soc": round(1.0 - uas.dod_max, 4),
             }
@@ -88,5 +92,6 @@ def _metres(values: NDArray[np.float64]) -> list[Any]:
     return values.round(2).tolist()
 
 
-def _hex(colour: colours.Colour) -> str:
+def hex_colour(colour: colours.Colour) -> str:
+    """As the page writes it: #rrggbb."""
     return "#" + "".join(f"{part:02x}" for part in colour)

@@ -8,6 +8,9 @@ from uas_coverage_env.scenario.family import SERIES
 from uas_coverage_env.scenario.model import Scenario
 
 _SHIPPED = Path(__file__).parent
+_DRAWN = (".geojson", ".kml", ".kmz", ".plan", ".shp")
+"""Files of areas, which `uas-coverage import` reads."""
+
 _LONGEST_SEED = 18  # digits, as in a sweep
 
 
@@ -28,6 +31,12 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         InputError: There is no such scenario, or something in it is wrong: one line that names
             file, field, value and fix.
     """
+    given = Path(name_or_path) if isinstance(name_or_path, str | Path) else Path()
+    if given.suffix.lower() in _DRAWN:
+        raise InputError(
+            f"{given}: is a drawn area; make a scenario of it: uas-coverage import {given} "
+            f"--out {given.with_suffix('.toml').name}"
+        )
     if isinstance(name_or_path, str) and name_or_path in scenario_names():
         path = _SHIPPED / f"{name_or_path}.toml"
     elif is_path(name_or_path):

@@ -329,7 +329,10 @@ export class Chart extends TimeCanvas {
     for (const { line, x, y } of ends.reverse()) {
       const apart = Math.min(y, room);
       room = apart - 11;
-      this.write(line.label, x, apart, bright(line.colour), "left", 600);
+      this.pen.font = "600 11px system-ui, sans-serif";
+      // a long name that begins at the end of a flight would leave the picture
+      const left = Math.min(x, this.width - 1 - this.pen.measureText(line.label).width);
+      this.write(line.label, left, apart, bright(line.colour), "left", 600);
     }
   }
 

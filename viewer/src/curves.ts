@@ -13,12 +13,14 @@ export function curves(
   duration: number,
   seek: (time: number) => void,
 ): TimeCanvas[] {
+  const cameras = all.some((each) => each.data.seen.length > 0);
   const contents = (each: Flight, focused: number | null = null) => [
     charge(each, focused),
     room(each, focused),
     voltage(each),
     current(each),
     coverage(each),
+    ...(cameras ? [ground(each)] : []),
   ];
   const decisions = all.some((each) => each.data.duration.values.length > 0);
   const charts = contents(flight).map((_, i) => {
@@ -28,13 +30,15 @@ export function curves(
   });
   const modes = new ModeChart(flight, duration, seek);
   if (!decisions) return [...charts, modes];
-  const longest = all
-    .flatMap((each) => each.data.duration.values)
-    .reduce((a, b) => Math.max(a, b), 0);
-  const [unit, scale] = longest * all[0].data.duration.unit < 0.1 ? ["ms", 1000] : ["s", 1];
-  const content = (each: Flight) => decisionTime(each, unit as string, scale as number);
-  const shared = all.flatMap((each) => values(content(each)));
-  return [...charts, modes, new Chart(() => widened(content(flight), shared), duration, seek)];
+  // the first decision often plans all of the mission, or loads what is compiled: it is not the scale
+  const later = all.flatMap(({ data: { duration } }) => {
+    const { values: whole, unit } = duration;
+    return (whole.length > 1 ? whole.slice(1) : whole).map((value) => value * unit);
+  });
+  const longest_s = later.reduce((a, b) => Math.max(a, b), 0);
+  const [unit, scale] = longest_s < 0.1 ? ["ms", 1000] : ["s", 1];
+  const content = (each: Flight) => decisionTime(each, unit as string, scale as number, longest_s);
+  return [...charts, modes, new Chart(() => content(flight), duration, seek)];
 }
 
 /** Charge, and what of it the way home takes with margin: where they meet is no return. */
@@ -131,7 +135,28 @@ function coverage(flight: Flight): ChartContent {
   };
 }
 
-function decisionTime(flight: Flight, unit: string, scale: number): ChartContent {
+/** Of the ground to be seen, how much each kind of camera has. */
+function ground(flight: Flight): ChartContent {
+  const { seen } = flight.data;
+  const one = seen.length === 1;
+  return {
+    title: `Ground seen, %${one ? ` (${seen[0].sensor})` : ""}`,
+    lines: seen.map(({ share, colour }, n) => ({
+      label: "",
+      colour,
+      values: share.values.map((value) => 100 * value * share.unit),
+      dash: DASHES[n % DASHES.length],
+    })),
+    legend: one ? undefined : seen.map(({ sensor, colour }) => [sensor, colour]),
+    dt: flight.data.dt_s,
+    show: (value) => `${value.toFixed(0)} %`,
+    from: 0,
+    to: 100,
+    steps: true,
+  };
+}
+
+function decisionTime(flight: Flight, unit: string, scale: number, longest_s: number): ChartContent {
   const { values: whole, unit: step } = flight.data.duration;
   const { fallbacks } = flight.data;
   return {
@@ -142,6 +167,8 @@ function decisionTime(flight: Flight, unit: string, scale: number): ChartContent
     dt: flight.data.dt_s,
     show: (value) => `${value.toFixed(2)} ${unit}`,
     from: 0,
+    to: longest_s * scale,
+    clipped: true,
     marked: fallbacks,
   };
 }

@@ -65,6 +65,17 @@ export interface ReachData {
   fixed: number[];
 }
 
+/** What a kind of camera has seen: the pictures that showed new ground, in order of time. */
+export interface SeenData {
+  sensor: string;
+  colour: string;
+  sample: number[];
+  /** North, east of four corners each. */
+  corners: Series;
+  /** Of the ground to be seen, at each sample. */
+  share: Series;
+}
+
 export interface FlightData {
   planner: string;
   seed: number;
@@ -80,6 +91,7 @@ export interface FlightData {
   /** Altitude of the roof, or the ground, under each UAS. */
   floor: Series;
   reach: ReachData;
+  seen: SeenData[];
   /** Room beyond the safe distances by kind of what is near. */
   room: Record<string, Series>;
   min_height_m: number;

@@ -6,6 +6,7 @@ import * as marks from "./marks";
 import { Overlay } from "./overlay";
 import { bright, colour, darker, dim } from "./palette";
 import { roundStep } from "./round_step";
+import { SEEN_ALPHA, type SeenSheet, sheets } from "./seen";
 import { Trail } from "./trail";
 import type { Focus, View } from "./view";
 
@@ -24,6 +25,7 @@ export class MapView implements View {
   private scale = 1;
   private middle: Point2 = [0, 0];
   private readonly overlay: Overlay;
+  private readonly seen: SeenSheet[];
   readonly canvases: HTMLCanvasElement[];
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly flight: Flight) {
@@ -31,6 +33,7 @@ export class MapView implements View {
     this.pen = canvas.getContext("2d")!;
     this.overlay = new Overlay(this.pen, flight, (point) => this.pixel(point));
     this.trail = new Trail("uas", [flight]);
+    this.seen = sheets(flight);
     const { outline } = flight.scene.fence;
     const [north, east] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
     this.low = [Math.min(...north), Math.min(...east)];
@@ -65,7 +68,7 @@ export class MapView implements View {
     const { pen, flight } = this;
     pen.fillStyle = colour("--outside");
     pen.fillRect(0, 0, this.canvas.clientWidth, this.canvas.clientHeight);
-    this.terrain();
+    this.terrain(moment.sample);
     flight.scene.waypoints.forEach(({ at, radius, heavy }, i) => {
       const covered = flight.data.covered_at[i] <= moment.sample;
       const [x, y] = this.pixel(at);
@@ -126,11 +129,19 @@ export class MapView implements View {
     }
   }
 
-  private terrain(): void {
+  private terrain(sample: number): void {
+    const { pen } = this;
     const { scene } = this.flight;
     this.polygon(scene.fence.outline, colour("--ground"), null);
     this.grid();
     for (const item of scene.decorations) this.polygon(item.outline, dim(item.colour), null);
+    const [[left, top], [right, bottom]] = [this.pixel([this.high[0], this.low[1]]), this.pixel([this.low[0], this.high[1]])];
+    pen.globalAlpha = SEEN_ALPHA;
+    for (const sheet of this.seen) {
+      sheet.until(sample);
+      pen.drawImage(sheet.canvas, left, top, right - left, bottom - top);
+    }
+    pen.globalAlpha = 1;
     for (const obstacle of scene.obstacles) {
       this.polygon(obstacle.outline, dim(obstacle.colour), darker(obstacle.colour, 0.45), 1.2);
     }

@@ -7,6 +7,7 @@ import { table } from "./table";
 
 const TITLE_PX = 26;
 const FILM_FPS = 30;
+const LAST_MS = 800;
 const FILMS = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 
 /** A flight's name and the canvases that show it, the lowest first. */
@@ -58,6 +59,8 @@ export function filmKind(): string | null {
 export class Film {
   private readonly canvas = document.createElement("canvas");
   private recorder: MediaRecorder | null = null;
+  /** Until it records, and while the last picture stands. */
+  private waits = false;
 
   constructor(private readonly clock: Clock, private readonly name: string) {}
 
@@ -72,22 +75,31 @@ export class Film {
       const type = kind.split(";")[0];
       save(new Blob(parts, { type }), `${this.name}.${type.split("/")[1]}`);
     });
-    recorder.start();
+    // what plays before it records would be missing
+    recorder.addEventListener("start", () => {
+      this.waits = false;
+      if (!this.clock.playing) this.clock.toggle();
+    });
+    this.waits = true;
     this.recorder = recorder;
-    if (!this.clock.playing) this.clock.toggle();
-  }
-
-  get records(): boolean {
-    return this.recorder !== null;
+    recorder.start();
   }
 
   /** A picture has been drawn. */
   drawn(shown: Shown[]): void {
-    if (!this.recorder) return;
+    const { recorder } = this;
+    if (!recorder || this.waits) return;
     compose(shown, this.canvas);
     if (this.clock.playing) return;
-    this.recorder.stop();
-    this.recorder = null;
+    // the last picture stands for a moment; the recorder takes one only where something is drawn
+    this.waits = true;
+    const again = setInterval(() => compose(shown, this.canvas), LAST_MS / 4);
+    setTimeout(() => {
+      clearInterval(again);
+      recorder.stop();
+      this.recorder = null;
+      this.waits = false;
+    }, LAST_MS);
   }
 }
 

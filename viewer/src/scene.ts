@@ -8,6 +8,7 @@ import { colour } from "./palette";
 import { Camera } from "./scene_camera";
 import { MovingObstacles } from "./scene_moving";
 import { Paths } from "./scene_paths";
+import { SeenGround } from "./scene_seen";
 import { place } from "./scene_space";
 import { extentOf, terrain, type Extent } from "./scene_terrain";
 import { Vehicles } from "./scene_vehicles";
@@ -52,6 +53,7 @@ export class SceneView implements View {
   private vehicles!: Vehicles;
   private paths!: Paths;
   private waypoints!: Waypoints;
+  private seen: SeenGround | null = null;
   private moving!: MovingObstacles;
   private trail: Trail;
   private ghost: Flight | null = null;
@@ -102,6 +104,7 @@ export class SceneView implements View {
       this.ghostPaths.draw(other);
     }
     this.waypoints.draw(moment);
+    this.seen?.draw(moment);
     this.moving.draw(moment);
     this.renderer.render(this.scene, lens);
     this.pen.clearRect(0, 0, width, height);
@@ -144,18 +147,21 @@ export class SceneView implements View {
       geometry?.dispose?.();
       material?.dispose?.();
     });
+    this.seen?.dispose();
     const { ground, half, centre } = this.extent;
     this.scene = new Scene();
     this.scene.background = new Color(colour("--outside"));
     this.vehicles = new Vehicles(this.flight, ground);
     this.paths = new Paths(this.flight, false);
     this.waypoints = new Waypoints(this.flight, ground);
+    this.seen = new SeenGround(this.flight, this.extent);
     this.moving = new MovingObstacles(this.flight);
     this.ghostPaths = this.ghost && new Paths(this.ghost, true);
     if (this.ghostPaths) this.scene.add(this.ghostPaths.group);
     this.setTrail(this.trail);
     this.scene.add(
       terrain(this.flight.scene, this.extent),
+      this.seen.group,
       this.waypoints.group,
       this.moving.group,
       this.paths.group,

@@ -40,6 +40,7 @@ export function someFlight(): FlightData {
       per_m: [0.01, 0.01],
       fixed: [0, 0],
     },
+    seen: [],
     room: { fence: series(0.01, [500, 500, 100, -20, 400, 5000]) },
     min_height_m: 3,
     no_return: [2, null],

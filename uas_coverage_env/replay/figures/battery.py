@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.replay.figures.style import line_style, printed, rows, uas_colour
+from uas_coverage_env.replay.figures.style import columns_of, line_style, printed, rows, uas_colour
 
 _PUBLISHED_SCENARIOS = ("village", "gasche2025")
 """The paper's mission; beside another one its curves would say nothing."""
@@ -52,7 +52,10 @@ def battery_figure(flight: Flight, *, published: bool | None = None) -> Figure:
         axes[0].set_ylim(bottom=0)
         axes[-1].set_xlabel("Time, s")
         figure.align_ylabels(axes)
-        figure.legend(handles=_legend(flight, published), loc="outside upper center", ncols=3)
+        handles = _legend(flight, published)
+        longest = max(len(str(handle.get_label())) for handle in handles)
+        columns = columns_of(longest, 3)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns)
     return figure
 
 

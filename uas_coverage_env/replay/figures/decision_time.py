@@ -7,9 +7,11 @@ from matplotlib.ticker import PercentFormatter
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade
+from uas_coverage_env.replay.figures.style import printed, shade, width_in
 
 _MILLISECONDS_BELOW_S = 0.1
+_OFF_SCALE = 1.3
+"""Times the longest of the others, from which on the first decision does not set the axis."""
 
 
 def decision_time_figure(flight: Flight) -> Figure:
@@ -22,11 +24,13 @@ def decision_time_figure(flight: Flight) -> Figure:
         raise InputError("the flight holds no decision: it ended before the first step")
     durations_s = np.array([decision.duration_s for decision in flight.decisions])
     fallback = np.array([decision.fallback for decision in flight.decisions])
-    fast = durations_s.max() < _MILLISECONDS_BELOW_S
+    # the first often plans the whole mission: it is told in words where it would set the axis
+    later_s = durations_s[1:].max() if len(durations_s) > 1 else durations_s[0]
+    fast = later_s < _MILLISECONDS_BELOW_S
     unit, scale = ("ms", 1e3) if fast else ("s", 1.0)
     times_s = flight.time_s[: len(durations_s)]
     with printed():
-        figure = Figure(figsize=(WIDTH_IN, 2.7), layout="constrained")
+        figure = Figure(figsize=(width_in(), 2.7), layout="constrained")
         series, shares = figure.subplots(1, 2, width_ratios=[1.6, 1.0], sharey=True)
         ink = shade(colours.BLUE)
         series.plot(times_s, scale * durations_s, color=ink, linewidth=0.6, alpha=0.5)
@@ -55,9 +59,10 @@ def decision_time_figure(flight: Flight) -> Figure:
                 fontsize=8,
             )
         shares.xaxis.set_major_formatter(PercentFormatter(1.0))
-        shares.set(xlabel="Share of the decisions", xlim=(0, 1.02))
-        limit_s = flight.planner_options.get("time_limit_s")
-        if isinstance(limit_s, int | float) and np.isfinite(limit_s):
+        shares.set(xlabel="Share of decisions", xlim=(0, 1.02))
+        given = flight.planner_options.get("time_limit_s")
+        limit_s = float(given) if isinstance(given, int | float) and np.isfinite(given) else 0.0
+        if limit_s > 0.0:
             for axis in (series, shares):
                 axis.axhline(scale * limit_s, color=shade(colours.RED), linewidth=0.8, ls=":")
             series.annotate(
@@ -69,5 +74,16 @@ def decision_time_figure(flight: Flight) -> Figure:
                 ha="right",
                 fontsize=8,
             )
-        series.set_ylim(bottom=0, top=1.12 * series.dataLim.y1)
+        shown_s = later_s if durations_s[0] > _OFF_SCALE * later_s else durations_s.max()
+        drawn = scale * max(float(shown_s), limit_s)
+        series.set_ylim(bottom=0, top=1.12 * drawn)
+        if durations_s[0] > _OFF_SCALE * later_s:
+            series.annotate(
+                f"first: {scale * durations_s[0]:.3g} {unit} ↑",
+                (0.0, 1.0),
+                xycoords="axes fraction",
+                xytext=(6, -9),
+                textcoords="offset points",
+                fontsize=8,
+            )
     return figure

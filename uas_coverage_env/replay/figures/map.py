@@ -5,21 +5,31 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.draw.labels import free_place
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, SeenGround, covered_at, seen_ground
-from uas_coverage_env.replay.figures.style import WIDTH_IN, printed, shade, uas_colour
+from uas_coverage_env.replay.figures.map_legend import SEEN_ALPHA, legend_of
+from uas_coverage_env.replay.figures.style import (
+    columns_of,
+    printed,
+    shade,
+    uas_colour,
+    width_in,
+)
 from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.vehicle import PSI
 
-_LEGEND_IN = 0.55
-_SEEN_TINTS = (colours.SKY, colours.ORANGE, colours.PURPLE, colours.YELLOW)
-_SEEN_ALPHA = 0.4
+_LEGEND_IN = 0.2
+_LEGEND_ROW_IN = 0.175
+_LABEL_PT = 6.5
+_TITLE_PER_IN = 13  # letters that fit
+_PT_PER_IN = 72.0
 
 
 def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
@@ -38,8 +48,12 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
     fence = flight.scenario.fence.vertices_m
     low, high = fence.min(axis=0), fence.max(axis=0)
     with printed():
-        height_in = WIDTH_IN * float((high[0] - low[0]) / (high[1] - low[1]))
-        size = (WIDTH_IN, min(9.0, max(2.5, height_in)) + _LEGEND_IN)
+        seen = seen_ground(flight, now)
+        legend = legend_of(flight, seen)
+        columns = columns_of(max(len(str(entry.get_label())) for entry in legend), 6)
+        legend_in = _LEGEND_IN + _LEGEND_ROW_IN * -(-len(legend) // columns)
+        height_in = width_in() * float((high[0] - low[0]) / (high[1] - low[1]))
+        size = (width_in(), min(9.0, max(0.4 * width_in(), height_in)) + legend_in)
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots()
         margin_m = 0.02 * float((high - low)[:2].max())
@@ -51,22 +65,20 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         # the fence is the frame
         axes.spines[["left", "bottom"]].set_visible(False)
         _terrain(axes, flight)
-        seen = seen_ground(flight, now)
         _seen_ground(axes, seen)
         _waypoints(axes, flight, now)
+        _heights(axes, flight, float((high - low)[1]) / (width_in() * _PT_PER_IN))
+        _north(figure, axes)
         _moving_obstacles(axes, flight, now)
         for i in range(len(flight.names)):
             _uas(axes, flight, now, i)
         _violations(axes, flight, now)
-        title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s: "
-        title += f"{flight.covered[now]} of {len(flight.scenario.waypoints)} waypoints"
+        title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s:"
+        covered = f"{flight.covered[now]} of {len(flight.scenario.waypoints)} waypoints"
+        wide = len(title) + len(covered) < _TITLE_PER_IN * width_in()
+        title += f"{' ' if wide else chr(10)}{covered}"
         axes.set_title(title, fontsize=9, parse_math=False)
-        figure.legend(
-            handles=_legend(flight, seen),
-            loc="outside lower center",
-            ncols=4 if seen else 6,
-            columnspacing=1.2,
-        )
+        figure.legend(handles=legend, loc="outside lower center", ncols=columns, columnspacing=1.2)
     return figure
 
 
@@ -93,13 +105,13 @@ def _terrain(axes: Axes, flight: Flight) -> None:
 
 def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
     """The ground that cameras have seen, under waypoints and paths; darker where several have."""
-    for ground, tint in zip(seen, _SEEN_TINTS, strict=False):
+    for ground, tint in zip(seen, colours.SEEN, strict=False):
         if ground.seen.any():
             axes.contourf(
                 *(ground.east_m, ground.north_m, ground.seen.astype(float)),
                 levels=(0.5, 1.5),
                 colors=[shade(tint)],
-                alpha=_SEEN_ALPHA,
+                alpha=SEEN_ALPHA,
                 zorder=1,
             )
 
@@ -118,6 +130,36 @@ def _waypoints(axes: Axes, flight: Flight, now: int) -> None:
             green = shade(colours.COVERED)
             axes.add_patch(Circle((x, y), waypoint.radius_m, color=green, alpha=0.5, linewidth=0))
             axes.plot(x, y, marker="$✓$", color=edge, markersize=6, markeredgewidth=0)
+
+
+def _heights(axes: Axes, flight: Flight, m_per_pt: float) -> None:
+    """How high the obstacles are, where no waypoint lies over the words."""
+    discs_m = np.array(
+        [(*_flat(np.array(w.position_m[:2])), w.radius_m) for w in flight.scenario.waypoints]
+    )
+    for obstacle, hull in zip(flight.scenario.obstacles, flight.scenario.hulls, strict=True):
+        words = f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
+        box_m = m_per_pt * _LABEL_PT * np.array([0.62 * len(words), 1.1])
+        place = free_place(_flat(outline_of(hull)), box_m, discs_m)
+        if place is not None:
+            tint = colours.OBSTACLES.get(obstacle.kind or "", colours.OTHER_OBSTACLE)
+            ink = shade(colours.shaded(tint, 0.35))
+            axes.text(*place, words, color=ink, fontsize=_LABEL_PT, ha="center", va="center")
+
+
+def _north(figure: Figure, axes: Axes) -> None:
+    """An arrow to the north, beside the upper right corner."""
+    axes.annotate(
+        "N",
+        xy=(1.0, 1.0),
+        xycoords="axes fraction",
+        xytext=(9, -21),
+        textcoords="offset points",
+        ha="center",
+        fontsize=8,
+    )
+    corner = offset_copy(axes.transAxes, figure, x=9, y=-12, units="points")
+    axes.plot(1.0, 1.0, marker="^", ms=5, color=shade(colours.INK), transform=corner, clip_on=False)
 
 
 def _moving_obstacles(axes: Axes, flight: Flight, now: int) -> None:
@@ -187,31 +229,3 @@ def _violations(axes: Axes, flight: Flight, now: int) -> None:
         if k <= now:
             x, y = _flat(flight.x[k, flight.names.index(violation.uas), :3])
             axes.plot(x, y, "X", color=shade(colours.RED), markeredgecolor="white", markersize=9)
-
-
-def _legend(flight: Flight, seen: Sequence[SeenGround]) -> list[Line2D]:
-    ring = {"marker": "o", "linestyle": "", "mfc": "none", "markersize": 8}
-    charge = [
-        Line2D([], [], **ring, mec=shade(colours.of_charge(soc)), markeredgewidth=2, label=label)
-        for soc, label in ((0.9, "charged"), (0.5, "medium"), (0.1, "discharged"))
-    ]
-    marks = [
-        Line2D([], [], **ring, mec=shade(colours.INK), label="waypoint"),
-        Line2D([], [], color=uas_colour(0), label="flown"),
-    ]
-    if len(flight.plan):
-        marks.append(
-            Line2D([], [], color=uas_colour(0), marker=".", ls="", ms=3, label="predicted")
-        )
-    marks += [
-        Line2D(
-            *([], []),
-            color=(*shade(tint), _SEEN_ALPHA),
-            marker="s",
-            ls="",
-            ms=7,
-            label=f"seen by {ground.sensor}, {ground.share:.0%}",
-        )
-        for ground, tint in zip(seen, _SEEN_TINTS, strict=False)
-    ]
-    return [*marks, *charge]

@@ -7,7 +7,7 @@ from matplotlib.patches import Patch
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.flight import MODES, Flight
-from uas_coverage_env.replay.figures.style import printed, rows, shade
+from uas_coverage_env.replay.figures.style import columns_of, printed, rows, shade
 
 _PAINT = {
     "covering": (colours.BLUE, ""),
@@ -52,7 +52,7 @@ def modes_figure(flight: Flight) -> Figure:
             Patch(facecolor=shade(_PAINT[mode][0]), hatch=_PAINT[mode][1], ec="white", label=mode)
             for mode in used
         ]
-        figure.legend(handles=legend, loc="outside upper center", ncols=len(legend))
+        figure.legend(handles=legend, loc="outside upper center", ncols=columns_of(8, len(legend)))
         figure.align_ylabels([coverage, bars])
     return figure
 

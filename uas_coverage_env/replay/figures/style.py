@@ -1,16 +1,22 @@
 """The look that all figures share."""
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib import style as styles
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.suggestions import did_you_mean
 
 WIDTH_IN = 6.3
-"""Text width of an A4 page."""
+"""Text width of an A4 page; of figures for which no other is asked."""
 
 LINE_STYLES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 
@@ -33,19 +39,69 @@ _RC: dict[Any, Any] = {
 }
 
 
+_width_in: ContextVar[float] = ContextVar("width_in", default=WIDTH_IN)
+_style: ContextVar[dict[Any, Any]] = ContextVar("style")
+
+
+@contextmanager
+def look(width_in: float = WIDTH_IN, style: str | None = None) -> Iterator[None]:
+    """Figures made within this context are of a width and a style.
+
+    Args:
+        width_in: Their width [in].
+        style: The name of a style of matplotlib, or the path of an `.mplstyle` file; it wins over
+            ours. None: ours.
+
+    Raises:
+        InputError: There is no such style, or it cannot be read.
+    """
+    tokens = _width_in.set(width_in), _style.set({} if style is None else _settings(style))
+    try:
+        yield
+    finally:
+        _width_in.reset(tokens[0])
+        _style.reset(tokens[1])
+
+
+def width_in() -> float:
+    """The width of figures now [in]."""
+    return _width_in.get()
+
+
+def columns_of(words: int, most: int) -> int:
+    """How many columns of a legend fit, where one of so many letters is the longest entry."""
+    return max(1, min(most, int(width_in() / (0.35 + 0.062 * words))))
+
+
+def _settings(style: str) -> dict[Any, Any]:
+    if style in styles.library:
+        return dict(styles.library[style])
+    path = Path(style)
+    if path.suffix != ".mplstyle":
+        known = ", ".join(name for name in styles.available if not name.startswith("_"))
+        close = did_you_mean(style, styles.available, f"take the path of an .mplstyle or {known}")
+        raise InputError(f"unknown style {style[:80]!r}; {close}")
+    try:
+        return dict(mpl.rc_params_from_file(path, fail_on_error=True, use_default_template=False))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the path") from None
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{path}: is no style of matplotlib ({error})") from error
+
+
 def printed() -> AbstractContextManager[None]:
     """Figures are made and saved within this context; what a person has set stays as it was."""
-    return mpl.rc_context({**mpl.rcParamsDefault, **_RC})
+    return mpl.rc_context({**mpl.rcParamsDefault, **_RC, **_style.get({})})
 
 
 def rows(height_in: float, heights: list[float]) -> tuple[Figure, list[Axes]]:
-    """A figure of text width with one column of axes that share their time.
+    """A figure with one column of axes that share their time.
 
     Args:
         height_in: Height of the figure [in].
         heights: Relative heights of the axes, from above.
     """
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    figure = Figure(figsize=(width_in(), height_in), layout="constrained")
     grid = figure.subplots(
         len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
     )

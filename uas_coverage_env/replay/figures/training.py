@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.replay.figures.style import WIDTH_IN, line_style, printed, uas_colour
+from uas_coverage_env.replay.figures.style import (
+    columns_of,
+    line_style,
+    printed,
+    uas_colour,
+    width_in,
+)
 
 CURVE = "learning_curve.csv"
 
@@ -45,7 +51,7 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
     panels = (*_PANELS, *([(_RETURN, 1.0, "Return")] if returns else []))
     rows = 3 if returns else 2
     with printed():
-        figure = Figure(figsize=(WIDTH_IN, 2.1 * rows), layout="constrained")
+        figure = Figure(figsize=(width_in(), 2.1 * rows), layout="constrained")
         grid = figure.subplots(rows, 2, sharex=True)
         for axis in grid.flat[len(panels) :]:
             axis.set_visible(False)
@@ -75,7 +81,7 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
         figure.align_ylabels()
         if any(runs):
             handles, labels = grid[0, 0].get_legend_handles_labels()
-            columns = min(4, len(labels))
+            columns = columns_of(max(map(len, labels)), min(4, len(labels)))
             figure.legend(handles, labels, loc="outside upper center", ncols=columns)
     return figure
 
