@@ -142,6 +142,15 @@ def test_a_weak_battery_gets_a_short_route():
     assert way_m[1] < way_m[0]
 
 
+def test_in_a_large_fleet_routes_leave_room_for_flights_that_take_longer_than_expected():
+    town = generate_scenario(3, n_uas=5, n_waypoints=40, n_obstacles=0)
+    weak = [uas.model_copy(update={"soc_0": 0.34}) for uas in town.uas]
+    trajectory = planner(programs=3, weight_energy=5.0)  # hardly made shorter
+    trajectory.reset(MissionBrief.of(town.model_copy(update={"uas": tuple(weak)})), 0)
+    assert trajectory.mission_plan.troubles == {}
+    assert len(trajectory.mission_plan.order.left_out) == 0
+
+
 def test_the_waypoints_of_a_lost_uas_are_covered_by_the_others():
     scenario = field(starts_m=TWO)
     world, flown = World(scenario), planner()

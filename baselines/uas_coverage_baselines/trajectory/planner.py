@@ -112,6 +112,7 @@ class Trajectory:
     def __init__(self, options: TrajectoryOptions | None = None) -> None:
         self.options = options or TrajectoryOptions()
         self.last_decision: Decision | None = None
+        self.mission_plan: MissionPlan | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -127,7 +128,7 @@ class Trajectory:
         """Plan the mission from the starts."""
         self._brief, self._seed = brief, seed
         self._by_legs: LegMission | None = None
-        self.mission_plan: MissionPlan | None = None
+        self.mission_plan = None
         if brief.execution is not None:
             effort = SearchEffort(self.options.moves, total_weight=self._total_weight)
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
