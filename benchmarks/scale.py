@@ -3,6 +3,9 @@
     python benchmarks/scale.py                                  generated towns up to 32 UAS
     python benchmarks/scale.py --sizes 2x50,32x256 --no-fly     first plans only
     python benchmarks/scale.py --figure scale.png
+    python benchmarks/scale.py --sizes 100x5000 --side-m 2600   of a denser town
+
+All UAS start in the west: with 5000 waypoints as far apart as usual, no battery lasts to the east.
 
 A size is UAS x waypoints; there is one obstacle for every six waypoints, 60 at most, and the area
 grows with the waypoints. The first plan is made in a process of its own, which has compiled
@@ -68,17 +71,22 @@ class Measured:
     flown: Row | None
 
 
-def town(n_uas: int, n_waypoints: int, seed: int) -> Scenario:
+def town(n_uas: int, n_waypoints: int, seed: int, side_m: float | None = None) -> Scenario:
     """The mission of a size."""
     n_obstacles = min(n_waypoints // 6, _MOST_OBSTACLES)
-    return generate_scenario(seed, n_uas, n_waypoints, n_obstacles, min_height_m=3.0)
+    return generate_scenario(seed, n_uas, n_waypoints, n_obstacles, side_m, min_height_m=3.0)
 
 
 def measure(
-    n_uas: int, n_waypoints: int, seed: int, options: Mapping[str, Any], flies: bool
+    n_uas: int,
+    n_waypoints: int,
+    seed: int,
+    side_m: float | None,
+    options: Mapping[str, Any],
+    flies: bool,
 ) -> Measured:
     """Plan, and fly, one mission; for a process of its own."""
-    scenario = town(n_uas, n_waypoints, seed)
+    scenario = town(n_uas, n_waypoints, seed, side_m)
     brief = MissionBrief.of(scenario)
     planner: Any = load_planner("trajectory", options)
     planner.warm_up(MissionBrief.of(town(2, 20, seed)))
@@ -158,6 +166,7 @@ def main(
     sizes: Annotated[str, typer.Option(help="UASxWAYPOINTS, separated by commas.")] = _SIZES,
     seed: Annotated[int, typer.Option(help="Of the towns.", min=0)] = 1,
     flies: Annotated[bool, typer.Option("--fly/--no-fly", help="Whether to fly, too.")] = True,
+    side_m: Annotated[float | None, typer.Option(help="Of the area.")] = None,
     option: Annotated[list[str] | None, typer.Option(help="NAME=VALUE of the planner.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Where to draw the growth.")] = None,
 ) -> None:
@@ -170,9 +179,8 @@ def main(
             ProcessPoolExecutor(1) as alone,
         ):
             try:
-                rows.append(
-                    alone.submit(measure, n_uas, n_waypoints, seed, options, flies).result()
-                )
+                size = n_uas, n_waypoints, seed, side_m
+                rows.append(alone.submit(measure, *size, options, flies).result())
             except ValueError as error:
                 raise InputError(f"--sizes {n_uas}x{n_waypoints}: {error}") from error
     show(rows)

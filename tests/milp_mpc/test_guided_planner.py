@@ -7,12 +7,13 @@ from practice_missions import mission
 from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
+from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import LOST
+from uas_coverage_env.world import HOME, LOST
 
 REPEATABLE = GuidedOptions(deterministic=True, horizon=10)
 PLACES = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]
@@ -48,6 +49,22 @@ def test_a_generated_mission_is_covered_and_everybody_comes_home():
     assert accomplished(flight)
     assert not flight.breaches
     assert not any(decision.fallback for decision in flight.decisions)
+
+
+def test_told_to_it_sets_off_along_the_order_of_trajectory():
+    scenario = generate_scenario(3, n_uas=2, n_waypoints=8, n_obstacles=3)
+    brief = MissionBrief.of(scenario)
+    planned = Trajectory(TrajectoryOptions(threads=2))
+    planned.reset(brief, 5)
+    routes = [route.tolist() for route in planned.mission_plan.order.routes]
+    guided = MilpMpcGuided(REPEATABLE.model_copy(update={"order": "trajectory"}))
+    guided.reset(brief, 5)
+    swarm = first_sight(brief)
+    guided.act(swarm)
+    ahead = {name: guided.target(name) for name in swarm.names}
+    assert ahead == {
+        name: route[0] if route else HOME for name, route in zip(swarm.names, routes, strict=True)
+    }
 
 
 def test_the_planner_is_known_by_its_name():

@@ -148,6 +148,12 @@ def test_flights_planned_side_by_side_are_those_planned_one_by_one():
     moment = Moment(swarm.x, np.ones(3, bool), swarm.uncovered, np.zeros(12, np.int64), 0.0)
     routes = {uas: np.arange(4 * uas, 4 * uas + 4) for uas in range(3)}
     nothing = {uas: () for uas in range(3)}
-    one, three = (fleet.flights(moment, routes, nothing, 20, {}, threads) for threads in (1, 3))
+    mission = moment, routes, nothing
+
+    def flights(threads):
+        drafts = fleet.drafts(*mission, 20, {}, threads)
+        return fleet.apart(*mission, fleet.flights(*mission, drafts, threads))
+
+    one, three = flights(1), flights(3)
     for uas in range(3):
         np.testing.assert_array_equal(one[uas].x, three[uas].x)

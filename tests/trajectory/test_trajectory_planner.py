@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import uas_coverage_baselines.trajectory.mission_plan as mission_plan
 import uas_coverage_baselines.trajectory.program as program_module
 from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import box, meadow, mover, waypoint
@@ -141,6 +142,15 @@ def test_a_weak_battery_gets_a_short_route():
     assert way_m[1] < way_m[0]
 
 
+def test_in_a_large_fleet_routes_leave_room_for_flights_that_take_longer_than_expected():
+    town = generate_scenario(3, n_uas=5, n_waypoints=40, n_obstacles=0)
+    weak = [uas.model_copy(update={"soc_0": 0.34}) for uas in town.uas]
+    trajectory = planner(programs=3, weight_energy=5.0)  # hardly made shorter
+    trajectory.reset(MissionBrief.of(town.model_copy(update={"uas": tuple(weak)})), 0)
+    assert trajectory.mission_plan.troubles == {}
+    assert len(trajectory.mission_plan.order.left_out) == 0
+
+
 def test_the_waypoints_of_a_lost_uas_are_covered_by_the_others():
     scenario = field(starts_m=TWO)
     world, flown = World(scenario), planner()
@@ -174,6 +184,19 @@ def test_what_is_blocked_is_waited_for_at_a_distance_and_covered_later():
     assert accomplished(flight)
     assert is_harmless(flight)
     assert flight.steps > 45
+
+
+@pytest.mark.parametrize(("moving", "searched"), [((), 4), ((PARKED,), 1)])
+def test_before_take_off_one_order_is_searched_where_the_plan_is_made_anew_anyway(
+    monkeypatch, moving, searched
+):
+    calls, improve = [], mission_plan.improve_routes
+    monkeypatch.setattr(
+        mission_plan, "improve_routes", lambda *args: calls.append(args) or improve(*args)
+    )
+    brief = MissionBrief.of(field(starts_m=TWO, moving_obstacles=moving))
+    planner(orders=4, moves=80, programs=3).reset(brief, 0)
+    assert len(calls) == searched
 
 
 @pytest.mark.parametrize("heading", [(0.0, 4.0, 0.0), (3.0, 3.0, 0.0), (-2.0, 5.0, 0.5)])

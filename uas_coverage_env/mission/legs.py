@@ -32,6 +32,7 @@ _NEIGHBOURS = 24
 """Legs to so many nearest waypoints are routed past obstacles; longer ones are taken straight."""
 _FROM_HERE = 64
 """Likewise from where a UAS is."""
+_AT_ONCE = 2**20  # straight legs: more than so many are computed in parts, for the memory
 _STOP_DEG = np.array([0.0, 10.0, 25.0, 90.0, 180.0])
 _STOP_SHARE = np.array([0.0, 0.0, 0.6, 1.0, 1.1])
 """What an autopilot loses in a corner, in corners of 90 degrees; a few degrees are no corner."""
@@ -128,10 +129,12 @@ class Legs:
 
     def _between(self, speeds: Speeds) -> FloatArray:
         n = len(self.waypoints_m)
-        first, second = (axis.ravel() for axis in np.indices((n, n)))
-        straight = _straight_s(
-            self.waypoints_m[first], self.waypoints_m[second], self._credit_m[second], speeds
-        ).reshape(n, n)
+        straight = np.empty((n, n))
+        for rows in np.array_split(np.arange(n), max(n * n // _AT_ONCE, 1)):
+            first, second = np.repeat(rows, n), np.tile(np.arange(n), len(rows))
+            straight[rows] = _straight_s(
+                self.waypoints_m[first], self.waypoints_m[second], self._credit_m[second], speeds
+            ).reshape(-1, n)
         near = np.repeat(np.arange(n), self.neighbours.shape[1]), self.neighbours.ravel()
         straight[near] = _legs_s(
             self.arena,

@@ -57,7 +57,7 @@ _LOWEST_SOC = 0.6
 # The last attempts have full batteries and differ in their blocks alone.
 _ATTEMPTS = 8
 _ATTEMPTS_TO_FULL = 4
-_LARGEST = {"n_uas": 64, "n_waypoints": 2000, "n_obstacles": 400}
+_LARGEST = {"n_uas": 128, "n_waypoints": 5000, "n_obstacles": 400}
 _LARGEST_MIN_HEIGHT_M = 10.0  # there is as much room between the highest roof and the ceiling
 
 

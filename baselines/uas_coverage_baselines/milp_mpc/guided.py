@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +20,7 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
+from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_env.mission import MissionBrief, Ways, first_sight
 from uas_coverage_env.vehicle import VX, VY
 from uas_coverage_env.world import HOME, Mode, SwarmState
@@ -29,6 +31,11 @@ _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is l
 class GuidedOptions(MovingHorizonOptions):
     """Options of `milp-mpc-guided`."""
 
+    order: Literal["search", "trajectory"] = Field(
+        default="search",
+        description="where the order before take-off comes from: a search of its own, or the plan "
+        "of `trajectory`, whose weight of energy is then its own, too",
+    )
     waypoint_sides: int = Field(default=12, ge=4, le=16, multiple_of=4, description="H_WP")
     limit_sides: int = Field(
         default=32,
@@ -74,8 +81,16 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
         super().reset(brief, seed)
         self._builder = ProblemBuilder(brief, self.options, Ways(brief))
         decision_s = self.options.threads * self.options.time_limit_s
-        self._guide = RouteGuide(brief, self._builder, TourShape(), decision_s)
-        self._guide.begin(first_sight(brief), seed)
+        made = brief, self._builder, TourShape(), decision_s
+        planned = Trajectory(TrajectoryOptions(threads=self.options.threads))
+        if self.options.order == "trajectory":
+            planned.reset(brief, seed)
+        if planned.mission_plan is None:
+            self._guide = RouteGuide(*made)
+            self._guide.begin(first_sight(brief), seed)
+        else:
+            self._guide = RouteGuide(*made, planned.options.weight_energy)
+            self._guide.take(first_sight(brief), planned.mission_plan.order)
         self._returning: set[str] = set()
         self._next: dict[str, int] = {}
 

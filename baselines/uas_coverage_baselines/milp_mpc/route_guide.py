@@ -65,8 +65,10 @@ class RouteGuide:
         builder: ProblemBuilder,
         shape: TourShape,
         decision_s: float = np.inf,
+        total_weight: float = 0.4,
     ) -> None:
         self._builder, self._shape = builder, shape
+        self._total_weight = total_weight
         self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(brief)
         self._names = tuple(uas.name for uas in brief.uas)
@@ -86,20 +88,29 @@ class RouteGuide:
         task = self._task(swarm)
         moves = min(_MOVES_PER_WAYPOINT * max(len(task.open_waypoints), 1), _MOVES_AT_MOST)
         orders = [
-            improve_routes(task, empty_routes(task.n_uas), SearchEffort(moves), seed + attempt)
+            improve_routes(task, empty_routes(task.n_uas), self._effort(moves), seed + attempt)
             for attempt in range(_FIRST_SEARCHES)
         ]
         self._order = min(orders, key=lambda order: order.cost_s)
+
+    def take(self, swarm: SwarmState, order: Routes) -> None:
+        """Begin with an order that was searched elsewhere."""
+        self._order = improve_routes(self._task(swarm), order, self._effort(0), 0)
+
+    def _effort(self, moves: int, hottest_s: float = 4.0, window: int = 0) -> SearchEffort:
+        return SearchEffort(
+            moves, hottest_s=hottest_s, window=window, total_weight=self._total_weight
+        )
 
     def update(self, swarm: SwarmState) -> None:
         """Bring the order up to date with what is seen now."""
         previous = self._order or empty_routes(len(self._names))
         task = self._task(swarm)
-        effort = SearchEffort(self._moves, hottest_s=1.5, window=24)
-        kept = improve_routes(task, previous, SearchEffort(0), 0)
+        effort = self._effort(self._moves, hottest_s=1.5, window=24)
+        kept = improve_routes(task, previous, self._effort(0), 0)
         part = RouteWindow.of(task, kept, _SEARCHED_AGAIN)
         first = (
-            kept if part.task is task else improve_routes(part.task, part.order, SearchEffort(0), 0)
+            kept if part.task is task else improve_routes(part.task, part.order, self._effort(0), 0)
         )
         better = improve_routes(part.task, first, effort, swarm.step)
         worthwhile = better.cost_s < first.cost_s - _WORTH_CHANGING_S

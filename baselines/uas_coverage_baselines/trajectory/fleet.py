@@ -13,7 +13,14 @@ from uas_coverage_baselines.routing import RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
-from uas_coverage_baselines.trajectory.retiming import quickest, retimed, shifted, stretches
+from uas_coverage_baselines.trajectory.retiming import (
+    Draft,
+    draft,
+    finished,
+    retimed,
+    shifted,
+    stretches,
+)
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD, VX, VY
@@ -152,36 +159,64 @@ class Fleet:
             solved=0,
         )
 
-    def flights(
+    def drafts(
         self,
         moment: Moment,
         routes: Mapping[int, IntArray],
         movers: Mapping[int, Sequence[Body]],
         budget: int,
-        known: Mapping[int, Flight],
+        known: Mapping[tuple[int, bytes], Flight],
         threads: int = 1,
-    ) -> dict[int, Flight]:
-        """Each UAS's quickest flight; a shorter one makes way for those that fly longer.
+    ) -> dict[int, Draft]:
+        """A flight of each UAS alone, to be finished by `flights`.
 
         Args:
             moment: Where everything is.
             routes: Waypoints of each UAS that is to fly.
             movers: What moves, as each sees it.
             budget: Programs to solve for each, about.
-            known: Flights along these routes that need no search where they still may be flown.
+            known: Flights by UAS and route that need no search where they still may be flown.
             threads: UAS planned side by side; the flights are the same.
         """
         earliest = moment.earliest if moment.earliest.any() else None
 
-        def flight_alone(u: int) -> Flight:
+        def begun(u: int) -> Draft:
             route, program = routes[u], self.program(u, {}, movers[u], earliest)
-            if u in known and program.allows(route, known[u]):
-                return known[u]
-            start = reduced_state(moment.x[u])
-            return quickest(program, self.terrain, u, start, route, budget)
+            same = known.get((u, route.tobytes()))
+            if same is not None and program.allows(route, same):
+                return Draft(same, 0)
+            return draft(program, self.terrain, u, reduced_state(moment.x[u]), route, budget)
 
         with ThreadPoolExecutor(threads) as side_by_side:  # the solver frees the GIL
-            alone = dict(zip(routes, side_by_side.map(flight_alone, routes), strict=True))
+            return dict(zip(routes, side_by_side.map(begun, routes), strict=True))
+
+    def flights(
+        self,
+        moment: Moment,
+        routes: Mapping[int, IntArray],
+        movers: Mapping[int, Sequence[Body]],
+        drafts: Mapping[int, Draft],
+        threads: int = 1,
+    ) -> dict[int, Flight]:
+        """Each UAS's quickest flight, whatever the others fly; arguments as for `drafts`."""
+        earliest = moment.earliest if moment.earliest.any() else None
+
+        def alone(u: int) -> Flight:
+            program = self.program(u, {}, movers[u], earliest)
+            return finished(program, reduced_state(moment.x[u]), routes[u], drafts[u])
+
+        with ThreadPoolExecutor(threads) as side_by_side:
+            return dict(zip(routes, side_by_side.map(alone, routes), strict=True))
+
+    def apart(
+        self,
+        moment: Moment,
+        routes: Mapping[int, IntArray],
+        movers: Mapping[int, Sequence[Body]],
+        alone: Mapping[int, Flight],
+    ) -> dict[int, Flight]:
+        """The flights, of which a shorter one makes way for those that are longer."""
+        earliest = moment.earliest if moment.earliest.any() else None
         flights: dict[int, Flight] = {}
         for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
             paths_m = {k: flight.path_m for k, flight in flights.items()}

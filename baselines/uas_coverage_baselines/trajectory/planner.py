@@ -53,7 +53,8 @@ class TrajectoryOptions(PlannerOptions):
         default=3,
         ge=1,
         le=100,
-        description="orders searched before take-off; one where more than 8 UAS fly",
+        description="orders searched before take-off; one where more than 8 UAS fly, or where "
+        "waypoints are blocked and the plan is made anew as they open",
     )
     moves: int = Field(
         default=300_000,
@@ -111,6 +112,7 @@ class Trajectory:
     def __init__(self, options: TrajectoryOptions | None = None) -> None:
         self.options = options or TrajectoryOptions()
         self.last_decision: Decision | None = None
+        self.mission_plan: MissionPlan | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -126,7 +128,7 @@ class Trajectory:
         """Plan the mission from the starts."""
         self._brief, self._seed = brief, seed
         self._by_legs: LegMission | None = None
-        self.mission_plan: MissionPlan | None = None
+        self.mission_plan = None
         if brief.execution is not None:
             effort = SearchEffort(self.options.moves, total_weight=self._total_weight)
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
@@ -356,7 +358,9 @@ class Trajectory:
         options, n_uas = self.options, len(flying)
         orders = min(options.orders, 2)
         if first:
-            orders = options.orders if n_uas <= _ONE_SEARCH else 1
+            # when what is blocked opens the plan is made anew: the search goes on then
+            once = n_uas > _ONE_SEARCH or unknown.any()
+            orders = 1 if once else options.orders
         larger = min(max(n_uas * len(unknown) / _SMALL, 1.0), _LARGER)
         effort = Effort(
             orders,

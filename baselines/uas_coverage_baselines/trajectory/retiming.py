@@ -90,15 +90,27 @@ def retimed(
     return program.solve(start, route, visits, guess, flight.u[low[:-1]], rounds)
 
 
-def quickest(
+class Draft(NamedTuple):
+    """A flight that is to be made shorter still.
+
+    Attributes:
+        flight: So far.
+        left: Programs to solve for that, about.
+    """
+
+    flight: Flight
+    left: int
+
+
+def draft(
     program: FlightProgram,
     terrain: Terrain,
     uas: int,
     start: FloatArray,
     route: IntArray,
     budget: int,
-) -> Flight:
-    """The quickest flight found along a route.
+) -> Draft:
+    """A flight along a route, as short as all its stretches may be made at once.
 
     Args:
         program: Of the UAS.
@@ -110,10 +122,29 @@ def quickest(
     """
     flight = first_flight(program, terrain, uas, start, route)
     if not flight.is_clear:
-        return flight
+        return Draft(flight, 0)
     # one program of a long flight takes as long as several of a short one
     until = program.solved + round(budget * min(1.0, _LONG_STEPS / flight.steps))
-    return shorten(program, start, route, _coarse(program, start, route, flight, until), until)
+    flight = _coarse(program, start, route, flight, until)
+    return Draft(flight, until - program.solved)
+
+
+def finished(program: FlightProgram, start: FloatArray, route: IntArray, begun: Draft) -> Flight:
+    """The quickest flight found from a draft: steps are taken away one by one."""
+    return shorten(program, start, route, begun.flight, program.solved + begun.left)
+
+
+def quickest(
+    program: FlightProgram,
+    terrain: Terrain,
+    uas: int,
+    start: FloatArray,
+    route: IntArray,
+    budget: int,
+) -> Flight:
+    """The quickest flight found along a route; arguments as for `draft`."""
+    begun = draft(program, terrain, uas, start, route, budget)
+    return finished(program, start, route, begun)
 
 
 def _coarse(
