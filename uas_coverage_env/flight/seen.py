@@ -1,8 +1,8 @@
 """What the cameras of a flight have seen of the ground: their pictures, laid on a grid of cells.
 
 A camera takes a picture at each sample, where the UAS flies at a tilt that the camera allows, and
-at a height and a speed that some waypoint asks for of it, if any does. The ground is flat, z = 0;
-what buildings hide is not considered.
+at a height and a speed that some waypoint asks for of it, if any does. The ground is flat, z = 0,
+but for obstacles of kind `terrain`, whose tops are the ground; what is hidden is not considered.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ BoolArray = NDArray[np.bool_]
 SEARCH_AREA = "search_area"
 """The kind of the decorations that are the ground to be seen, as `import` writes them; with `_` and
 the name of a sensor, by that one."""
+
+TERRAIN = "terrain"
+"""The kind of the obstacles that are ground, as `import` writes them: upright boxes."""
 
 _CELLS = 250_000
 _FINEST_M = 0.5
@@ -133,13 +136,38 @@ def _seen_by(
     flies: BoolArray,
 ) -> SeenGround:
     north_m, east_m, asked = _ground(scenario, name)
+    tops_m = _tops_m(scenario, north_m, east_m)
     seen = np.zeros_like(asked)
     for i, sensor in cameras:
-        for picture in footprints_m(sensor, x[flies[:, i] & _as_asked(scenario, name, x[:, i]), i]):
+        looking = x[flies[:, i] & _as_asked(scenario, name, x[:, i]), i]
+        for place_m, picture in zip(looking[:, :3], footprints_m(sensor, looking), strict=True):
             if np.isfinite(picture).all():
                 rows, columns = _window(north_m, picture[:, 0]), _window(east_m, picture[:, 1])
-                seen[rows, columns] |= _inside(picture, north_m[rows], east_m[columns])
+                north, east, tops = north_m[rows], east_m[columns], tops_m[rows, columns]
+                for top_m in np.unique(tops):
+                    lifted = _lifted(picture, place_m, top_m)
+                    seen[rows, columns] |= (tops == top_m) & _inside(lifted, north, east)
     return SeenGround(name, north_m, east_m, asked, seen)
+
+
+def _tops_m(scenario: Scenario, north_m: FloatArray, east_m: FloatArray) -> FloatArray:
+    """(N, E) how high the ground is, by the terrain that is an obstacle [m]."""
+    tops_m = np.zeros((len(north_m), len(east_m)))
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        if obstacle.kind == TERRAIN:
+            corners = hull.vertices_m
+            rows, columns = _window(north_m, corners[:, 0]), _window(east_m, corners[:, 1])
+            part = tops_m[rows, columns]
+            np.maximum(part, -corners[:, 2].min(), out=part)
+    return tops_m
+
+
+def _lifted(picture: FloatArray, place_m: FloatArray, top_m: float) -> FloatArray:
+    """(4, 2) the corners of a picture on ground that is so high; one point where it is higher."""
+    if top_m == 0.0:
+        return picture
+    share = max(1.0 - top_m / -float(place_m[2]), 0.0)
+    return place_m[:2] + share * (picture - place_m[:2])
 
 
 def _as_asked(scenario: Scenario, name: str, x: FloatArray) -> BoolArray:
