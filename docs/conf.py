@@ -29,7 +29,7 @@ autodoc_mock_imports = [
     name
     for name in (
         *("torch", "stable_baselines3", "sb3_contrib", "matplotlib", "imageio_ffmpeg"),
-        *("pyproj", "shapely", "shapefile", "defusedxml", "rasterio"),
+        *("pyproj", "shapely", "shapefile", "defusedxml"),
     )
     if find_spec(name) is None  # extras that a site is built without
 ]

@@ -177,6 +177,7 @@ def _read(path: Path, grid: rasterio.DatasetReader, window: Window) -> tuple[Flo
     """Heights [m], and where there are none."""
     try:
         found = grid.read(1, window=window, masked=True).astype(np.float64)
+        found = found * grid.scales[0] + grid.offsets[0]
     except (RasterioError, ValueError):
         raise InputError(f"{path}: is damaged; take it from its source again") from None
     heights = found.filled(np.nan)
