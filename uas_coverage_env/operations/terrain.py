@@ -130,7 +130,9 @@ def _cells(
         west = grid.bounds.left
         longitude = west + (longitude - west + _EDGE) % 360.0 - _EDGE
     with np.errstate(invalid="ignore"):
-        column, row = ~grid.transform * (longitude, latitude)
+        to = ~grid.transform
+        column = to.a * longitude + to.b * latitude + to.c
+        row = to.d * longitude + to.e * latitude + to.f
     return column - _EDGE, row - _EDGE
 
 
