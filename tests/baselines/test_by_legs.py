@@ -38,6 +38,15 @@ def test_a_leg_passes_what_is_within_the_radius_less_tolerance_and_tracking(asid
     assert len(corners_of(meadow(waypoints=row), [0, 1, 2]).speeds_mps) == legs
 
 
+@pytest.mark.parametrize("aside_m", [0.0, 2.5])
+def test_a_leg_is_so_slow_that_it_flies_through_no_sphere_between_two_samples(aside_m):
+    row = [ROW[0], waypoint((80.0, 60.0 + aside_m, -20.0), 6.0), ROW[2]]
+    scenario = meadow(waypoints=row)
+    (speed,) = corners_of(scenario, [0, 1, 2]).speeds_mps[1:-1]
+    in_it_m = 2.0 * np.sqrt(6.0**2 - aside_m**2)
+    assert 0.85 * in_it_m < speed * scenario.dt_s < in_it_m
+
+
 def test_legs_lead_over_a_low_roof_and_keep_its_distance():
     house = box("house", (60.0, 20.0, -25.0), (70.0, 100.0, 0.0), safe_distance_m=2.0)
     scenario = meadow(obstacles=[house], waypoints=ROW)

@@ -18,7 +18,7 @@ from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import Place, warnings
 
 _HEIGHT_M = 40.0
-_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink"}
+_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink", "rasterio"}
 
 
 @contextmanager
@@ -47,6 +47,10 @@ def import_area(
     out: Annotated[Path, typer.Option(help="Scenario file to write.")],
     town: Annotated[
         Path | None, typer.Option(help="Buildings of OpenStreetMap as .geojson; or `karhula`.")
+    ] = None,
+    terrain: Annotated[
+        Path | None,
+        typer.Option(help="Heights of the ground, a GeoTIFF or .asc; default: it is flat."),
     ] = None,
     fleet: Annotated[
         str,
@@ -86,6 +90,10 @@ def import_area(
             help="Top of the fence, m; default: 30 m above the waypoints.", show_default=False
         ),
     ] = None,
+    min_height: Annotated[
+        float,
+        typer.Option(help="Of UAS above ground and roofs, but for take-off and landing, m."),
+    ] = 0.0,
     flown_by: Annotated[
         str | None,
         typer.Option(
@@ -123,6 +131,8 @@ def import_area(
         ceiling_m=ceiling,
         homes=tuple(place_of("--home", text) for text in home or ()),
         town=town,
+        terrain=terrain,
+        min_height_m=min_height,
         flown_by=flown_by,
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"

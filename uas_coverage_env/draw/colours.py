@@ -33,6 +33,7 @@ OBSTACLES: dict[str, Colour] = {
     "residential": (209, 178, 138),
     "high_rise": (163, 141, 126),
     "church": (190, 122, 100),
+    "terrain": (203, 193, 158),
 }
 OTHER_OBSTACLE: Colour = (168, 168, 164)
 

@@ -1,8 +1,8 @@
 """What the cameras of a flight have seen of the ground: their pictures, laid on a grid of cells.
 
 A camera takes a picture at each sample, where the UAS flies at a tilt that the camera allows, and
-at a height and a speed that some waypoint asks for of it, if any does. The ground is flat, z = 0;
-what buildings hide is not considered.
+at a height and a speed that some waypoint asks for of it, if any does. The ground is flat, z = 0,
+but for obstacles of kind `terrain`, whose tops are the ground; what is hidden is not considered.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ BoolArray = NDArray[np.bool_]
 SEARCH_AREA = "search_area"
 """The kind of the decorations that are the ground to be seen, as `import` writes them; with `_` and
 the name of a sensor, by that one."""
+
+TERRAIN = "terrain"
+"""The kind of the obstacles that are ground, as `import` writes them: upright boxes."""
 
 _CELLS = 250_000
 _FINEST_M = 0.5
@@ -63,7 +67,8 @@ class SeenPictures:
     Attributes:
         sensor: Its name; of all UAS that carry it.
         sample: (P,) when they were taken, in order of time.
-        corners_m: (P, 4, 2) north and east of their corners, in order round the picture [m].
+        corners_m: (P, 4, 2) north and east of their corners at z = 0, in order round the
+            picture [m]; where terrain is higher, less of it is seen.
         share: (T,) of the ground to be seen, how much was until each sample, 0..1.
     """
 
@@ -83,12 +88,12 @@ def seen_ground(flight: FlightRecord, until: int | None = None) -> tuple[SeenGro
     samples = slice(None if until is None else until + 1)
     found = []
     for name, pictures in _taken(flight, samples).items():
-        north_m, east_m, asked = _ground(flight.scenario, name)
-        seen = np.zeros_like(asked)
-        for _, corners_m in pictures:
-            window, inside = _cells(corners_m, north_m, east_m)
+        ground = _ground(flight.scenario, name)
+        seen = np.zeros_like(ground.asked)
+        for picture in pictures:
+            window, inside = ground.cells(picture)
             seen[window] |= inside
-        found.append(SeenGround(name, north_m, east_m, asked, seen))
+        found.append(SeenGround(name, ground.north_m, ground.east_m, ground.asked, seen))
     return tuple(found)
 
 
@@ -96,20 +101,21 @@ def seen_pictures(flight: FlightRecord) -> tuple[SeenPictures, ...]:
     """What each kind of camera has seen, picture by picture; empty where no UAS carries one."""
     found = []
     for name, pictures in _taken(flight, slice(None)).items():
-        north_m, east_m, asked = _ground(flight.scenario, name)
-        seen = np.zeros_like(asked)
+        ground = _ground(flight.scenario, name)
+        asked, seen = ground.asked, np.zeros_like(ground.asked)
         new_cells = np.zeros(len(flight.x))
-        kept: list[tuple[int, FloatArray]] = []
-        for sample, corners_m in pictures:
-            window, inside = _cells(corners_m, north_m, east_m)
+        kept: list[_Picture] = []
+        for picture in pictures:
+            window, inside = ground.cells(picture)
             new = inside & ~seen[window]
             if new.any():
                 seen[window] |= new
-                new_cells[sample] += (new & asked[window]).sum()
-                kept.append((sample, corners_m))
+                new_cells[picture.sample] += (new & asked[window]).sum()
+                kept.append(picture)
         share = new_cells.cumsum() / asked.sum() if asked.any() else np.ones(len(flight.x))
-        corners = np.array([corners_m for _, corners_m in kept]).reshape(-1, 4, 2)
-        found.append(SeenPictures(name, np.array([k for k, _ in kept], np.intp), corners, share))
+        samples = np.array([picture.sample for picture in kept], np.intp)
+        corners = np.array([picture.corners_m for picture in kept]).reshape(-1, 4, 2)
+        found.append(SeenPictures(name, samples, corners, share))
     return tuple(found)
 
 
@@ -163,8 +169,39 @@ def _turned(rays: FloatArray, phi: FloatArray, theta: FloatArray, psi: FloatArra
     return np.stack(np.broadcast_arrays(north, east, down), axis=-1)
 
 
-def _taken(flight: FlightRecord, samples: slice) -> dict[str, Iterator[tuple[int, FloatArray]]]:
-    """Camera -> sample and corners (4, 2) of its pictures that count, in order of time."""
+class _Picture(NamedTuple):
+    sample: int
+    place_m: FloatArray  # (3,) of the UAS
+    corners_m: FloatArray  # (4, 2) at z = 0
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """The middles of cells, which of them are to be seen, and how high they lie (N, E) [m]."""
+
+    north_m: FloatArray
+    east_m: FloatArray
+    asked: BoolArray
+    tops_m: FloatArray
+
+    def cells(self, picture: _Picture) -> tuple[tuple[slice, slice], BoolArray]:
+        """The cells around a picture, and which of them are in it."""
+        around_m = np.vstack([picture.corners_m, picture.place_m[:2]])
+        rows, columns = (
+            _window(middles_m, around_m[:, k])
+            for k, middles_m in enumerate((self.north_m, self.east_m))
+        )
+        north_m, east_m = self.north_m[rows], self.east_m[columns]
+        tops_m = self.tops_m[rows, columns]
+        inside = np.zeros(tops_m.shape, np.bool_)
+        for top_m in np.unique(tops_m).tolist():
+            lifted_m = _lifted(picture, top_m)
+            inside |= (tops_m == top_m) & _inside(lifted_m, north_m, east_m)
+        return (rows, columns), inside
+
+
+def _taken(flight: FlightRecord, samples: slice) -> dict[str, Iterator[_Picture]]:
+    """Camera -> its pictures that count, in order of time."""
     x, flies = flight.x[samples].copy(), flight.mode[samples] < LANDED
     x[..., PHI:WX] = flight.attitude_rad[samples]
     carried: dict[str, list[tuple[int, Sensor]]] = {}
@@ -184,21 +221,33 @@ def _in_time(
     cameras: list[tuple[int, Sensor]],
     x: FloatArray,
     flies: BoolArray,
-) -> Iterator[tuple[int, FloatArray]]:
+) -> Iterator[_Picture]:
     corners_m = np.full((len(x), len(cameras), 4, 2), np.nan)
     for c, (i, sensor) in enumerate(cameras):
         counts = flies[:, i] & _as_asked(scenario, name, x[:, i])
         corners_m[counts, c] = footprints_m(sensor, x[counts, i])
     for k, c in np.argwhere(np.isfinite(corners_m).all(axis=(2, 3))).tolist():
-        yield k, corners_m[k, c]
+        yield _Picture(k, x[k, cameras[c][0], :3], corners_m[k, c])
 
 
-def _cells(
-    corners_m: FloatArray, north_m: FloatArray, east_m: FloatArray
-) -> tuple[tuple[slice, slice], BoolArray]:
-    """The cells around a picture, and which of them are in it."""
-    rows, columns = _window(north_m, corners_m[:, 0]), _window(east_m, corners_m[:, 1])
-    return (rows, columns), _inside(corners_m, north_m[rows], east_m[columns])
+def _tops_m(scenario: Scenario, north_m: FloatArray, east_m: FloatArray) -> FloatArray:
+    """(N, E) how high the ground is, by the terrain that is an obstacle [m]."""
+    tops_m = np.zeros((len(north_m), len(east_m)))
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        if obstacle.kind == TERRAIN:
+            corners = hull.vertices_m
+            rows, columns = _window(north_m, corners[:, 0]), _window(east_m, corners[:, 1])
+            part = tops_m[rows, columns]
+            np.maximum(part, -corners[:, 2].min(), out=part)
+    return tops_m
+
+
+def _lifted(picture: _Picture, top_m: float) -> FloatArray:
+    """(4, 2) the corners of a picture on ground that is so high; one point where it is higher."""
+    if top_m == 0.0:
+        return picture.corners_m
+    share = max(1.0 + top_m / float(picture.place_m[2]), 0.0)
+    return picture.place_m[:2] + share * (picture.corners_m - picture.place_m[:2])
 
 
 def _as_asked(scenario: Scenario, name: str, x: FloatArray) -> BoolArray:
@@ -215,8 +264,7 @@ def _as_asked(scenario: Scenario, name: str, x: FloatArray) -> BoolArray:
     return fits
 
 
-def _ground(scenario: Scenario, name: str) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Middles of cells to the north and east, and which of them are to be seen."""
+def _ground(scenario: Scenario, name: str) -> _Ground:
     corners_m = scenario.fence.vertices_m[:, :2]
     low, high = corners_m.min(axis=0), corners_m.max(axis=0)
     cell_m = max(math.sqrt(float(np.prod(high - low)) / _CELLS), _FINEST_M)
@@ -233,7 +281,7 @@ def _ground(scenario: Scenario, name: str) -> tuple[FloatArray, FloatArray, Bool
         columns = _window(east_m, np.array([east - radius, east + radius]))
         away_m = np.hypot(north_m[rows, None] - north, east_m[None, columns] - east)
         asked[rows, columns] |= away_m <= radius
-    return north_m, east_m, asked
+    return _Ground(north_m, east_m, asked, _tops_m(scenario, north_m, east_m))
 
 
 def _window(middles_m: FloatArray, places_m: FloatArray) -> slice:

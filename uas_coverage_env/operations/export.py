@@ -13,7 +13,9 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.mission.lateness import Pair, pairs_of
+from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.mission.separation import Waits, separate
+from uas_coverage_env.operations.asked import stopping
 from uas_coverage_env.operations.exported import Exported, exported, followed, waiting
 from uas_coverage_env.operations.formats import FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
@@ -90,7 +92,7 @@ def make_export(flight: Flight, options: ExportOptions) -> Export:
         if track is None:
             grounded.append(uas.name)
         else:
-            tracks.append(track)
+            tracks.append(_as_asked(flight, track, settled.tolerances))
     if not tracks:
         raise InputError("no UAS flies in this flight; there is nothing to export")
     exports, pairs = _kept_apart(flight, tracks, frame, settled)
@@ -141,6 +143,13 @@ def _check(options: ExportOptions, settled: _Settled) -> None:
             raise InputError(f"{name} {value:g}: should be between 0.1 and {MOST_TOLERANCE_M:g}")
     if not 0.0 <= settled.min_slack_s <= 3_600.0:
         raise InputError(f"--min-slack {settled.min_slack_s:g}: should be between 0 and 3600")
+
+
+def _as_asked(flight: Flight, track: Track, tolerances: Tolerances) -> Track:
+    def fly(one: Track) -> Followed:
+        return followed(one, flight.scenario, tolerances, Waits())
+
+    return stopping(flight.scenario, track, tolerances.corner_m, fly)
 
 
 def place_of_flight(flight: Flight, given: Place | None) -> Place:
@@ -224,7 +233,7 @@ def _apart(flight: Flight, settled: _Settled, tracks: Sequence[Track]) -> Apart:
     fleet = [
         (
             track.uas,
-            partial(followed, track, scenario.vehicles[track.uas], settled.tolerances),
+            partial(followed, track, scenario, settled.tolerances),
         )
         for track in tracks
     ]
@@ -274,9 +283,6 @@ def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
     notes = []
     if scenario.moving_obstacles:
         notes.append("files of legs carry no time: moving obstacles are not avoided")
-    asks = any(waypoint.max_speed_mps is not None for waypoint in scenario.waypoints)
-    if asks and scenario.execution is None:
-        notes.append("files keep the path, not the speeds that waypoints ask for")
     if scenario.wind is not None or scenario.uncertainty is not None or scenario.disturbances:
         notes.append("the report holds for still air, and for the vehicles as their files say")
     if scenario.execution is not None:
@@ -295,4 +301,9 @@ def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
         ).sum()
         if at_risk:
             notes.append(f"{one.track.name}: {at_risk} waypoints may be missed")
+        if one.not_as_asked:
+            notes.append(
+                f"{one.track.name}: {len(one.not_as_asked)} waypoints are not passed within the "
+                f"radius, speed and heights that they ask for"
+            )
     return notes

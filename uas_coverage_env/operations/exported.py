@@ -1,5 +1,6 @@
 """One UAS of an export: its legs, how they are flown, and what that takes of its battery."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.mission.separation import Waits
+from uas_coverage_env.operations.asked import most_mps, not_as_asked
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.room import Surroundings
 from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
@@ -19,7 +21,7 @@ from uas_coverage_env.vehicle import DOD, VehicleParams
 from uas_coverage_env.vehicle.range import dod_per_s
 
 _SLOWEST_MPS = 0.5
-_SAME_SPEED_MPS = 0.5
+_SAME_SPEED_MPS, _SAME_SHARE = 0.5, 0.1
 _LEAST_RETURN_M = 15.0
 _ABOVE_ROOFS_M = 1.0
 _EVERY = 5
@@ -67,6 +69,7 @@ class Exported:
         vehicle: Its vehicle.
         frame: Where it is on the Earth.
         looks_ahead: Whether it looks where it flies; else, north.
+        not_as_asked: Waypoints not passed within the radius, speed and heights they ask for.
     """
 
     track: Track
@@ -80,6 +83,7 @@ class Exported:
     vehicle: VehicleParams
     frame: LocalFrame
     looks_ahead: bool
+    not_as_asked: tuple[int, ...]
 
     @property
     def point_of_no_return(self) -> int | None:
@@ -91,22 +95,20 @@ class Exported:
         return self.frame.to_geodetic(places_m)
 
 
-def followed(
-    track: Track, vehicle: VehicleParams, tolerances: Tolerances, waits: Waits
-) -> Followed:
+def followed(track: Track, scenario: Scenario, tolerances: Tolerances, waits: Waits) -> Followed:
     """How an autopilot flies the file of a track.
 
     Args:
         track: The track.
-        vehicle: Whose limits the autopilot has.
+        scenario: Whose vehicles have the autopilot's limits, and whose waypoints ask for speeds.
         tolerances: How far from a corner it may pass.
         waits: Where it waits for others.
     """
     return follow(
         track.corners_m,
-        file_speeds(track),
+        file_speeds(track, scenario),
         file_holds(track, waits),
-        Autopilot.of(vehicle, tolerances.corner_m),
+        Autopilot.of(scenario.vehicles[track.uas], tolerances.corner_m),
         waits.start_s,
     )
 
@@ -120,11 +122,11 @@ def exported(
 ) -> Exported:
     """What there is to say about a track."""
     scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
-    flown = followed(track, vehicle, tolerances, waits)
+    flown = followed(track, scenario, tolerances, waits)
     charges, soc_landed = _charges(flight, track, flown, waits)
     return Exported(
         track=track,
-        speeds_mps=file_speeds(track),
+        speeds_mps=file_speeds(track, scenario),
         holds_s=file_holds(track, waits),
         waits=waits,
         followed=flown,
@@ -134,16 +136,21 @@ def exported(
         vehicle=vehicle,
         frame=frame,
         looks_ahead=scenario.uas[track.uas].heading == "course",
+        not_as_asked=tuple(not_as_asked(scenario, track, flown)),
     )
 
 
-def file_speeds(track: Track) -> tuple[float, ...]:
-    """Speed of each leg [m/s]: changed only where it matters, each change is an item of its own."""
+def file_speeds(track: Track, scenario: Scenario) -> tuple[float, ...]:
+    """Speed of each leg [m/s]: changed only where it matters, each change is an item of its own.
+
+    Never above what waypoints on a leg ask for (`asked.most_mps`).
+    """
     speeds: list[float] = []
-    for leg in track.legs:
-        wanted = round(max(leg.speed_mps, _SLOWEST_MPS), 1)
-        changed = not speeds or abs(wanted - speeds[-1]) > _SAME_SPEED_MPS
-        speeds.append(wanted if changed else speeds[-1])
+    for leg, most in zip(track.legs, most_mps(scenario, track), strict=True):
+        wanted = min(round(max(leg.speed_mps, _SLOWEST_MPS), 1), most)
+        last = speeds[-1] if speeds else math.inf
+        same = abs(wanted - last) <= min(_SAME_SPEED_MPS, _SAME_SHARE * wanted)
+        speeds.append(last if same and last <= most else wanted)
     return tuple(speeds)
 
 

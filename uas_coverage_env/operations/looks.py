@@ -9,6 +9,9 @@ from typing import Any
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.cameras import Camera, named_camera
 
+_UNEVEN_M = 1.0
+"""Ground that falls away by less than that under a waypoint is not worth a word."""
+
 
 @dataclass(frozen=True)
 class Look:
@@ -30,18 +33,26 @@ class Look:
         """The table of the camera on a UAS."""
         return {"name": self.name, "field_of_view_deg": list(self.camera.field_of_view_deg())}
 
-    def note(self, hectares: float, heights_m: Sequence[float]) -> str:
-        """What is seen, from how many waypoints, for the user."""
+    def note(self, hectares: float, heights_m: Sequence[float], *, uneven: bool = False) -> str:
+        """What is seen, from how many waypoints, for the user.
+
+        Args:
+            hectares: What is to be seen [ha].
+            heights_m: Of the waypoints above the lowest ground that they see [m].
+            uneven: Whether the ground is.
+        """
         east_m, north_m = self.pitch_m
         line = (
             f"{hectares:.1f} ha in {len(heights_m)} waypoints, at most {east_m:.1f} m apart from "
             f"west to east and {north_m:.1f} m from south to north; "
             f"{100.0 * self.camera.ground_sample_m(self.height_m):.1f} cm per pixel"
         )
-        raised = sum(height_m > self.height_m + 1e-3 for height_m in heights_m)
+        least_m = self.height_m + (_UNEVEN_M if uneven else 1e-3)
+        raised = sum(height_m > least_m for height_m in heights_m)
         if raised:
+            over = "roofs, or ground that falls away" if uneven else "roofs"
             worst_cm = 100.0 * self.camera.ground_sample_m(max(heights_m))
-            line += f" (up to {worst_cm:.1f} from {raised} that lie higher, over roofs)"
+            line += f" (up to {worst_cm:.1f} from {raised} that lie higher, over {over})"
         return line
 
 

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import shapely
-from shapely.geometry import Point, Polygon
+import numpy as np
+from shapely.geometry import Polygon
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
@@ -16,18 +16,17 @@ from uas_coverage_env.operations.cameras import named_camera
 from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.operations.drawing import Drawn
 from uas_coverage_env.operations.fleet import SPARE_M, Member, fleet_tables, parse_fleet
-from uas_coverage_env.operations.layout import MOST_WAYPOINTS, lay_waypoints
 from uas_coverage_env.operations.looks import Look, look_at, look_of
+from uas_coverage_env.operations.relief import Relief, relief_of
 from uas_coverage_env.operations.site import (
     FENCE_MARGIN_M,
-    LARGEST_UAS_M,
     Area,
     Site,
-    Wall,
     building_walls,
     make_site,
 )
-from uas_coverage_env.operations.town import Town, read_town
+from uas_coverage_env.operations.town import Building, Town, read_town
+from uas_coverage_env.operations.waypoints import Asked, make_waypoints
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.endurance import back_and_forth
 
@@ -36,11 +35,11 @@ UAS_SAFE_DISTANCE_M = 5.0
 _FILES_OFF_M = 3.0
 """How much wider UAS that share a take-off place stand where files fly them."""
 
-_SPARE_M = 1.0
-"""Between a waypoint and the nearest place that a UAS may take."""
-
 _ABOVE_WAYPOINTS_M = 30.0
 """Top of the fence above the waypoints, unless it is given."""
+
+_LOWEST_ROOF_M = 0.5
+"""Above the take-off places: in a valley, roofs may be below."""
 
 _MOST_STEPS = 100_000
 _OUTLINE_DETAIL_M = 0.5
@@ -63,6 +62,8 @@ class ImportOptions:
         ceiling_m: Top of the fence above the ground; None: 30 m above the waypoints [m].
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
         town: GeoJSON of buildings.
+        terrain: Grid of heights; None: the ground is flat.
+        min_height_m: Least height of UAS above ground and roofs, but for take-off and landing [m].
         flown_by: Who flies it in the end, `autopilot`; None: nobody in particular.
     """
 
@@ -76,6 +77,8 @@ class ImportOptions:
     ceiling_m: float | None = None
     homes: tuple[tuple[float, float], ...] = ()
     town: Path | None = None
+    terrain: Path | None = None
+    min_height_m: float = 0.0
     flown_by: str | None = None
 
 
@@ -108,12 +111,23 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     _check(options)
     fleet = parse_fleet(options.fleet)
     looks = _looks(fleet, options)
-    ceiling_m = _ceiling_m(looks, options)
+    ceiling_m, relief = _ceiling_m(looks, options), Relief()
     site = make_site(things, options.homes, ceiling_m)
+    uas = _fleet_tables(fleet, looks, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0))
+    if options.terrain is not None:
+        starts_m = np.array([table["start_m"][1::-1] for table in uas])
+        relief = relief_of(options.terrain, site, starts_m)
+        rise_m = relief.highest_m([area.shape for area in site.areas])
+        ceiling_m = _ceiling_m(looks, options, rise_m)
+        site = make_site(things, options.homes, ceiling_m, relief.start_m)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
-    walls = [*site.no_fly, *building_walls(town.buildings, site.fence)]
+    buildings = [_raised(building, relief) for building in town.buildings]
+    higher = [building for building in buildings if building.height_m >= _LOWEST_ROOF_M]
+    walls = [*site.no_fly, *relief.walls, *building_walls(higher, site.fence)]
     seen = [(area, look_at(looks, area.camera, area.source)) for area in site.areas]
-    waypoints, left_out_m2 = _waypoints(site, walls, seen, ceiling_m, options)
+    asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
+    asked = Asked(options.radius_m, options.max_speed_mps, options.min_height_m, asks)
+    waypoints = make_waypoints(site, relief, walls, seen, ceiling_m, asked)
     tables = {
         "schema": 1,
         "name": name,
@@ -135,22 +149,28 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
             }
             for n, wall in enumerate(walls)
         ],
-        "uas": _fleet_tables(
-            fleet, looks, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0)
-        ),
-        "waypoints": [table for tables in waypoints.values() for table in tables],
+        "uas": uas,
+        "waypoints": waypoints.all(),
         "decorations": _decorations(seen, several=len(looks) > 1),
         "place": site.frame.place.model_dump(),
+        **({"min_height_m": options.min_height_m} if options.min_height_m else {}),
         **({"execution": {"flown_by": options.flown_by}} if options.flown_by else {}),
     }
     scenario = _finite(parse(tables, Scenario, name))
     notes = [
-        *_look_notes(looks, seen, waypoints),
+        *_look_notes(looks, seen, waypoints.above_m, uneven=relief.ground is not None),
         f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} obstacles",
+        *([relief.note(site)] if relief.ground else []),
         *_town_notes(town),
     ]
-    if left_out_m2 >= 0.5:
-        notes.append(f"left out: {left_out_m2:.0f} m² that are seen from no place a UAS may take")
+    if waypoints.too_high:
+        notes.append(
+            f"{waypoints.too_high} waypoints lie higher above the ground than asked: it is below "
+            f"the take-off places, and no UAS flies below them"
+        )
+    if waypoints.left_out_m2 >= 0.5:
+        out_m2 = waypoints.left_out_m2
+        notes.append(f"left out: {out_m2:.0f} m² that are seen from no place a UAS may take")
     return Imported(scenario, tuple(notes), town.credit if town.buildings else "")
 
 
@@ -162,8 +182,14 @@ def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
     return tuple(look_of(name, *how) for name in names)
 
 
-def _ceiling_m(looks: Sequence[Look], options: ImportOptions) -> float:
-    highest_m = max(look.height_m for look in looks)
+def _raised(building: Building, relief: Relief) -> Building:
+    """A building on the highest ground under it."""
+    ground_m = relief.range_m(*building.footprint.bounds)[1]
+    return replace(building, height_m=building.height_m + ground_m) if ground_m else building
+
+
+def _ceiling_m(looks: Sequence[Look], options: ImportOptions, rise_m: float = 0.0) -> float:
+    highest_m = max(look.height_m for look in looks) + rise_m
     if options.ceiling_m is None:
         return highest_m + _ABOVE_WAYPOINTS_M
     _within("--ceiling", options.ceiling_m, highest_m + options.radius_m, 2_000.0)
@@ -186,14 +212,16 @@ def _fleet_tables(
 def _look_notes(
     looks: Sequence[Look],
     seen: Sequence[tuple[Area, Look]],
-    waypoints: Mapping[str, Sequence[dict[str, Any]]],
+    above_m: Mapping[str, Sequence[float]],
+    *,
+    uneven: bool,
 ) -> list[str]:
     notes = []
     for look in looks:
         hectares = sum(area.shape.area for area, by in seen if by is look) / 1e4
-        heights_m = [-table["position_m"][2] for table in waypoints.get(look.name, ())]
+        heights_m = above_m.get(look.name, ())
         named = f"{look.name}: " if len(looks) > 1 else ""
-        notes.append(named + look.note(hectares, heights_m))
+        notes.append(named + look.note(hectares, heights_m, uneven=uneven))
     return notes
 
 
@@ -202,6 +230,7 @@ def _check(options: ImportOptions) -> None:
         raise InputError(f"--flown-by {options.flown_by[:40]!r}: take {', '.join(FLOWN_BY)}")
     _within("--height", options.height_m, 1.0, 1_000.0)
     _within("--radius", options.radius_m, 0.5, 1_000.0)
+    _within("--min-height", options.min_height_m, 0.0, 100.0)
     _within("--overlap", options.overlap, 0.0, 0.9)
     if options.max_speed_mps is not None:
         _within("--max-speed", options.max_speed_mps, 0.5, 100.0)
@@ -210,62 +239,6 @@ def _check(options: ImportOptions) -> None:
 def _within(name: str, value: float, least: float, most: float) -> None:
     if not least <= value <= most:
         raise InputError(f"{name} {value:g}: should be between {least:g} and {most:g}")
-
-
-def _waypoints(
-    site: Site,
-    walls: Sequence[Wall],
-    seen: Sequence[tuple[Area, Look]],
-    ceiling_m: float,
-    options: ImportOptions,
-) -> tuple[dict[str, list[dict[str, Any]]], float]:
-    """The tables `[[waypoints]]` of each camera, and the area that is left out [m²]."""
-    keep_m = LARGEST_UAS_M + _SPARE_M
-    low, high = [], []
-    for wall in walls:
-        fits = wall.top_m + wall.safe_distance_m + keep_m <= ceiling_m - FENCE_MARGIN_M
-        (low if fits else high).append(wall)
-    allowed = site.fence.buffer(-(FENCE_MARGIN_M + keep_m)).difference(
-        shapely.union_all([wall.footprint.buffer(wall.safe_distance_m + keep_m) for wall in high])
-    )
-    if allowed.is_empty:
-        raise InputError("no waypoint has room in the fence; enlarge the fence")
-    roofs = shapely.STRtree([w.footprint.buffer(w.safe_distance_m + keep_m) for w in low])
-    asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
-    tables: dict[str, list[dict[str, Any]]] = {}
-    left_out_m2 = 0.0
-    for number, (area, look) in enumerate(seen):
-        layout = lay_waypoints(area.shape, look.pitch_m, allowed, f"area {number + 1}")
-        left_out_m2 += layout.left_out_m2
-        for east_m, north_m in layout.places_m:
-            under = roofs.query(Point(east_m, north_m), "intersects")
-            tops = [low[k].top_m + low[k].safe_distance_m + keep_m for k in under]
-            position_m = (north_m, east_m, -max(look.height_m, *tops, 0.0))
-            tables.setdefault(look.name, []).append(
-                {
-                    "kind": "search",
-                    "position_m": [round(value, 3) for value in position_m],
-                    "radius_m": options.radius_m,
-                    "weight": area.weight,
-                    **_asked(look, options, asks=asks),
-                }
-            )
-    count = sum(map(len, tables.values()))
-    if count > MOST_WAYPOINTS:
-        raise InputError(
-            f"the areas need {count} waypoints, more than {MOST_WAYPOINTS}; fly higher "
-            f"(--height), or divide them into missions"
-        )
-    if not tables:
-        raise InputError("nothing of the areas is seen from any place that a UAS may take")
-    return tables, left_out_m2
-
-
-def _asked(look: Look, options: ImportOptions, *, asks: bool) -> dict[str, Any]:
-    """What a waypoint asks for."""
-    if options.max_speed_mps is not None:
-        return {"sensor": look.name, "max_speed_mps": options.max_speed_mps}
-    return {"sensor": look.name} if asks else {}
 
 
 def _finite(scenario: Scenario) -> Scenario:

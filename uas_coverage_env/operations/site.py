@@ -84,7 +84,10 @@ class Site:
 
 
 def make_site(
-    things: Sequence[Drawn], homes: Sequence[tuple[float, float]], ceiling_m: float
+    things: Sequence[Drawn],
+    homes: Sequence[tuple[float, float]],
+    ceiling_m: float,
+    start_m: float | None = None,
 ) -> Site:
     """The site that was drawn.
 
@@ -92,11 +95,12 @@ def make_site(
         things: Polygons and take-off places.
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
         ceiling_m: Top of the fence above the ground [m].
+        start_m: Height of the take-off places; None: as a drawing says [m].
 
     Raises:
         InputError: Something in it cannot be meant.
     """
-    frame = _with_height(frame_around(list(things)), things)
+    frame = _with_height(frame_around(list(things)), things, start_m)
     polygons = [
         (thing, local_polygon(frame, thing)) for thing in things if isinstance(thing, DrawnPolygon)
     ]
@@ -137,8 +141,10 @@ def building_walls(buildings: Sequence[Building], fence: Polygon) -> list[Wall]:
     ]
 
 
-def _with_height(frame: LocalFrame, things: Sequence[Drawn]) -> LocalFrame:
-    """The height of the ground that a file tells with a take-off place."""
+def _with_height(frame: LocalFrame, things: Sequence[Drawn], start_m: float | None) -> LocalFrame:
+    """The height of the ground: given, or what a file tells with a take-off place."""
+    if start_m is not None:
+        return LocalFrame(frame.place.model_copy(update={"height_m": round(start_m, 3)}))
     for thing in things:
         if isinstance(thing, TakeOff) and thing.height_m is not None:
             if not -1_000.0 <= thing.height_m <= 10_000.0:

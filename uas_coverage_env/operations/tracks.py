@@ -362,8 +362,8 @@ class _Builder:
 
     def speed_mps(self, i: int, j: int) -> float:
         """Mean speed of the flight between two samples, or the largest."""
-        if j <= i:
-            return 1.0
+        if j <= i:  # above its start
+            return 3.0 if self._rests_between else 1.0
         steps_m = np.linalg.norm(np.diff(self.path[i : j + 1], axis=0), axis=1)
         return float(steps_m.max() if self._rests_between else steps_m.mean()) / self.dt_s
 

@@ -90,7 +90,7 @@ class Obstacle(StrictModel):
 
     Attributes:
         name: Unique among the obstacles.
-        kind: Free label; it chooses a colour in pictures.
+        kind: Free label; it chooses a colour in pictures, and cameras see the tops of `terrain`.
         safe_distance_m: Kept from the hull in addition to the radius of the UAS [m].
         vertices_m: Points whose convex hull is the obstacle, (V, 3) [m].
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -28,6 +29,9 @@ _ABOVE_OTHERS_M = 1.5
 _HEADROOM_M = 0.5
 _TRACKING_M = 1.0
 """How far a flight may be from its legs, taken off the radius of waypoints that legs pass."""
+
+_SAMPLED_OFF_M = 0.3
+"""Farther from a waypoint than its leg, most of the time."""
 
 _MOST_PASSED = 60
 _SAME_M = 0.1
@@ -87,6 +91,7 @@ class CoursePlanner:
             highest_m = max(-uas.start_m[2] for uas in brief.uas)
             self._lift_m = max(self._lift_m, highest_m + apart_m + _ABOVE_OTHERS_M)
         spent_m = self._execution.tolerance_m + _TRACKING_M
+        self._radius_m = np.array([w.radius_m for w in brief.waypoints])
         self._passed_m = np.array([w.radius_m - spent_m for w in brief.waypoints])
         anything = (-np.inf, np.inf)
         self._heights_m = np.array([w.heights_m or anything for w in brief.waypoints], float)
@@ -114,6 +119,7 @@ class CoursePlanner:
             n = self._passed(places[-1], waypoints[k:])
             run = waypoints[k : k + n]
             speed = min(self._fastest_mps[uas], 0.9 * self._asked_mps[list(run)].min())
+            speed = min(speed, self._sampled_mps(places[-1], run))
             self._fly_to(run[-1], self._waypoints_m[run[-1]], places, speeds, speed)
             leg_of += [len(speeds) - 1] * n
             k += n
@@ -160,15 +166,30 @@ class CoursePlanner:
         return most
 
     def _passes(self, a: FloatArray, b: FloatArray, between: list[int]) -> bool:
-        way = b - a
-        share = np.clip((self._waypoints_m[between] - a) @ way / max(way @ way, 1e-9), 0.0, 1.0)
-        nearest_m = a + share[:, None] * way
-        away_m = np.linalg.norm(nearest_m - self._waypoints_m[between], axis=1)
+        away_m, share, nearest_m = self._off_m(a, b, between)
         low_m, high_m = self._heights_m[between].T
         asked = (-nearest_m[:, 2] >= low_m) & (-nearest_m[:, 2] <= high_m)
         in_turn = bool((np.diff(share) >= 0.0).all())
         near = away_m <= np.maximum(self._passed_m[between], _SAME_M)
         return bool(in_turn and near.all() and asked.all())
+
+    def _sampled_mps(self, here_m: FloatArray, run: Sequence[int]) -> float:
+        """How fast a leg may be without flying through a sphere between two samples [m/s]."""
+        between = list(run[:-1])
+        if not between:
+            return math.inf
+        away_m = self._off_m(here_m, self._waypoints_m[run[-1]], between)[0] + _SAMPLED_OFF_M
+        chord_m = 2.0 * np.sqrt(np.maximum(self._radius_m[between] ** 2 - away_m**2, _SAME_M))
+        return float(chord_m.min()) / self._brief.dt_s
+
+    def _off_m(
+        self, a: FloatArray, b: FloatArray, waypoints: list[int]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n,) distances of waypoints from a leg, (n,) share of it, (n, 3) nearest places."""
+        way = b - a
+        share = np.clip((self._waypoints_m[waypoints] - a) @ way / max(way @ way, 1e-9), 0.0, 1.0)
+        nearest_m = a + share[:, None] * way
+        return np.linalg.norm(nearest_m - self._waypoints_m[waypoints], axis=1), share, nearest_m
 
     def _is_clear(self, row: int, a: FloatArray, b: FloatArray) -> bool:
         return route(self.terrain.arena, row, *a, *b)[3] == CLEAR
