@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-import uas_coverage_baselines.trajectory.mission_plan as mission_plan
 import uas_coverage_baselines.trajectory.program as program_module
 from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import box, meadow, mover, waypoint
@@ -184,19 +183,6 @@ def test_what_is_blocked_is_waited_for_at_a_distance_and_covered_later():
     assert accomplished(flight)
     assert is_harmless(flight)
     assert flight.steps > 45
-
-
-@pytest.mark.parametrize(("moving", "searched"), [((), 4), ((PARKED,), 1)])
-def test_before_take_off_one_order_is_searched_where_the_plan_is_made_anew_anyway(
-    monkeypatch, moving, searched
-):
-    calls, improve = [], mission_plan.improve_routes
-    monkeypatch.setattr(
-        mission_plan, "improve_routes", lambda *args: calls.append(args) or improve(*args)
-    )
-    brief = MissionBrief.of(field(starts_m=TWO, moving_obstacles=moving))
-    planner(orders=4, moves=80, programs=3).reset(brief, 0)
-    assert len(calls) == searched
 
 
 @pytest.mark.parametrize("heading", [(0.0, 4.0, 0.0), (3.0, 3.0, 0.0), (-2.0, 5.0, 0.5)])

@@ -53,8 +53,7 @@ class TrajectoryOptions(PlannerOptions):
         default=3,
         ge=1,
         le=100,
-        description="orders searched before take-off; one where more than 8 UAS fly, or where "
-        "waypoints are blocked and the plan is made anew as they open",
+        description="orders searched before take-off; one where more than 8 UAS fly",
     )
     moves: int = Field(
         default=300_000,
@@ -358,9 +357,7 @@ class Trajectory:
         options, n_uas = self.options, len(flying)
         orders = min(options.orders, 2)
         if first:
-            # when what is blocked opens the plan is made anew: the search goes on then
-            once = n_uas > _ONE_SEARCH or unknown.any()
-            orders = 1 if once else options.orders
+            orders = options.orders if n_uas <= _ONE_SEARCH else 1
         larger = min(max(n_uas * len(unknown) / _SMALL, 1.0), _LARGER)
         effort = Effort(
             orders,
