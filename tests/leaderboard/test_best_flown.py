@@ -19,6 +19,17 @@ def test_of_every_shipped_scenario_one_is_known_and_can_be_flown(name):
     assert best.planner in planner_names()
 
 
+def test_the_planner_that_is_named_takes_that_much():
+    """In this mission a waypoint opens when all others have been covered for long."""
+    scenario = load_scenario("gasche2025")
+    best = best_flown(scenario)
+    assert best is not None
+    result = summary(rollout(scenario, load_planner(best.planner)))
+    assert (result["coverage"], result["all_home"], result["violations"]) == (1.0, True, [])
+    assert result["energy_Wh"] == pytest.approx(best.energy_Wh, rel=0.02)
+    assert result["steps"] == pytest.approx(best.steps, rel=0.02)
+
+
 def test_a_scenario_that_was_changed_is_another_one():
     scenario = load_scenario("open_field")
     changed = scenario.model_copy(update={"waypoints": scenario.waypoints[:-1]})
