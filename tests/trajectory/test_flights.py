@@ -5,12 +5,24 @@ from small_worlds import box, meadow, waypoint
 from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.first_guess import first_flight
 from uas_coverage_baselines.trajectory.fleet import Moment, make_way
-from uas_coverage_baselines.trajectory.retiming import quickest, retimed, stretches, worth
+from uas_coverage_baselines.trajectory.retiming import (
+    draft,
+    finished,
+    retimed,
+    stretches,
+    worth,
+)
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 
 from uas_coverage_env.geometry import segment_clearance
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.vehicle import VX, VZ
+
+
+def quickest(fleet, start, route, budget):
+    program = fleet.programs[0]
+    begun = draft(program, fleet.terrain, 0, start, route, budget)
+    return finished(program, start, route, begun)
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +31,7 @@ def flown():
     scenario = field()
     fleet, swarm = fleet_of(scenario)
     route = every_waypoint(scenario)
-    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 100)
+    flight = quickest(fleet, start_of(swarm), route, 100)
     return fleet, swarm, route, flight
 
 
@@ -86,7 +98,7 @@ def test_a_flight_beyond_the_battery_is_not_flown():
     scenario = field(soc_0=0.2505)
     fleet, swarm = fleet_of(scenario)
     route = every_waypoint(scenario)
-    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 20)
+    flight = quickest(fleet, start_of(swarm), route, 20)
     assert trouble_alone(fleet, 0, swarm.x[0], flight) == "the battery does not last"
 
 
@@ -113,7 +125,7 @@ def test_tall_obstacles_are_flown_round_and_long_low_ones_over(obstacle, place_m
     scenario = field(waypoints=(waypoint(place_m, 5.0),), obstacles=(obstacle,))
     fleet, swarm = fleet_of(scenario)
     route = every_waypoint(scenario)
-    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 60)
+    flight = quickest(fleet, start_of(swarm), route, 60)
     assert flight.is_clear
     roof_m = -min(z for _, _, z in obstacle["vertices_m"])
     assert (-flight.path_m[:, 2].min() > roof_m) == over
@@ -125,7 +137,7 @@ def test_with_nothing_to_visit_a_flight_goes_home():
     start = start_of(swarm)
     start[[0, 4, 8]] += (30.0, -20.0, -10.0)
     nothing = np.zeros(0, np.int64)
-    flight = quickest(fleet.programs[0], fleet.terrain, 0, start, nothing, 60)
+    flight = quickest(fleet, start, nothing, 60)
     assert flight.is_clear
     assert np.linalg.norm(flight.path_m[-1] - fleet.programs[0].landing.home_m) < 2.0
 
@@ -137,7 +149,7 @@ def test_a_far_waypoint_is_flown_to_at_nearly_full_speed():
     away_m = np.linalg.norm(fleet.waypoints_m[:, :2] - start_m, axis=1)
     route = np.array([15])
     assert 400.0 < away_m[15] < 500.0
-    flight = quickest(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route, 100)
+    flight = quickest(fleet, start_of(swarm), route, 100)
     full_speed_s = 2.0 * away_m[15] / fleet.terrain.legs.speed_mps[0]
     assert flight.is_clear
     assert fleet.brief.dt_s * flight.steps < full_speed_s + 8.0

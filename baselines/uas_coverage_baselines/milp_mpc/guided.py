@@ -20,6 +20,7 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
+from uas_coverage_baselines.routing import Routes
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_env.mission import MissionBrief, Ways, first_sight
 from uas_coverage_env.vehicle import VX, VY
@@ -82,17 +83,23 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
         self._builder = ProblemBuilder(brief, self.options, Ways(brief))
         decision_s = self.options.threads * self.options.time_limit_s
         made = brief, self._builder, TourShape(), decision_s
-        planned = Trajectory(TrajectoryOptions(threads=self.options.threads))
         if self.options.order == "trajectory":
-            planned.reset(brief, seed)
-        if planned.mission_plan is None:
+            order, total_weight = self._order_of_trajectory(brief, seed)
+            self._guide = RouteGuide(*made, total_weight)
+            self._guide.take(first_sight(brief), order)
+        else:
             self._guide = RouteGuide(*made)
             self._guide.begin(first_sight(brief), seed)
-        else:
-            self._guide = RouteGuide(*made, planned.options.weight_energy)
-            self._guide.take(first_sight(brief), planned.mission_plan.order)
         self._returning: set[str] = set()
         self._next: dict[str, int] = {}
+
+    def _order_of_trajectory(self, brief: MissionBrief, seed: int) -> tuple[Routes, float]:
+        """The order of its plan, and the weight that it gives energy."""
+        planner = Trajectory(TrajectoryOptions(threads=self.options.threads))
+        # with whole flights, also where an autopilot is to fly the mission by legs
+        planner.reset(brief.model_copy(update={"execution": None}), seed)
+        assert planner.mission_plan is not None
+        return planner.mission_plan.order, planner.total_weight
 
     def mode(self, name: str) -> Mode:
         """Covering while a UAS has anything left to visit."""

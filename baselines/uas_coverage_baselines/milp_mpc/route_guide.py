@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,10 +65,10 @@ class RouteGuide:
         builder: ProblemBuilder,
         shape: TourShape,
         decision_s: float = np.inf,
-        total_weight: float = 0.4,
+        total_weight: float = SearchEffort.total_weight,
     ) -> None:
         self._builder, self._shape = builder, shape
-        self._total_weight = total_weight
+        self._glance = SearchEffort(0, total_weight=total_weight)  # costs alone, no search
         self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(brief)
         self._names = tuple(uas.name for uas in brief.uas)
@@ -87,30 +87,26 @@ class RouteGuide:
         """Search long, before take-off."""
         task = self._task(swarm)
         moves = min(_MOVES_PER_WAYPOINT * max(len(task.open_waypoints), 1), _MOVES_AT_MOST)
+        effort = replace(self._glance, moves=moves)
         orders = [
-            improve_routes(task, empty_routes(task.n_uas), self._effort(moves), seed + attempt)
+            improve_routes(task, empty_routes(task.n_uas), effort, seed + attempt)
             for attempt in range(_FIRST_SEARCHES)
         ]
         self._order = min(orders, key=lambda order: order.cost_s)
 
     def take(self, swarm: SwarmState, order: Routes) -> None:
         """Begin with an order that was searched elsewhere."""
-        self._order = improve_routes(self._task(swarm), order, self._effort(0), 0)
-
-    def _effort(self, moves: int, hottest_s: float = 4.0, window: int = 0) -> SearchEffort:
-        return SearchEffort(
-            moves, hottest_s=hottest_s, window=window, total_weight=self._total_weight
-        )
+        self._order = improve_routes(self._task(swarm), order, self._glance, 0)
 
     def update(self, swarm: SwarmState) -> None:
         """Bring the order up to date with what is seen now."""
         previous = self._order or empty_routes(len(self._names))
         task = self._task(swarm)
-        effort = self._effort(self._moves, hottest_s=1.5, window=24)
-        kept = improve_routes(task, previous, self._effort(0), 0)
+        effort = replace(self._glance, moves=self._moves, hottest_s=1.5, window=24)
+        kept = improve_routes(task, previous, self._glance, 0)
         part = RouteWindow.of(task, kept, _SEARCHED_AGAIN)
         first = (
-            kept if part.task is task else improve_routes(part.task, part.order, self._effort(0), 0)
+            kept if part.task is task else improve_routes(part.task, part.order, self._glance, 0)
         )
         better = improve_routes(part.task, first, effort, swarm.step)
         worthwhile = better.cost_s < first.cost_s - _WORTH_CHANGING_S

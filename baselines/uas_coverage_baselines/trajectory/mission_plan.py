@@ -158,7 +158,7 @@ def plan_mission(
         if task.n_uas <= SMALL_FLEET:
             less_s[too_long] += _SHORTER * battery_s[too_long]
             continue
-        # whoever takes their waypoints over is as late as they are
+        # the UAS that take over their waypoints will be as late
         routes, dt_s = best.order.routes, fleet.brief.dt_s
         flown_s = [dt_s * flights[u, routes[u].tobytes()].steps for u in too_long]
         late = np.max(flown_s / best.order.seconds[too_long]) - 1.0

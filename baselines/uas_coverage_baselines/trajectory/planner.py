@@ -129,7 +129,7 @@ class Trajectory:
         self._by_legs: LegMission | None = None
         self.mission_plan = None
         if brief.execution is not None:
-            effort = SearchEffort(self.options.moves, total_weight=self._total_weight)
+            effort = SearchEffort(self.options.moves, total_weight=self.total_weight)
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
@@ -177,12 +177,12 @@ class Trajectory:
 
     def _steer(self) -> Steering:
         assert self.mission_plan is not None
-        moves, weight = self.options.moves // 10, self._total_weight
+        moves, weight = self.options.moves // 10, self.total_weight
         order = self.mission_plan.order
         return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
 
     @property
-    def _total_weight(self) -> float:
+    def total_weight(self) -> float:
         """Worth of a second of each UAS's flight: in a large fleet of less, or most stay home."""
         return self.options.weight_energy * min(1.0, SMALL_FLEET / len(self._brief.uas))
 
@@ -363,7 +363,7 @@ class Trajectory:
             orders,
             round(larger * options.moves),
             options.programs,
-            self._total_weight,
+            self.total_weight,
             options.threads,
         )
         if unknown.any():

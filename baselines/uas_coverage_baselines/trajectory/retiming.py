@@ -134,19 +134,6 @@ def finished(program: FlightProgram, start: FloatArray, route: IntArray, begun: 
     return shorten(program, start, route, begun.flight, program.solved + begun.left)
 
 
-def quickest(
-    program: FlightProgram,
-    terrain: Terrain,
-    uas: int,
-    start: FloatArray,
-    route: IntArray,
-    budget: int,
-) -> Flight:
-    """The quickest flight found along a route; arguments as for `draft`."""
-    begun = draft(program, terrain, uas, start, route, budget)
-    return finished(program, start, route, begun)
-
-
 def _coarse(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, until: int
 ) -> Flight:
