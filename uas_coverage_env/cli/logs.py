@@ -10,11 +10,10 @@ import typer
 from rich.table import Table
 
 from uas_coverage_env.cli.flights import keep_flight, report_flight
-from uas_coverage_env.cli.operations import extra, place_of
+from uas_coverage_env.cli.operations import asked_place, extra
 from uas_coverage_env.cli.output import console, one_line
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, check_directory
-from uas_coverage_env.scenario import Place
 
 if TYPE_CHECKING:
     from uas_coverage_env.operations.logs import Logged
@@ -42,22 +41,11 @@ def import_log(
     """Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`)."""
     with extra():
         from uas_coverage_env.operations import LocalFrame, flown_flight
+        from uas_coverage_env.operations.export import place_of_flight
     check_directory(out, overwrite=overwrite)
     planned = Flight.load(plan)
     scenario = planned.scenario
-    if place is not None:
-        if scenario.place is not None:
-            raise InputError(
-                f"--place: scenario {scenario.name!r} has a [place] already; leave it out"
-            )
-        latitude, longitude = place_of("--place", place)
-        there = Place(latitude_deg=latitude, longitude_deg=longitude)
-    elif scenario.place is not None:
-        there = scenario.place
-    else:
-        raise InputError(
-            f"scenario {scenario.name!r} has no [place] on the Earth; give --place LAT,LON"
-        )
+    there = place_of_flight(planned, asked_place(place))
     with extra():
         made = flown_flight(planned, _by_uas(logs, planned.names), LocalFrame(there))
     keep_flight(made.flight, out, overwrite=overwrite)

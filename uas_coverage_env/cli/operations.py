@@ -195,14 +195,13 @@ def export(
         from uas_coverage_env.operations import ENDINGS, ExportOptions, make_export
     if out.is_dir() and any(out.iterdir()) and not overwrite:
         raise InputError(f"--out {out}: is not empty; give another or add --overwrite")
-    latitude, longitude = place_of("--place", place) if place else (0.0, 0.0)
     options = ExportOptions(
         kind=kind,
         min_slack_s=min_slack,
         path_m=tolerance,
         corner_m=corner,
         autopilot=autopilot,
-        place=Place(latitude_deg=latitude, longitude_deg=longitude) if place else None,
+        place=asked_place(place),
     )
     made = make_export(Flight.load(directory), options)
     left = {name for name in prepare_folder(out) if Path(name).suffix in ENDINGS} - set(made.files)
@@ -237,3 +236,11 @@ def place_of(option: str, text: str) -> tuple[float, float]:
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise InputError(f"{option} {text[:60]!r}: is no latitude and longitude in degrees")
     return latitude, longitude
+
+
+def asked_place(text: str | None) -> Place | None:
+    """What `--place` says; None where it is not given."""
+    if text is None:
+        return None
+    latitude, longitude = place_of("--place", text)
+    return Place(latitude_deg=latitude, longitude_deg=longitude)

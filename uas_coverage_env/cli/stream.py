@@ -5,12 +5,11 @@ from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli.operations import extra, place_of
+from uas_coverage_env.cli.operations import asked_place, extra
 from uas_coverage_env.cli.output import FAILED, console
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.scenario import Place
 
 
 def stream(
@@ -57,11 +56,7 @@ def stream(
         raise InputError(f"{track}: exists; give another --track or add --overwrite")
     connections = _connections(connect)
     flight = Flight.load(directory)
-    here = None
-    if place is not None:
-        latitude, longitude = place_of("--place", place)
-        here = Place(latitude_deg=latitude, longitude_deg=longitude)
-    where = place_of_flight(flight, here)
+    where = place_of_flight(flight, asked_place(place))
     if not yes and not _agrees(len(connections)):
         raise InputError("vehicles would arm and take off; say yes, or add --yes")
     screen = console()
