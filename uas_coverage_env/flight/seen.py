@@ -85,36 +85,23 @@ def seen_ground(flight: FlightRecord, until: int | None = None) -> tuple[SeenGro
         flight: The flight.
         until: The last sample that counts; None: that of the flight.
     """
-    samples = slice(None if until is None else until + 1)
-    found = []
-    for name, pictures in _taken(flight, samples).items():
-        ground = _ground(flight.scenario, name)
-        seen = np.zeros_like(ground.asked)
-        for picture in pictures:
-            window, inside = ground.cells(picture)
-            seen[window] |= inside
-        found.append(SeenGround(name, ground.north_m, ground.east_m, ground.asked, seen))
-    return tuple(found)
+    return tuple(
+        SeenGround(name, ground.north_m, ground.east_m, ground.asked, seen)
+        for name, ground, seen, _ in _seen(flight, slice(None if until is None else until + 1))
+    )
 
 
 def seen_pictures(flight: FlightRecord) -> tuple[SeenPictures, ...]:
     """What each kind of camera has seen, picture by picture; empty where no UAS carries one."""
     found = []
-    for name, pictures in _taken(flight, slice(None)).items():
-        ground = _ground(flight.scenario, name)
-        asked, seen = ground.asked, np.zeros_like(ground.asked)
+    for name, ground, _, kept in _seen(flight, slice(None)):
         new_cells = np.zeros(len(flight.x))
-        kept: list[_Picture] = []
-        for picture in pictures:
-            window, inside = ground.cells(picture)
-            new = inside & ~seen[window]
-            if new.any():
-                seen[window] |= new
-                new_cells[picture.sample] += (new & asked[window]).sum()
-                kept.append(picture)
-        share = new_cells.cumsum() / asked.sum() if asked.any() else np.ones(len(flight.x))
-        samples = np.array([picture.sample for picture in kept], np.intp)
-        corners = np.array([picture.corners_m for picture in kept]).reshape(-1, 4, 2)
+        for picture, asked_cells in kept:
+            new_cells[picture.sample] += asked_cells
+        total = ground.asked.sum()
+        share = new_cells.cumsum() / total if total else np.ones(len(flight.x))
+        samples = np.array([picture.sample for picture, _ in kept], np.intp)
+        corners = np.array([picture.corners_m for picture, _ in kept]).reshape(-1, 4, 2)
         found.append(SeenPictures(name, samples, corners, share))
     return tuple(found)
 
@@ -198,6 +185,26 @@ class _Ground:
             lifted_m = _lifted(picture, top_m)
             inside |= (tops_m == top_m) & _inside(lifted_m, north_m, east_m)
         return (rows, columns), inside
+
+
+def _seen(
+    flight: FlightRecord, samples: slice
+) -> Iterator[tuple[str, _Ground, BoolArray, list[tuple[_Picture, int]]]]:
+    """Name of each kind of camera, the ground, and what it has seen of it.
+
+    That is cells (N, E), and the pictures that showed new ones, with how many were to be seen.
+    """
+    for name, pictures in _taken(flight, samples).items():
+        ground = _ground(flight.scenario, name)
+        seen = np.zeros_like(ground.asked)
+        kept: list[tuple[_Picture, int]] = []
+        for picture in pictures:
+            window, inside = ground.cells(picture)
+            new = inside & ~seen[window]
+            if new.any():
+                seen[window] |= new
+                kept.append((picture, int((new & ground.asked[window]).sum())))
+        yield name, ground, seen, kept
 
 
 def _taken(flight: FlightRecord, samples: slice) -> dict[str, Iterator[_Picture]]:
