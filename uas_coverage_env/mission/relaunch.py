@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.kernels import interpreted
+from uas_coverage_env.geometry import outside_cylinder
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.mission.range import Range
@@ -15,8 +15,8 @@ from uas_coverage_env.mission.ways import Ways
 from uas_coverage_env.vehicle import DOD, VX
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import FLYING, LANDED, LOST, SwarmState
+from uas_coverage_env.world.contacts import obstacle_breaches
 
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
@@ -77,23 +77,12 @@ class Relaunch:
 
     def _is_clear(self, u: int, swarm: SwarmState, going: BoolArray) -> bool:
         """Whether a UAS that flies where it stands keeps all safe distances."""
-        brief, here_m = self._brief, swarm.x[u, :3]
-        radius_m = brief.uas[u].radius_m
-        for obstacle, hull in zip(brief.obstacles, brief.hulls, strict=True):
-            if hull.signed_distance(here_m[None])[0] < radius_m + obstacle.safe_distance_m:
-                return False
-        for mover, position_m in zip(brief.moving_obstacles, swarm.moving_position_m, strict=True):
-            beside_m, above_m = _away_m(here_m - position_m)
-            room_m = max(beside_m - mover.radius_m, above_m - 0.5 * mover.height_m)
-            if room_m < radius_m + mover.safe_distance_m:
-                return False
+        brief, arena, here_m = self._brief, self._view.arena, swarm.x[u, :3]
+        if obstacle_breaches(arena, arena.moving_path_m[0], u, *here_m.tolist()):
+            return False
         for other in np.flatnonzero((swarm.status == FLYING) | going).tolist():
-            apart_m = radius_m + brief.uas[other].radius_m + brief.uas_safe_distance_m
-            if max(_away_m(here_m - swarm.x[other, :3])) < apart_m:
+            kept_m = brief.uas[u].radius_m + brief.uas[other].radius_m + brief.uas_safe_distance_m
+            away_m = here_m - swarm.x[other, :3]
+            if interpreted(outside_cylinder)(0.0, 0.0, *away_m.tolist()) < kept_m:
                 return False
         return True
-
-
-def _away_m(away_m: FloatArray) -> tuple[float, float]:
-    """Horizontal and vertical distance."""
-    return math.hypot(away_m[0], away_m[1]), abs(float(away_m[2]))

@@ -280,7 +280,7 @@ def check_fence_and_battery(arena, state, outcome):
 
 
 @rare_kernel
-def _obstacle_breaches(arena, next_m, i, x, y, z):
+def obstacle_breaches(arena, next_m, i, x, y, z):
     """How many fixed and moving obstacles, at next_m (M, 3), UAS i is too near to."""
     count = 0
     radius_m = arena.uas[i].radius_m
@@ -323,7 +323,7 @@ def count_breaches(arena, state, outcome):
         count = 0
         # at the end of the segment nothing is nearer than it was somewhere on it; the same below
         if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + EPS_M:
-            count = _obstacle_breaches(arena, next_m, i, x, y, z)
+            count = obstacle_breaches(arena, next_m, i, x, y, z)
         for j in range(state.status.shape[0]):
             keep_m = radius_m + arena.uas[j].radius_m + rules.uas_safe_distance_m
             if event.separation_m > keep_m + EPS_M:
