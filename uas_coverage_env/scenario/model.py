@@ -29,8 +29,8 @@ class Scenario(UncheckedScenario):
             take-off and landing; without it, or at 0, there is no such rule [m].
         from_ground: Whether UAS climb from the ground to their starts before t = 0, and descend to
             it after the last sample; without it missions begin and end in the air.
-        relaunch: Whether UAS that have landed take off again, with the charge that they have, where
-            nobody else is at work any more; without it, who has landed has landed for good.
+        relaunch: Whether landed UAS take off again on their remaining charge, when no other UAS is
+            working; without it, a UAS that has landed stays on the ground.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
         moving_obstacles: Moving obstacles.
