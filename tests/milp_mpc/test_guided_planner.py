@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import pytest
 from practice_missions import mission
 from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
@@ -11,7 +12,7 @@ from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.scenario import Execution, generate_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import HOME, LOST
 
@@ -51,14 +52,22 @@ def test_a_generated_mission_is_covered_and_everybody_comes_home():
     assert not any(decision.fallback for decision in flight.decisions)
 
 
-def test_told_to_it_sets_off_along_the_order_of_trajectory():
+@pytest.mark.parametrize("execution", [None, Execution(flown_by="autopilot")])
+def test_told_to_it_sets_off_along_the_order_of_trajectory(monkeypatch, execution):
     scenario = generate_scenario(3, n_uas=2, n_waypoints=8, n_obstacles=3)
     brief = MissionBrief.of(scenario)
     planned = Trajectory(TrajectoryOptions(threads=2))
     planned.reset(brief, 5)
     routes = [route.tolist() for route in planned.mission_plan.order.routes]
+    taken, take = [], RouteGuide.take
+    monkeypatch.setattr(
+        RouteGuide,
+        "take",
+        lambda guide, swarm, order: taken.append(order) or take(guide, swarm, order),
+    )
     guided = MilpMpcGuided(REPEATABLE.model_copy(update={"order": "trajectory"}))
-    guided.reset(brief, 5)
+    guided.reset(brief.model_copy(update={"execution": execution}), 5)
+    assert [[route.tolist() for route in order.routes] for order in taken] == [routes]
     swarm = first_sight(brief)
     guided.act(swarm)
     ahead = {name: guided.target(name) for name in swarm.names}
