@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
 from uas_coverage_env.flight.record import LANDED
+from uas_coverage_env.geometry import nearest_on_segment
 from uas_coverage_env.operations.room import Room, Surroundings
 from uas_coverage_env.world.coverage import covering_samples
 
@@ -211,9 +212,7 @@ def relaid(
 
 def distances_m(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """(N,) distances of points (N, 3) from a straight line between two places [m]."""
-    way = b - a
-    share = np.clip((points - a) @ way / max(way @ way, 1e-12), 0.0, 1.0)
-    return np.linalg.norm(points - a - share[:, None] * way, axis=1)
+    return nearest_on_segment(points, a, b).distance_m
 
 
 def cut_path(corners: FloatArray, stops: list[bool], corner_m: float) -> FloatArray:

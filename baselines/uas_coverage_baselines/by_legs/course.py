@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.terrain import Terrain
+from uas_coverage_env.geometry import nearest_on_segment
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.mission.separation import Waits
@@ -166,7 +167,7 @@ class CoursePlanner:
         return most
 
     def _passes(self, a: FloatArray, b: FloatArray, between: list[int]) -> bool:
-        away_m, share, nearest_m = self._off_m(a, b, between)
+        away_m, share, nearest_m = nearest_on_segment(self._waypoints_m[between], a, b)
         low_m, high_m = self._heights_m[between].T
         asked = (-nearest_m[:, 2] >= low_m) & (-nearest_m[:, 2] <= high_m)
         in_turn = bool((np.diff(share) >= 0.0).all())
@@ -178,18 +179,11 @@ class CoursePlanner:
         between = list(run[:-1])
         if not between:
             return math.inf
-        away_m = self._off_m(here_m, self._waypoints_m[run[-1]], between)[0] + _SAMPLED_OFF_M
-        chord_m = 2.0 * np.sqrt(np.maximum(self._radius_m[between] ** 2 - away_m**2, _SAME_M))
+        end_m = self._waypoints_m[run[-1]]
+        away_m = nearest_on_segment(self._waypoints_m[between], here_m, end_m).distance_m
+        off_m = away_m + _SAMPLED_OFF_M
+        chord_m = 2.0 * np.sqrt(np.maximum(self._radius_m[between] ** 2 - off_m**2, _SAME_M))
         return float(chord_m.min()) / self._brief.dt_s
-
-    def _off_m(
-        self, a: FloatArray, b: FloatArray, waypoints: list[int]
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n,) distances of waypoints from a leg, (n,) share of it, (n, 3) nearest places."""
-        way = b - a
-        share = np.clip((self._waypoints_m[waypoints] - a) @ way / max(way @ way, 1e-9), 0.0, 1.0)
-        nearest_m = a + share[:, None] * way
-        return np.linalg.norm(nearest_m - self._waypoints_m[waypoints], axis=1), share, nearest_m
 
     def _is_clear(self, row: int, a: FloatArray, b: FloatArray) -> bool:
         return route(self.terrain.arena, row, *a, *b)[3] == CLEAR
