@@ -5,13 +5,16 @@ import pytest
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import layers_of, value_of
+from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, desk, no_record
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
 
 from uas_coverage_env import generate_scenario, rollout
 from uas_coverage_env.flight import coverage, energy_Wh, home
-from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.vehicle import VX, VY
+from uas_coverage_env.world import COMMAND_DTYPE
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +78,33 @@ def test_the_same_seed_flies_the_same_mission(town):
     first = rollout(town, LearnedRoute(LearnedRouteOptions(samples=3)), max_steps=20)
     again = rollout(town, LearnedRoute(LearnedRouteOptions(samples=3)), max_steps=20)
     np.testing.assert_array_equal(first.x, again.x)
+
+
+def test_commands_do_not_depend_on_what_lies_behind_the_arrays_in_memory(town):
+    """Tubes end with the lookahead; longer paths were once held against what followed them."""
+    view = WorldView(MissionBrief.of(town))
+    tube_m = view.arena.tube_m
+    policy = load_policy(SHIPPED)
+    flight = layers_of(policy.description.network.flight, policy.tensors, "flight.")
+
+    def commands(behind_m):
+        memory = np.full(tube_m.size + 100, behind_m)
+        memory[: tube_m.size] = tube_m.ravel()
+        arena = view.arena._replace(tube_m=memory[: tube_m.size].reshape(tube_m.shape))
+        rng, last, command = (
+            np.random.default_rng(0),
+            len(tube_m) - 1,
+            np.zeros(1, COMMAND_DTYPE)[0],
+        )
+        for _ in range(50):
+            x = view.state.x[last].copy()
+            x[:3] = *rng.uniform(10.0, 110.0, 2), -20.0
+            x[VX], x[VY] = velocity_mps = rng.uniform(-8.0, 8.0, 2)
+            targets = rng.permutation(AHEAD)
+            steer_along(arena, last, x, velocity_mps, targets, AHEAD, flight, command)
+            yield command["values"].tolist()
+
+    assert list(commands(0.0)) == list(commands(1e6))
 
 
 def test_the_networks_of_the_file_are_those_that_are_compiled():

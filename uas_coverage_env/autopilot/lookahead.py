@@ -152,10 +152,15 @@ def _box_of(path_m, n_flown, low, high):
 
 
 @kernel
+def _tube_at(arena, i, k):
+    """The tube of UAS i after k steps [m]; beyond the lookahead as wide as at its end."""
+    return arena.tube_m[i, min(k, arena.tube_m.shape[1] - 1)]
+
+
+@kernel
 def _fence_slack(arena, i, path_m, n_flown, low, high, slack_m):
     """The smaller of slack_m and the distance to spare from the geofence along a path."""
     rules = arena.rules[0]
-    tube_m = arena.tube_m
     normals = arena.normals
     offsets_m = arena.offsets_m
     required_m = rules.fence_margin_m
@@ -165,14 +170,14 @@ def _fence_slack(arena, i, path_m, n_flown, low, high, slack_m):
         level = math.hypot(normals[h, 0], normals[h, 1])
         for axis in range(3):
             outermost += max(normals[h, axis] * low[axis], normals[h, axis] * high[axis])
-        if -outermost - required_m - level * tube_m[i, n_flown] >= slack_m:
+        if -outermost - required_m - level * _tube_at(arena, i, n_flown) >= slack_m:
             # the whole box around the path is far enough from this face
             continue
         for k in range(1, n_flown + 1):
             spare_m = -signed_distance(
                 normals, offsets_m, h, h + 1, path_m[k, 0], path_m[k, 1], path_m[k, 2]
             )
-            kept_m = required_m + level * tube_m[i, k]
+            kept_m = required_m + level * _tube_at(arena, i, k)
             if spare_m - kept_m < slack_m:
                 now_m = -signed_distance(
                     normals, offsets_m, h, h + 1, path_m[0, 0], path_m[0, 1], path_m[0, 2]
@@ -217,7 +222,6 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
         slack_m = _height_slack(arena, i, path_m, n_flown, slack_m)
     normals = arena.normals
     offsets_m = arena.offsets_m
-    tube_m = arena.tube_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         if box_apart(obstacle, low[0], low[1], low[2], high[0], high[1], high[2]):
@@ -226,7 +230,7 @@ def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
         last = obstacle.last_kept
         least_m = arena.uas[i].radius_m + obstacle.safe_distance_m
         for k in range(n_flown):
-            required_m = least_m + tube_m[i, k + 1]
+            required_m = least_m + _tube_at(arena, i, k + 1)
             x0 = path_m[k, 0]
             y0 = path_m[k, 1]
             z0 = path_m[k, 2]
@@ -361,7 +365,7 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
             abs(path_m[0, 2] - other_m[0, 2]),
         )
         for k in range(path_m.shape[0] - 1):
-            required_m = _kept_m(least_m + tube_m[i, k + 1] + tube_m[j, k + 1], now_m)
+            required_m = _kept_m(least_m + _tube_at(arena, i, k + 1) + tube_m[j, k + 1], now_m)
             if _paths_apart(path_m, other_m, k, required_m + max(slack_m, 0.0)):
                 continue
             apart_m = separation_at(path_m, other_m, k)
