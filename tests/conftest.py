@@ -1,5 +1,6 @@
 """Options of the whole test suite, its quick part, and who runs what where several processes do."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -18,20 +19,47 @@ def pytest_addoption(parser):
     parser.addoption(
         "--write-seconds",
         action="store_true",
-        help="with -n: write how long what stays together took (tests/scope_seconds.json)",
+        help="with -n: write the processor time of what stays together (tests/scope_seconds.json)",
     )
 
 
 _seconds: dict[str, float] = {}
+_BEFORE_S = pytest.StashKey[float]()
+
+
+def _processor_s():
+    """Of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
+def pytest_collection_finish(session):
+    session.stash[_BEFORE_S] = _processor_s()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item):
+    report = yield
+    now_s = _processor_s()
+    # an attribute of the report gets from the worker to the process that writes the file
+    report.processor_s = now_s - item.session.stash[_BEFORE_S]
+    item.session.stash[_BEFORE_S] = now_s
+    return report
 
 
 def pytest_runtest_logreport(report):
-    _seconds[report.nodeid] = _seconds.get(report.nodeid, 0.0) + report.duration
+    _seconds[report.nodeid] = _seconds.get(report.nodeid, 0.0) + report.processor_s
 
 
 def pytest_sessionfinish(session):
     if session.config.option.write_seconds and not hasattr(session.config, "workerinput"):
         write_seconds(_seconds)
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if config.option.write_seconds:
+        terminalreporter.section("most processor time")
+        for nodeid in sorted(_seconds, key=_seconds.__getitem__, reverse=True)[:50]:
+            terminalreporter.write_line(f"{_seconds[nodeid]:6.1f} s  {nodeid}")
 
 
 def pytest_ignore_collect(collection_path, config):

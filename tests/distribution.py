@@ -1,9 +1,8 @@
 """Which tests stay together where several processes run the suite (`-n 2`), and which come first.
 
 Tests of a folder need the same kernels and fixtures: one process compiles and makes them, instead
-of each. What takes longest comes first, so that all processes end at about the same time. How long
-each takes is written by `python -m pytest -n 2 --write-seconds`, on a machine that does nothing
-else.
+of each. What takes longest comes first, so that all processes end at about the same time. How much
+processor time each takes is written by `python -m pytest -n 2 --write-seconds`.
 """
 
 import json

@@ -163,8 +163,9 @@ def test_an_added_waypoint_is_covered_and_no_planner_knew_of_it():
 
 
 def test_a_new_obstacle_is_flown_round():
-    wall_m = corners_m((125.0, 50.0, -50.0), (135.0, 120.0, 0.0))
-    crane = event("obstacle_added", 20.0, name="crane", safe_distance_m=2.0, vertices_m=wall_m)
+    # between waypoints that are still open, and out of the way of anyone who flies there now
+    wall_m = corners_m((125.0, 60.0, -50.0), (135.0, 120.0, 0.0))
+    crane = event("obstacle_added", 8.0, name="crane", safe_distance_m=2.0, vertices_m=wall_m)
     flight = flown(crane)
     assert all_is_well(flight)
     assert flight.min_obstacle_clearance_m >= 2.36
