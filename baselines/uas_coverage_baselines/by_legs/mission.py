@@ -15,7 +15,7 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_env.mission import Handover, MissionBrief, first_sight
-from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import Command, SwarmState
 
 BoolArray = NDArray[np.bool_]
@@ -75,32 +75,19 @@ class LegMission:
 
     def _task(self, swarm: SwarmState, works: BoolArray) -> RoutingTask:
         brief, terrain, x = self._brief, self._pilot.planner.terrain, swarm.x
-        legs, uas = terrain.legs, terrain.arena.uas
-        n_uas = len(x)
+        uas = terrain.arena.uas
         share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         left_s = share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
         left_s = np.minimum(left_s, brief.max_steps * brief.dt_s - swarm.time_s) - _RESERVE_S
         open_ = swarm.uncovered.copy()
         if works.any():
             open_ &= brief.can_cover[works].any(axis=0)
-        idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
-        return RoutingTask(
-            open_waypoints=np.flatnonzero(open_),
-            first_s=np.array([terrain.from_here_s(u, x[u, :3]) for u in range(n_uas)]),
-            between_s=terrain.between_s,
-            kind=legs.kind,
-            home_s=terrain.home_s + _LANDING_S,
-            idle_s=np.where(works, idle_s, 0.0),
-            position_m=np.ascontiguousarray(x[:, :2]),
-            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
-            speed_mps=legs.speed_mps,
-            acceleration_mps2=legs.acceleration_mps2,
-            start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
-            waypoints_m=legs.waypoints_m,
-            turn_s=legs.turn_s,
-            neighbours=legs.neighbours,
+        return RoutingTask.of(
+            terrain,
+            x,
+            works,
+            open_waypoints=open_,
             weight=self._weight,
-            not_before_s=np.zeros(len(open_)),
-            budget_s=np.where(works, left_s, -np.inf),
-            turn_of_cosine=legs.turn_of_cosine,
+            budget_s=left_s,
+            landing_s=_LANDING_S,
         )

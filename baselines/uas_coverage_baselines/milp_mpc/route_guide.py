@@ -19,7 +19,7 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.vehicle.range import ORDER_GUIDE
 from uas_coverage_env.world import SwarmState
 
@@ -152,8 +152,6 @@ class RouteGuide:
         rows = np.array([swarm.names.index(name) for name in self._names])
         active = np.array([name in swarm.active for name in self._names])
         x = swarm.x[rows]
-        first_s = np.array([self._legs.from_here_s(u, x[u, 0:3]) for u in range(len(self._names))])
-        idle_s = np.array([self._legs.way_home_s(u, x[u, 0:3]) for u in range(len(self._names))])
         left_s = np.array(
             [self._builder.seconds_left(n, x[u, DOD]) for u, n in enumerate(self._names)]
         )
@@ -171,23 +169,13 @@ class RouteGuide:
         opens[blocked] = _WAIT_S
         self._near_enough_m = 0.5 * self._radius_m
         self._near_enough_m[blocked] = _WAITING_M
-        return RoutingTask(
-            open_waypoints=np.flatnonzero(wanted),
-            first_s=first_s,
-            between_s=self._legs.between_s,
-            kind=self._legs.kind,
-            home_s=self._legs.home_s + ORDER_GUIDE.landing_s,
-            idle_s=np.where(active, idle_s, 0.0),
-            position_m=np.ascontiguousarray(x[:, 0:2]),
-            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
-            speed_mps=self._legs.speed_mps,
-            acceleration_mps2=self._legs.acceleration_mps2,
-            start_m=np.ascontiguousarray(self._legs.starts_m[:, :2]),
-            waypoints_m=self._legs.waypoints_m,
-            turn_s=self._legs.turn_s,
-            neighbours=self._legs.neighbours,
+        return RoutingTask.of(
+            self._legs,
+            x,
+            active,  # a UAS that is not there any more can visit nothing
+            open_waypoints=wanted,
             weight=self._weight,
+            budget_s=left_s - _RESERVE_S,
+            landing_s=ORDER_GUIDE.landing_s,
             not_before_s=opens,
-            # a UAS that is not there any more can visit nothing
-            budget_s=np.where(active, left_s - _RESERVE_S, -np.inf),
         )

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.routing.terrain import Terrain
+from uas_coverage_env.mission import Legs
+from uas_coverage_env.vehicle import VX, VY
+
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,61 @@ class RoutingTask:
     not_before_s: FloatArray
     budget_s: FloatArray
     turn_of_cosine: FloatArray | None = None
+
+    @classmethod
+    def of(
+        cls,
+        legs: Legs | Terrain,
+        x: FloatArray,
+        may_work: BoolArray,
+        *,
+        open_waypoints: BoolArray,
+        weight: FloatArray,
+        budget_s: FloatArray,
+        landing_s: float,
+        not_before_s: FloatArray | None = None,
+        stretch: float = 1.0,
+        speed_share: float = 1.0,
+    ) -> RoutingTask:
+        """The routing problem of UAS where they are.
+
+        Args:
+            legs: Leg times; with `Terrain`, the shorter of the ways over and round obstacles.
+            x: (U, 14) states.
+            may_work: (U,) may be sent; the others visit nothing and take no time.
+            open_waypoints: (W,) still to be visited.
+            weight: (W,).
+            budget_s: (U,) how long each may fly.
+            landing_s: What landing takes beyond the leg home.
+            not_before_s: (W,) from now on; None: any time.
+            stretch: How much longer legs take than their times say.
+            speed_share: Share of the cruising speed that is flown.
+        """
+        own = legs.legs if isinstance(legs, Terrain) else legs
+        position_m = x[:, :3]
+        n_uas, n_waypoints = len(x), len(own.waypoints_m)
+        idle_s = np.array([own.way_home_s(u, position_m[u]) for u in range(n_uas)])
+        first_s = np.array([legs.from_here_s(u, position_m[u]) for u in range(n_uas)])
+        return cls(
+            open_waypoints=np.flatnonzero(open_waypoints),
+            first_s=stretch * first_s,
+            between_s=stretch * legs.between_s,
+            kind=own.kind,
+            home_s=stretch * legs.home_s + landing_s,
+            idle_s=np.where(may_work, idle_s, 0.0),
+            position_m=np.ascontiguousarray(position_m[:, :2]),
+            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
+            speed_mps=speed_share * own.speed_mps,
+            acceleration_mps2=own.acceleration_mps2,
+            start_m=np.ascontiguousarray(own.starts_m[:, :2]),
+            waypoints_m=own.waypoints_m,
+            turn_s=own.turn_s / speed_share,
+            neighbours=own.neighbours,
+            weight=weight,
+            not_before_s=np.zeros(n_waypoints) if not_before_s is None else not_before_s,
+            budget_s=np.where(may_work, budget_s, -np.inf),
+            turn_of_cosine=own.turn_of_cosine,
+        )
 
     @property
     def n_uas(self) -> int:

@@ -15,7 +15,7 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.vehicle.range import TOUR
 from uas_coverage_env.world import Arena
 
@@ -184,10 +184,6 @@ class Schedule:
 
     def task(self, view: View) -> RoutingTask:
         """The routing problem of a moment."""
-        legs, x = self.legs, view.x
-        n_uas = len(x)
-        first_s = np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)])
-        idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
         # it is unknown when a blocked waypoint opens: late enough to do other work before, and soon
         # enough to be thought of while there is other work near it
         work_s = self._legs_left(view)[view.may_work]
@@ -195,22 +191,13 @@ class Schedule:
         open_ = view.uncovered.copy()
         if view.may_work.any():  # what nobody can cover is no reason to search again
             open_ &= self._can_cover[view.may_work].any(axis=0)
-        return RoutingTask(
-            open_waypoints=np.flatnonzero(open_),
-            first_s=first_s,
-            between_s=legs.between_s,
-            kind=legs.kind,
-            home_s=legs.home_s + TOUR.landing_s,
-            idle_s=np.where(view.may_work, idle_s, 0.0),
-            position_m=np.ascontiguousarray(x[:, 0:2]),
-            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
-            speed_mps=self.legs.speed_mps,
-            acceleration_mps2=self.legs.acceleration_mps2,
-            start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
-            waypoints_m=legs.waypoints_m,
-            turn_s=self.legs.turn_s,
-            neighbours=legs.neighbours,
+        return RoutingTask.of(
+            self.legs,
+            view.x,
+            view.may_work,
+            open_waypoints=open_,
             weight=self._weight,
+            budget_s=self._budget_s(view),
+            landing_s=TOUR.landing_s,
             not_before_s=np.where(view.blocked, opens_s, 0.0),
-            budget_s=np.where(view.may_work, self._budget_s(view), -np.inf),
         )

@@ -23,7 +23,7 @@ from uas_coverage_baselines.trajectory.retiming import (
 )
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle import DOD
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -110,30 +110,19 @@ class Fleet:
             moment: Where everything is.
             less_s: (U,) taken off the budgets: what routes took more than expected.
         """
-        terrain, legs, x = self.terrain, self.terrain.legs, moment.x
-        n_uas, until_s = len(x), self.brief.max_steps * self.brief.dt_s
-        first_s = np.array([terrain.from_here_s(u, x[u, :3]) for u in range(n_uas)])
-        idle_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
-        budget_s = np.minimum(self.battery_s(x), until_s - moment.time_s) - _SPARE_S - less_s
-        may, legs_share = moment.may_work, _LEGS / self._speed_share
-        return RoutingTask(
-            open_waypoints=np.flatnonzero(moment.uncovered),
-            first_s=legs_share * first_s,
-            between_s=legs_share * terrain.between_s,
-            kind=legs.kind,
-            home_s=legs_share * terrain.home_s + _LANDING_S,
-            idle_s=np.where(may, idle_s, 0.0),
-            position_m=np.ascontiguousarray(x[:, :2]),
-            velocity_mps=np.ascontiguousarray(x[:, VX : VY + 1]),
-            speed_mps=self._speed_share * legs.speed_mps,
-            acceleration_mps2=legs.acceleration_mps2,
-            start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
-            waypoints_m=self.waypoints_m,
-            turn_s=legs.turn_s / self._speed_share,
-            neighbours=legs.neighbours,
+        left_s = self.brief.max_steps * self.brief.dt_s - moment.time_s
+        budget_s = np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
+        return RoutingTask.of(
+            self.terrain,
+            moment.x,
+            moment.may_work,
+            open_waypoints=moment.uncovered,
             weight=self._weight,
+            budget_s=budget_s,
+            landing_s=_LANDING_S,
             not_before_s=self.brief.dt_s * moment.earliest.astype(float),
-            budget_s=np.where(may, budget_s, -np.inf),
+            stretch=_LEGS / self._speed_share,
+            speed_share=self._speed_share,
         )
 
     def program(
