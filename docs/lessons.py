@@ -25,7 +25,7 @@ PAGES = DOCS / "lessons"
 PICTURES = DOCS / "pictures" / "lessons"
 NOTEBOOKS = sorted((DOCS.parent / "notebooks").glob("*.ipynb"))
 
-_COLOURS = 48
+_COLOURS = 128
 _SECONDS_FOR_A_CELL = 3600
 
 
@@ -95,10 +95,13 @@ def write(notebook: Path) -> None:
 
 
 def _save(png: bytes, path: Path) -> None:
-    """A picture with few colours: a fifth of the size, and nobody sees it."""
+    """A picture with few colours: a fraction of the size, which nobody sees."""
     path.parent.mkdir(exist_ok=True)
     picture = Image.open(io.BytesIO(png)).convert("RGB")
-    picture.quantize(_COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    few = picture.quantize(
+        _COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+    )  # the default keeps large areas and gives thin lines the colours of others
+    few.save(path, optimize=True)
 
 
 def main(*arguments: str) -> int:
