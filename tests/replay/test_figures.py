@@ -132,7 +132,7 @@ def test_figures_are_as_wide_as_asked_and_narrow_ones_hold_their_legends(kind, f
 
 def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path):
     path = tmp_path / "paper.mplstyle"
-    path.write_text("lines.linewidth: 3.25\n")
+    path.write_text('# ours\nlines.linewidth: 3.25  # wide\naxes.edgecolor: "#112233"\n')
     for style, width in ((str(path), 3.25), (None, 1.1)):
         with look(style=style):
             soc, *_ = battery_figure(flight).axes
@@ -144,12 +144,21 @@ def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path)
     [
         ("ggplott", "unknown style 'ggplott'; did you mean ggplot"),
         ("missing.mplstyle", "missing.mplstyle: no such file"),
-        ("broken.mplstyle", "broken.mplstyle: is no style of matplotlib"),
+        ("broken.mplstyle", "broken.mplstyle, line 1, font.size: .*large and red"),
+        (
+            "typo.mplstyle",
+            "typo.mplstyle, line 2: unknown key 'lines.linewdith'; .*lines.linewidth",
+        ),
+        ("colon.mplstyle", "colon.mplstyle, line 1: 'font.size 9' has no colon; write KEY: VALUE"),
+        ("bytes.mplstyle", "bytes.mplstyle: is no style of matplotlib"),
     ],
 )
 def test_a_style_that_cannot_be_taken_is_told_in_a_line(style, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("broken.mplstyle").write_text("font.size: large and red\n")
+    Path("typo.mplstyle").write_text("font.size: 9  # points\nlines.linewdith: 2\n")
+    Path("colon.mplstyle").write_text("font.size 9\n")
+    Path("bytes.mplstyle").write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match=message) as refusal, look(style=style):
         pass
     assert "\n" not in str(refusal.value)
