@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uas_coverage_env.draw import colours
-from uas_coverage_env.files.plain_files import read_bytes
+from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import did_you_mean
 
@@ -87,20 +87,20 @@ def _settings(style: str) -> dict[Any, Any]:
         close = did_you_mean(style, styles.available, f"take the path of an .mplstyle or {known}")
         raise InputError(f"unknown style {style[:80]!r}; {close}")
     try:
-        text = read_bytes(path, _MOST_BYTES).decode()
+        text = read_text(path, _MOST_BYTES)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: is no style of matplotlib; save it as text in UTF-8") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    read = mpl.RcParams()
+    read: Any = mpl.RcParams()
     for number, line in enumerate(text.splitlines(), 1):
         _set(read, _COMMENT.sub(r"\1", line).strip(), f"{path}, line {number}")
     return dict(read)
 
 
-def _set(read: mpl.RcParams, line: str, where: str) -> None:
+def _set(read: Any, line: str, where: str) -> None:
     """Take over a line of a style: matplotlib itself only logs what it does not know."""
     if not line:
         return
@@ -111,7 +111,7 @@ def _set(read: mpl.RcParams, line: str, where: str) -> None:
         close = did_you_mean(key, mpl.rcParamsDefault, "take one of matplotlib.rcParams")
         raise InputError(f"{where}: unknown key {key[:60]!r}; {close}")
     try:
-        read.update({key: value.strip('"')})
+        read[key] = value.strip('"')
     except ValueError as error:
         reason = " ".join(str(error).removeprefix(f"Key {key}: ").split())
         raise InputError(f"{where}, {key}: {reason[:160]}; correct the value") from error
