@@ -149,14 +149,14 @@ def _carried(uas: Uas) -> str:
 
 
 def _asked(scenario: Scenario) -> list[str]:
-    """How many waypoints ask for which sensor, and who carries it."""
+    """How many waypoints ask for which sensor, and which UAS carry it."""
     wanted = [waypoint.sensor for waypoint in scenario.waypoints]
     lines = []
     for name in dict.fromkeys(one for one in wanted if one is not None):
         carriers = [
             uas.name for uas in scenario.uas if any(one.name == name for one in uas.sensors)
         ]
-        lines.append(f"{wanted.count(name)} for {name}: {', '.join(carriers) or 'nobody'}")
+        lines.append(f"{wanted.count(name)} for {name}: {', '.join(carriers) or 'no UAS'}")
     return lines
 
 

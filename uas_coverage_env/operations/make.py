@@ -64,7 +64,7 @@ class ImportOptions:
         town: GeoJSON of buildings.
         terrain: Grid of heights; None: the ground is flat.
         min_height_m: Least height of UAS above ground and roofs, but for take-off and landing [m].
-        flown_by: Who flies it in the end, `autopilot`; None: nobody in particular.
+        flown_by: What flies it in the end, `autopilot`; None: the world alone.
     """
 
     fleet: str = "s500_v2:2"
