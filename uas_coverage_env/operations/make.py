@@ -159,7 +159,8 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     scenario = _finite(parse(tables, Scenario, name))
     notes = [
         *_look_notes(looks, seen, waypoints.above_m, uneven=relief.ground is not None),
-        f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} obstacles",
+        f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} "
+        f"obstacle{'' if len(walls) == 1 else 's'}",
         *([relief.note(site)] if relief.ground else []),
         *_town_notes(town),
     ]
