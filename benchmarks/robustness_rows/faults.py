@@ -159,7 +159,7 @@ def mission(kind: str, seed: int) -> Scenario:
     soon = kind in ("obstacle_added", "moving_obstacle_added")
     at_s = float(rng.integers(2, 5) if soon else rng.integers(3, 60))
     event = {"kind": kind, "at_s": at_s, **fields}
-    # who has landed takes off again for what a lost UAS leaves
+    # a landed UAS takes off again for what a lost one leaves
     changes |= {"relaunch": True, "events": (event,)}
     return Scenario.model_validate(town.model_dump(by_alias=True) | changes)
 
@@ -225,7 +225,7 @@ ROW = Row(
     ),
     "Several events in one mission, events in wind, and losses of charge or thrust that no UAS "
     "could survive. Return mode and safety filter are on. Breaches are not counted here: a zone "
-    "that is closed round a UAS is one until it is left. All missions have `relaunch = true`: who "
-    "has landed takes off again for what a UAS leaves that is lost later. A limit that is exceeded "
-    "counts as failed, too, even where the fault is the cause.",
+    "that is closed round a UAS is one until it is left. All missions have `relaunch = "
+    "true`: a UAS that has landed takes off again for waypoints that another one, lost later, "
+    "leaves open. A limit exceeded counts as a failure even where the fault is the cause.",
 )

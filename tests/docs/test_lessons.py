@@ -20,7 +20,7 @@ def lessons():
 
 def test_every_lesson_has_a_page_with_each_of_its_cells(lessons):
     """Where this fails: python docs/lessons.py with the number of the lesson."""
-    assert len(lessons.NOTEBOOKS) == 4
+    assert len(lessons.NOTEBOOKS) == 9
     assert lessons.stale() == []
 
 

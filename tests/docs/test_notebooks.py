@@ -1,10 +1,13 @@
 """The lessons in notebooks/: they run from top to bottom, and are kept without what they print."""
 
+import ast
 import re
 
 import nbformat
 import pytest
 from markdown_blocks import ROOT
+from matplotlib import pyplot
+from matplotlib.figure import Figure
 from nbclient import NotebookClient
 
 from uas_coverage_env.compiled.progress import NOTICE
@@ -12,6 +15,9 @@ from uas_coverage_env.compiled.progress import NOTICE
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 SECONDS_FOR_A_CELL = 600  # the longest takes half a minute; a busy machine several times that
 MACHINE_PATH = re.compile(r"/(?:home|Users|private|var)/|\b[A-Z]:\\")
+INLINE = "%matplotlib inline\n"
+IN_A_KERNEL = {"1_vehicle_and_battery", "4_learn_and_compare"}
+"""As a reader runs them: the first one, and the one that trains, which alters its process."""
 SHORTER = {
     "2_milp_blocks": {
         "relative_gap=0.01)": "relative_gap=0.5)",
@@ -24,6 +30,11 @@ SHORTER = {
         "missions=4": "missions=2",
         "range(2000, 2006)": "range(2000, 2002)",
     },
+    "5_own_area": {"height_m=60.0": "height_m=100.0"},
+    "6_own_vehicle": {'rollout(field, "nearest-waypoint")': 'rollout(field, "hover", max_steps=9)'},
+    "7_own_planner": {"range(30, 35)": "range(30, 31)"},
+    "8_wind_and_faults": {"[0.0, 2.0, 4.0, 6.0]": "[0.0, 6.0]", "range(12)": "range(2)"},
+    "9_reading_flights": {"range(5, 11)": "range(5, 7)"},
 }
 """What is cut short in a lesson, where it takes long: all cells run, on less of the same."""
 PRIVATE_NAME = re.compile(r"(?:[.,(]|\bimport)\s*_(?!_)\w+")
@@ -43,8 +54,8 @@ def cut_short(notebook, name):
         cell.source = cell.source.replace(long, short)
 
 
-def test_there_are_four_lessons_and_pages_lead_to_them():
-    assert [path.name[0] for path in NOTEBOOKS] == ["1", "2", "3", "4"]
+def test_there_are_nine_lessons_and_pages_lead_to_them():
+    assert "".join(path.name[0] for path in NOTEBOOKS) == "123456789"
     for page in (ROOT / "docs" / "notebooks.md", ROOT / "notebooks" / "README.md"):
         text = page.read_text(encoding="utf-8")
         assert all(f"{path.name})" in text for path in NOTEBOOKS), page
@@ -80,7 +91,7 @@ def test_the_links_of_a_notebook_lead_somewhere(path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)
+@pytest.mark.parametrize("path", [p for p in NOTEBOOKS if p.stem in IN_A_KERNEL], ids=name_of)
 def test_a_notebook_runs_from_top_to_bottom_without_a_warning(path, tmp_path, monkeypatch):
     # nothing of the person's own settings, and nothing left behind
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
@@ -100,3 +111,27 @@ def test_a_notebook_runs_from_top_to_bottom_without_a_warning(path, tmp_path, mo
     lines = [line for line in warned.splitlines() if NOTICE not in line]  # a fresh machine compiles
     assert lines == []
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [p for p in NOTEBOOKS if p.stem not in IN_A_KERNEL], ids=name_of)
+def test_the_cells_of_a_notebook_run_one_after_the_other(path, tmp_path, monkeypatch):
+    """In this process: a kernel would import everything again for each lesson."""
+    drawn = []
+    pyplot.switch_backend("agg")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pyplot, "show", lambda: drawn.append(pyplot.gcf()) or pyplot.close())
+    notebook = nbformat.read(path, as_version=4)
+    cut_short(notebook, path.stem)
+    names = {"__name__": "lesson"}
+    for cell in code_cells(notebook):
+        *statements, last = ast.parse(cell.source.replace(INLINE, "")).body
+        exec(compile(ast.Module(statements, []), cell.id, "exec"), names)
+        if not isinstance(last, ast.Expr):
+            exec(compile(ast.Module([last], []), cell.id, "exec"), names)
+        elif isinstance(
+            shown := eval(compile(ast.Expression(last.value), cell.id, "eval"), names), Figure
+        ):
+            drawn.append(shown)
+            shown.canvas.draw()
+    assert len(drawn) >= 3

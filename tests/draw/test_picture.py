@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.draw import Picture, picture
+from uas_coverage_env.draw import Picture, legend, picture
 from uas_coverage_env.draw.colours import of_charge
 from uas_coverage_env.draw.frame import Frame
+from uas_coverage_env.draw.legend import SIGNS, decoration_kinds, obstacle_kinds
 from uas_coverage_env.scenario import generate_scenario, load_scenario, scenario_names
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, PSI
@@ -204,6 +205,28 @@ def test_a_large_swarm_is_summed_up():
     top, bottom, *_ = differs(before, picture(scenario, swarm))
     assert bottom > 484
     assert top < 484
+
+
+def test_a_legend_is_as_wide_as_its_picture_and_taller_the_more_there_is(village):
+    few, all_of_them = (legend(village, signs, 900) for signs in (("open",), SIGNS))
+    assert few.shape[1:] == all_of_them.shape[1:] == (900, 3)
+    assert all_of_them.shape[0] > few.shape[0]
+    assert legend(village, SIGNS, 300).shape[0] > 0.33 * all_of_them.shape[0]  # in fewer columns
+
+
+def test_a_legend_has_the_tint_of_everything_that_stands_or_lies_on_the_map(village):
+    pixels = {tuple(pixel) for pixel in legend(village, (), 900).reshape(-1, 3).tolist()}
+    kinds = {**obstacle_kinds(village), **decoration_kinds(village)}
+    assert {"forest", "high rise", "water"} <= set(kinds)
+    assert set(kinds.values()) <= pixels
+
+
+def test_where_a_moving_obstacle_has_been_is_drawn(village, swarm):
+    before, drawn = picture(village, swarm), Picture(village)
+    been_m = np.array([[[100.0, 250.0, -3.0]], [[100.0, 400.0, -3.0]]])
+    top, bottom, left, right = differs(before, drawn.draw(swarm, moving_paths_m=been_m))
+    assert bottom - top < 5
+    assert right - left > 100
 
 
 def test_importing_the_room_does_not_import_pillow():

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("pyproj")
 from pymavlink import mavwp
+from qgc_loader import problems
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
@@ -19,7 +20,7 @@ from uas_coverage_env.operations.tracks import make_track
 from uas_coverage_env.scenario import Execution, Place, load_scenario
 
 PLACE = Place(latitude_deg=60.5, longitude_deg=26.9)
-WAYPOINT, TAKE_OFF, CHANGE_SPEED = 16, 22, 178
+WAYPOINT, TAKE_OFF, CHANGE_SPEED, TRIGGER_DISTANCE = 16, 22, 178, 206
 CORNER_M = 2.0
 
 
@@ -93,6 +94,68 @@ def test_a_file_read_back_and_flown_passes_every_waypoint_as_it_asks(flight, kin
             asking += flight.scenario.waypoints[w].max_speed_mps is not None
         assert uas["waypoints_not_as_asked"] == 0
     assert asking == 3
+
+
+def pictures(items, followed):
+    """(P, 3) where pictures are taken on the legs of a file that ask for them."""
+    frame, corners, each, now = LocalFrame(PLACE), [], [], 0.0
+    for command, params, place in items:
+        if command == TRIGGER_DISTANCE:
+            now = params[0]
+        elif command in (TAKE_OFF, WAYPOINT):
+            corners.append(frame.to_ned(*place))
+            if command == WAYPOINT:
+                each.append(now)
+    assert now == 0.0, "switched off before it lands"
+    taken, since = [], 0.0
+    leg_of = np.searchsorted(followed.corner_s[1:], followed.times_s).clip(max=len(each) - 1)
+    for k in range(1, len(followed.places_m)):
+        apart_m, before_m = each[leg_of[k]], each[leg_of[k - 1]]
+        since += np.linalg.norm(followed.places_m[k] - followed.places_m[k - 1])
+        if apart_m and (not before_m or since >= apart_m):
+            taken.append(followed.places_m[k])
+            since = 0.0
+    return np.array(taken).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "qgc"])
+def test_a_picture_is_taken_in_the_sphere_of_every_waypoint_that_asks_for_a_camera(
+    flight, kind, tmp_path
+):
+    made, scenario = make_export(flight, ExportOptions(kind, min_slack_s=0.0)), flight.scenario
+    asking = 0
+    for i, uas in enumerate(made.data["uas"]):
+        if kind == "qgc":
+            text = made.files[f"{uas['name']}.plan"]
+            assert problems(text) == []
+            items = list(items_of_plan(text))
+        else:
+            text = made.files[f"{uas['name']}.waypoints"]
+            items = list(items_by_pymavlink(text, tmp_path / uas["name"]))
+        cameras = {one.name for one in scenario.uas[i].sensors if one.field_of_view_deg}
+        wanted = [
+            scenario.waypoints[w]
+            for w in make_track(flight, i, Tolerances()).waypoints
+            if scenario.waypoints[w].sensor in cameras
+        ]
+        taken = pictures(items, flown(items, scenario.vehicles[i]))
+        assert bool(wanted) == bool(len(taken)) == (uas["picture_each_m"] is not None)
+        for waypoint in wanted:
+            away_m = np.linalg.norm(taken - np.array(waypoint.position_m), axis=1)
+            assert away_m.min() <= waypoint.radius_m + 0.5  # the model's samples are apart, too
+        asking += len(wanted)
+    assert asking > 3
+
+
+def test_files_of_a_mission_that_asks_for_no_camera_trigger_none():
+    scenario = load_scenario("open_field").model_copy(update={"place": PLACE})
+    made = make_export(
+        rollout(scenario, load_planner("lawnmower")), ExportOptions("qgc", min_slack_s=0.0)
+    )
+    for uas in made.data["uas"]:
+        commands = [item[0] for item in items_of_plan(made.files[f"{uas['name']}.plan"])]
+        assert TRIGGER_DISTANCE not in commands
+        assert uas["picture_each_m"] is None
 
 
 def test_a_speed_that_is_not_asked_for_is_not_limited(flight):

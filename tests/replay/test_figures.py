@@ -93,6 +93,30 @@ def test_the_map_has_north_heights_and_a_legend_of_all_that_is_on_it(flight):
     assert len(entries) == len(set(entries))
 
 
+def entries_at(flight, step):
+    return {text.get_text() for text in map_figure(flight, step=step).legends[0].texts}
+
+
+def test_the_legend_says_only_what_is_on_the_map_at_its_sample(flight):
+    charge = {"charged", "medium", "discharged"}
+    assert charge | {"geofence", "height"} <= entries_at(flight, 25)
+    mode = np.full_like(flight.mode, MODES.index("landed"))
+    mode[:, 1] = MODES.index("lost")
+    over = entries_at(dataclasses.replace(flight, mode=mode), 25)
+    assert not charge & over
+    assert {"landed", "lost"} <= over
+
+
+def test_the_path_of_a_moving_obstacle_is_drawn_once_it_has_moved(flight):
+    moved_m = flight.moving_position_m.copy()
+    moved_m[10:, 0, 0] += 50.0
+    moved = dataclasses.replace(flight, moving_position_m=moved_m)
+    assert "path of it" not in entries_at(moved, 5)
+    assert "path of it" in entries_at(moved, 25)
+    drawn = lines(map_figure(moved, step=25).axes[0])
+    assert any(np.array_equal(line, moved_m[:26, 0, [1, 0]]) for line in drawn)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_figures_are_as_wide_as_asked_and_narrow_ones_hold_their_legends(kind, flight):
     with look(width_in=88 / 25.4):
@@ -108,7 +132,7 @@ def test_figures_are_as_wide_as_asked_and_narrow_ones_hold_their_legends(kind, f
 
 def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path):
     path = tmp_path / "paper.mplstyle"
-    path.write_text("lines.linewidth: 3.25\n")
+    path.write_text('# ours\nlines.linewidth: 3.25  # wide\naxes.edgecolor: "#112233"\n')
     for style, width in ((str(path), 3.25), (None, 1.1)):
         with look(style=style):
             soc, *_ = battery_figure(flight).axes
@@ -120,12 +144,21 @@ def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path)
     [
         ("ggplott", "unknown style 'ggplott'; did you mean ggplot"),
         ("missing.mplstyle", "missing.mplstyle: no such file"),
-        ("broken.mplstyle", "broken.mplstyle: is no style of matplotlib"),
+        ("broken.mplstyle", "broken.mplstyle, line 1, font.size: .*large and red"),
+        (
+            "typo.mplstyle",
+            "typo.mplstyle, line 2: unknown key 'lines.linewdith'; .*lines.linewidth",
+        ),
+        ("colon.mplstyle", "colon.mplstyle, line 1: 'font.size 9' has no colon; write KEY: VALUE"),
+        ("bytes.mplstyle", "bytes.mplstyle: is no style of matplotlib"),
     ],
 )
 def test_a_style_that_cannot_be_taken_is_told_in_a_line(style, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("broken.mplstyle").write_text("font.size: large and red\n")
+    Path("typo.mplstyle").write_text("font.size: 9  # points\nlines.linewdith: 2\n")
+    Path("colon.mplstyle").write_text("font.size 9\n")
+    Path("bytes.mplstyle").write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match=message) as refusal, look(style=style):
         pass
     assert "\n" not in str(refusal.value)

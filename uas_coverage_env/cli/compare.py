@@ -76,7 +76,7 @@ def compare(
     reference: Annotated[
         str | None,
         typer.Option(
-            help=f"Whom the others are compared with; {_REFERENCE}, or the first.",
+            help=f"The planner that the others are compared with; {_REFERENCE}, or the first.",
             show_default=False,
         ),
     ] = None,

@@ -32,7 +32,7 @@ def demonstrate_command(
     ],
     out: Annotated[Path, typer.Option(help="Folder of the missions; resumed if it exists.")],
     planner: Annotated[
-        str, typer.Option(metavar="NAME", help="Who demonstrates; see `planners`.")
+        str, typer.Option(metavar="NAME", help="The planner that demonstrates; see `planners`.")
     ] = "trajectory",
     option: Annotated[
         list[str] | None,

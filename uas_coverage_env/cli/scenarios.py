@@ -12,7 +12,7 @@ from rich.table import Table
 
 from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.output import console, loaded
-from uas_coverage_env.draw import picture
+from uas_coverage_env.draw import legend, picture
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import (
@@ -86,7 +86,12 @@ def check(
     path = picture_file or Path(f"{scenario.name}.png")
     if path.exists() and not overwrite and not _drawn_by_us(path):
         raise InputError(f"{path}: exists; give another --picture or add --overwrite")
-    pixels = picture(scenario, World(scenario).swarm_state(), size_px=_PICTURE_PX)
+    pixels = np.vstack(
+        [
+            picture(scenario, World(scenario).swarm_state(), size_px=_PICTURE_PX),
+            legend(scenario, _signs(scenario), _PICTURE_PX),
+        ]
+    )
     try:
         with written_by(path) as place:
             mark = PngInfo()
@@ -99,6 +104,16 @@ def check(
     for line in _lines(scenario):
         out.print(line, markup=False)
     out.print(f"drawn in {path}", markup=False)
+
+
+def _signs(scenario: Scenario) -> set[str]:
+    """What the picture of a scenario before its flight has on it."""
+    heavy = len({point.weight for point in scenario.waypoints}) > 1
+    return {
+        *("open", "home", "flying"),
+        *(["heavy"] if heavy else []),
+        *(["moving", "kept_off"] if scenario.moving_obstacles else []),
+    }
 
 
 def _drawn_by_us(path: Path) -> bool:
@@ -134,14 +149,14 @@ def _carried(uas: Uas) -> str:
 
 
 def _asked(scenario: Scenario) -> list[str]:
-    """How many waypoints ask for which sensor, and who carries it."""
+    """How many waypoints ask for which sensor, and which UAS carry it."""
     wanted = [waypoint.sensor for waypoint in scenario.waypoints]
     lines = []
     for name in dict.fromkeys(one for one in wanted if one is not None):
         carriers = [
             uas.name for uas in scenario.uas if any(one.name == name for one in uas.sensors)
         ]
-        lines.append(f"{wanted.count(name)} for {name}: {', '.join(carriers) or 'nobody'}")
+        lines.append(f"{wanted.count(name)} for {name}: {', '.join(carriers) or 'no UAS'}")
     return lines
 
 

@@ -34,6 +34,8 @@ OBSTACLES: dict[str, Colour] = {
     "high_rise": (163, 141, 126),
     "church": (190, 122, 100),
     "terrain": (203, 193, 158),
+    "no_fly": (232, 170, 160),
+    "outside_fence": (214, 190, 190),
 }
 OTHER_OBSTACLE: Colour = (168, 168, 164)
 
@@ -48,6 +50,16 @@ def shaded(colour: Colour, factor: float) -> Colour:
     """The colour darkened (factor < 1) or lightened, within what a byte can hold."""
     red, green, blue = (min(255, max(0, round(part * factor))) for part in colour)
     return red, green, blue
+
+
+def of_obstacle(kind: str | None) -> Colour:
+    """The tint of an obstacle."""
+    return OBSTACLES.get(kind or "", OTHER_OBSTACLE)
+
+
+def of_decoration(kind: str | None) -> Colour:
+    """The tint of what lies on the ground and is no obstacle."""
+    return DECORATIONS.get(kind or "", OTHER_DECORATION)
 
 
 def of_charge(soc: float) -> Colour:

@@ -47,6 +47,11 @@ def moving_obstacle(
     """A disc for the cylinder and a dotted circle for the distance to be kept from it."""
     box = (x - radius, y - radius, x + radius, y + radius)
     draw.ellipse(box, fill=colours.RED, outline=colours.INK, width=round(frame.unit))
+    safe_distance(draw, frame, x, y, safe_radius)
+
+
+def safe_distance(draw: "ImageDraw", frame: Frame, x: float, y: float, safe_radius: float) -> None:
+    """A dotted circle around a moving obstacle."""
     # chords: an arc takes Pillow three times as long
     dashes = min(240, max(12, 3 * round(safe_radius / (4 * frame.unit))))
     for dash in range(dashes):
@@ -88,6 +93,25 @@ def flying(
         draw.line(line, fill=colours.INK, width=round(2.2 * unit))
     nose = (x + arm * math.sin(yaw), y - arm * math.cos(yaw))
     draw.line((x, y, *nose), fill=colour, width=round(2.2 * unit))
+
+
+def pad(draw: "ImageDraw", frame: Frame, x: float, y: float) -> None:
+    """A small ring where a UAS starts, and lands."""
+    radius = 5 * frame.unit
+    box = (x - radius, y - radius, x + radius, y + radius)
+    draw.ellipse(box, fill=colours.WHITE, outline=colours.BLUE, width=round(1.5 * frame.unit))
+
+
+def planned(draw: "ImageDraw", frame: Frame, x: float, y: float, colour: Colour) -> None:
+    """A dot where a UAS means to be."""
+    radius = 2 * frame.unit
+    box = (x - radius, y - radius, x + radius, y + radius)
+    draw.ellipse(box, fill=colour, outline=colours.WHITE)
+
+
+def moving_path(draw: "ImageDraw", frame: Frame, pixels: list[tuple[float, float]]) -> None:
+    """A thin line where a moving obstacle has been."""
+    draw.line(pixels, fill=colours.RED, width=round(frame.unit))
 
 
 def landed(draw: "ImageDraw", frame: Frame, x: float, y: float, colour: Colour) -> None:

@@ -102,12 +102,14 @@ class Picture:
         *,
         paths_m: NDArray[np.float64] | None = None,
         planned_m: Mapping[str, NDArray[np.float64]] | None = None,
+        moving_paths_m: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:
         """The picture of a state.
 
         Args:
             swarm: The state.
             paths_m: (T, U, 3) [m] where the UAS have been.
+            moving_paths_m: (T, M, 3) [m] where the moving obstacles have been.
             planned_m: Name of a UAS -> (N, 3) [m], where it means to fly.
 
         Returns:
@@ -118,6 +120,9 @@ class Picture:
         image = self._canvas.image
         image.paste(self._map_with_waypoints(swarm.uncovered))
         draw = ImageDraw.Draw(image)
+        if moving_paths_m is not None and len(moving_paths_m) > 1:
+            for pixels in self._frame.pixels(moving_paths_m).swapaxes(0, 1).tolist():
+                marks.moving_path(draw, self._frame, [(x, y) for x, y in pixels])
         if paths_m is not None and len(paths_m) > 1:
             self._paths(draw, paths_m)
         if planned_m:
@@ -177,12 +182,10 @@ class Picture:
         names: tuple[str, ...],
         planned_m: Mapping[str, NDArray[np.float64]],
     ) -> None:
-        radius = 2 * self._frame.unit
         for name, positions_m in planned_m.items():
             colour = _colour(names.index(name))
             for x, y in self._frame.pixels(np.asarray(positions_m)).tolist():
-                box = (x - radius, y - radius, x + radius, y + radius)
-                draw.ellipse(box, fill=colour, outline=colours.WHITE)
+                marks.planned(draw, self._frame, x, y, colour)
 
     def _moving_obstacles(self, draw: "ImageDraw", swarm: SwarmState) -> None:
         scale = self._frame.scale

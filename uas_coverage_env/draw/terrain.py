@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import colours
+from uas_coverage_env.draw import colours, marks
 from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.labels import free_place
 from uas_coverage_env.draw.text import fitted, width_of, write
@@ -40,7 +40,7 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
     draw.polygon(_flat(frame.pixels(fence)), fill=colours.GROUND)
     beside_scale = _grid(image, draw, frame, fence)
     for decoration in scenario.decorations:
-        fill = colours.DECORATIONS.get(decoration.kind or "", colours.OTHER_DECORATION)
+        fill = colours.of_decoration(decoration.kind)
         corners = _flat(frame.pixels(np.array(decoration.polygon_m)))
         draw.polygon(corners, fill=fill)
         if decoration.kind == "pad":
@@ -48,9 +48,9 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
     _shadows(image, frame, scenario.hulls)
     points = scenario.waypoints
     places = frame.pixels(np.array([point.position_m for point in points]))
-    marks = np.column_stack([places, [point.radius_m * frame.scale for point in points]])
+    discs = np.column_stack([places, [point.radius_m * frame.scale for point in points]])
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        _obstacle(image, draw, frame, obstacle.kind or "", hull, marks)
+        _obstacle(image, draw, frame, obstacle.kind or "", hull, discs)
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
     _north(image, draw, frame, beside_scale)
@@ -114,14 +114,14 @@ def _obstacle(
     frame: Frame,
     kind: str,
     hull: ConvexPolytope,
-    marks: NDArray[np.float64],
+    discs: NDArray[np.float64],
 ) -> None:
     """The faces that can be seen from above, lit, in the tint of the kind; darker where taller.
 
-    Its height stands where no waypoint (`marks`, (W, 3) x, y, radius on the canvas) hides it.
+    Its height stands where no waypoint (`discs`, (W, 3) x, y, radius on the canvas) hides it.
     """
     height_m = float(np.ptp(hull.vertices_m[:, 2]))
-    tint = colours.OBSTACLES.get(kind, colours.OTHER_OBSTACLE)
+    tint = colours.of_obstacle(kind)
     tint = colours.shaded(tint, 1.08 - 0.3 * min(1.0, height_m / _TALL_M))
     distances = hull.face_distances(hull.vertices_m)
     for face in np.flatnonzero(hull.normals[:, 2] < -1e-6):
@@ -135,16 +135,14 @@ def _obstacle(
     ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.35)
     words, size = f"{height_m:.0f} m", 8.5 * frame.letter
     box = np.array([width_of(words, size), size]) + frame.unit
-    place = free_place(frame.pixels(outline), box, marks)
+    place = free_place(frame.pixels(outline), box, discs)
     if place is not None:
         write(image, place, words, size, ink, align=0.5)
 
 
 def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> None:
-    radius = 5 * frame.unit
-    for x, y in frame.pixels(starts_m):
-        box = (x - radius, y - radius, x + radius, y + radius)
-        draw.ellipse(box, fill=colours.WHITE, outline=colours.BLUE, width=round(1.5 * frame.unit))
+    for x, y in frame.pixels(starts_m).tolist():
+        marks.pad(draw, frame, x, y)
 
 
 def _margins(image: "Image", draw: "ImageDraw", frame: Frame, name: str) -> None:

@@ -69,7 +69,7 @@ def home(flight: FlightRecord) -> NDArray[np.bool_]:
 
 
 def accomplished(flight: FlightRecord) -> bool:
-    """Whether the mission succeeded: everything covered, everyone home, no violation.
+    """Whether the mission succeeded: everything covered, every UAS home, no violation.
 
     A UAS that an event of the scenario took away need not be home.
     """

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Picture
+from uas_coverage_env.draw import Picture, legend
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.metrics import covered_at
@@ -62,16 +62,44 @@ def flight_pictures(
             _swarm(flight, now, uncovered=covered > now),
             paths_m=flight.x[: now + 1, :, 0:3],
             planned_m=_planned(flight, now),
+            moving_paths_m=flight.moving_position_m[: now + 1],
         )
 
 
 def draw_flight(flight: Flight, path: str | Path, step: int | None = None) -> None:
-    """Write `flight_picture` as a PNG."""
+    """Write `flight_picture` with a legend under it as a PNG."""
     from PIL import Image
 
+    now = flight.steps if step is None else step
+    pixels = np.vstack(
+        [flight_picture(flight, step), legend(flight.scenario, _signs(flight, now), _SIZE_PX)]
+    )
     content = BytesIO()
-    Image.fromarray(flight_picture(flight, step)).save(content, format="png")
+    Image.fromarray(pixels).save(content, format="png")
     write_atomically(Path(path), content.getvalue())
+
+
+def _signs(flight: Flight, now: int) -> set[str]:
+    """Which signs of the legend are on the picture of a sample."""
+    covered = covered_at(flight) <= now
+    weights = {point.weight for point in flight.scenario.waypoints}
+    moving_m = flight.moving_position_m[: now + 1]
+    mode = flight.mode[now]
+    there = {
+        "open": not covered.all(),
+        "covered": covered.any(),
+        "heavy": len(weights) > 1,
+        "home": True,
+        "flying": not np.isin(mode, (LANDED, LOST)).all(),
+        "landed": (mode == LANDED).any(),
+        "lost": (mode == LOST).any(),
+        "flown": now > 0,
+        "planned": bool(_planned(flight, now)),
+        "moving": bool(moving_m.size),
+        "kept_off": bool(moving_m.size),
+        "moved": bool((moving_m != moving_m[:1]).any()),
+    }
+    return {sign for sign, is_there in there.items() if is_there}
 
 
 def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState:

@@ -1,4 +1,4 @@
-"""Who is better: planners and policies on the same scenarios, flown, kept, counted, published."""
+"""Planners and policies compared on the same scenarios: flown, kept, counted, published."""
 
 from uas_coverage_env.leaderboard.bounds import Bounds, bounds_of
 from uas_coverage_env.leaderboard.machine import machine

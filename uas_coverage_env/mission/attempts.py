@@ -1,4 +1,4 @@
-"""Who comes no nearer to its target, and which waypoints are therefore left for later."""
+"""UAS that come no nearer to their targets, and waypoints that are therefore left for later."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ class MissionBrief(StrictModel):
         place: Where on the Earth it is; None where the scenario does not say.
         conditions: Stated bounds of wind and of the true vehicles, never what is drawn; None where
             nothing pushes back.
-        execution: Who flies it in the end, and how exactly; None where the scenario does not say.
+        execution: What flies it in the end, and how exactly; None where the scenario does not say.
     """
 
     schema_version: int

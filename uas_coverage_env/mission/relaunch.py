@@ -23,10 +23,10 @@ BoolArray = NDArray[np.bool_]
 class Relaunch:
     """The rule by which UAS that have landed take off again, for every planner the same.
 
-    They do where nobody is at work any more: all others have landed, are lost, take no commands
+    They do where no UAS is at work any more: all others have landed, are lost, take no commands
     (`Handover`), or are on their way home in return mode. Then each goes that reaches an open
     waypoint and comes home again with the charge that it has, and stands clear of everything.
-    Where nothing has been covered since, and nobody was lost, they do not go a second time.
+    Where nothing has been covered since, and no UAS was lost, they do not go a second time.
 
     Args:
         brief: The mission as it is now.

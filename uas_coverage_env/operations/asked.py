@@ -23,6 +23,7 @@ SHARE = 0.95
 """Of the speed that is asked, what a file sets: a vehicle does not hold it to the last digit."""
 
 _LEAST_MPS = 0.1
+_LEAST_APART_M = 1.0
 _ROUNDING = 1e-6
 _BETWEEN_M = 0.05
 """What a straight line at full speed may be closer between two samples of the model."""
@@ -52,6 +53,49 @@ def most_mps(scenario: Scenario, track: Track) -> tuple[float, ...]:
         else math.inf
         for mps, share in zip(most.tolist(), level.tolist(), strict=True)
     )
+
+
+def triggers_m(scenario: Scenario, track: Track, corner_m: float) -> tuple[float, ...]:
+    """How far apart the pictures on each leg are [m]; 0 where no waypoint asks for a camera.
+
+    On every leg that touches the sphere of such a waypoint they are no farther apart than the path,
+    corners cut, is long within it: one at least is taken where the waypoint counts as covered.
+
+    Args:
+        scenario: The mission.
+        track: The legs.
+        corner_m: How far from a corner an autopilot may pass [m].
+    """
+    carried = scenario.uas[track.uas].sensors
+    cameras = {sensor.name for sensor in carried if sensor.field_of_view_deg is not None}
+    path = cut_path(track.corners_m, [leg.stop for leg in track.legs], corner_m)
+    apart_m = np.full(len(track.legs), math.inf)
+    for w in track.waypoints:
+        waypoint = scenario.waypoints[w]
+        if waypoint.sensor in cameras:
+            centre = np.array([waypoint.position_m])
+            corners = pairwise(track.corners_m)
+            away_m = np.array([distances_m(centre, a, b)[0] for a, b in corners])
+            touched = away_m <= max(waypoint.radius_m, float(away_m.min()))
+            inside_m = _length_within_m(path, centre[0], waypoint.radius_m)
+            apart_m[touched] = np.minimum(apart_m[touched], inside_m)
+    return tuple(
+        max(math.floor(10.0 * each) / 10.0, _LEAST_APART_M) if math.isfinite(each) else 0.0
+        for each in apart_m.tolist()
+    )
+
+
+def _length_within_m(path: FloatArray, centre: FloatArray, radius_m: float) -> float:
+    """How long a path of straight pieces is within a sphere."""
+    ways = np.diff(path, axis=0)
+    lengths = np.linalg.norm(ways, axis=1)
+    to_centre = centre - path[:-1]
+    along = (to_centre * ways).sum(axis=1) / np.maximum(lengths, 1e-9)
+    aside_2 = (to_centre**2).sum(axis=1) - along**2
+    half = np.sqrt(np.maximum(radius_m**2 - aside_2, 0.0))
+    ends = (np.clip(along + side * half, 0.0, lengths) for side in (-1.0, 1.0))
+    enters, leaves = ends
+    return float((leaves - enters).sum())
 
 
 def not_as_asked(scenario: Scenario, track: Track, followed: Followed) -> list[int]:

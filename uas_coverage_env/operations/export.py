@@ -160,7 +160,7 @@ def place_of_flight(flight: Flight, given: Place | None) -> Place:
         given: For a scenario that does not say.
 
     Raises:
-        InputError: Nobody says where, or both do.
+        InputError: Neither says where, or both do.
     """
     place, name = flight.scenario.place, flight.scenario.name
     if place is not None and given is not None:

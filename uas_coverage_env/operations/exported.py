@@ -12,7 +12,7 @@ from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.mission.separation import Waits
-from uas_coverage_env.operations.asked import most_mps, not_as_asked
+from uas_coverage_env.operations.asked import most_mps, not_as_asked, triggers_m
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.room import Surroundings
 from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
@@ -70,6 +70,7 @@ class Exported:
         frame: Where it is on the Earth.
         looks_ahead: Whether it looks where it flies; else, north.
         not_as_asked: Waypoints not passed within the radius, speed and heights they ask for.
+        triggers_m: (legs,) how far apart pictures are taken; 0: none are [m].
     """
 
     track: Track
@@ -84,6 +85,7 @@ class Exported:
     frame: LocalFrame
     looks_ahead: bool
     not_as_asked: tuple[int, ...]
+    triggers_m: tuple[float, ...]
 
     @property
     def point_of_no_return(self) -> int | None:
@@ -137,6 +139,7 @@ def exported(
         frame=frame,
         looks_ahead=scenario.uas[track.uas].heading == "course",
         not_as_asked=tuple(not_as_asked(scenario, track, flown)),
+        triggers_m=triggers_m(scenario, track, tolerances.corner_m),
     )
 
 

@@ -64,7 +64,7 @@ class ImportOptions:
         town: GeoJSON of buildings.
         terrain: Grid of heights; None: the ground is flat.
         min_height_m: Least height of UAS above ground and roofs, but for take-off and landing [m].
-        flown_by: Who flies it in the end, `autopilot`; None: nobody in particular.
+        flown_by: What flies it in the end, `autopilot`; None: the world alone.
     """
 
     fleet: str = "s500_v2:2"
@@ -159,7 +159,8 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     scenario = _finite(parse(tables, Scenario, name))
     notes = [
         *_look_notes(looks, seen, waypoints.above_m, uneven=relief.ground is not None),
-        f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} obstacles",
+        f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} "
+        f"obstacle{'' if len(walls) == 1 else 's'}",
         *([relief.note(site)] if relief.ground else []),
         *_town_notes(town),
     ]

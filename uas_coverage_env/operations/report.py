@@ -61,6 +61,7 @@ def _uas(flight: Flight, one: Exported) -> dict[str, Any]:
         "waits": waiting(one),
         "waypoints_passed": len(track.waypoints),
         "waypoints_not_as_asked": len(one.not_as_asked),
+        "picture_each_m": min(filter(None, one.triggers_m), default=None),
         "waypoint_margin_m": round(min(margins), 3) if margins else None,
         "return_height_m": one.return_m,
         "point_of_no_return": None if lost is None else _moment(one, lost),

@@ -26,9 +26,7 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
             {
                 "name": obstacle.name,
                 "kind": obstacle.kind or "",
-                "colour": hex_colour(
-                    colours.OBSTACLES.get(obstacle.kind or "", colours.OTHER_OBSTACLE)
-                ),
+                "colour": hex_colour(colours.of_obstacle(obstacle.kind)),
                 **_body(hull),
             }
             for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
@@ -36,9 +34,7 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
         "decorations": [
             {
                 "kind": item.kind or "",
-                "colour": hex_colour(
-                    colours.DECORATIONS.get(item.kind or "", colours.OTHER_DECORATION)
-                ),
+                "colour": hex_colour(colours.of_decoration(item.kind)),
                 "outline": _metres(np.array(item.polygon_m)),
             }
             for item in scenario.decorations

@@ -14,7 +14,7 @@ class Execution(StrictModel):
     that the file takes as long as the flight. In the world nothing is different.
 
     Attributes:
-        flown_by: Who flies it.
+        flown_by: What flies it.
         tolerance_m: How far legs may be from the flight, that much less than its radius from a
             waypoint [m].
         corner_m: How far from a corner the autopilot may pass [m].

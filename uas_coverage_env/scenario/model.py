@@ -46,7 +46,7 @@ class Scenario(UncheckedScenario):
         sensing: How well UAS are known to planners and autopilots; without it, exactly.
         events: What happens during the mission; a table `[[events]]` for each.
         sorties: Battery packs of each UAS; without it, one.
-        execution: Who flies it in the end; without it, nobody in particular.
+        execution: What flies it in the end, an autopilot; without it, the world alone.
     """
 
     def __getstate__(self) -> dict[Any, Any]:

@@ -1,4 +1,4 @@
-"""Who can cover what: the sensors that UAS carry, and those that waypoints ask for."""
+"""Which UAS can cover what: the sensors that UAS carry, and those that waypoints ask for."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class ScoreStore:
         return tuple(self._missions.get((level, player), ()))
 
     def players(self, level: str) -> tuple[str, ...]:
-        """Who has flown on a level."""
+        """Names of the players that have flown on a level."""
         return tuple(player for name, player in self._missions if name == level)
 
     def add(self, level: str, player: str, mission: MissionScore) -> None:

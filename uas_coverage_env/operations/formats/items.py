@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from uas_coverage_env.operations.exported import Exported
 
-WAYPOINT, LAND, TAKE_OFF, DELAY, CHANGE_SPEED = 16, 21, 22, 93, 178
+WAYPOINT, LAND, TAKE_OFF, DELAY, CHANGE_SPEED, TRIGGER_DISTANCE = 16, 21, 22, 93, 178, 206
 """MAV_CMD."""
 
 MISSION_FRAME, RELATIVE_FRAME = 2, 3
@@ -32,7 +32,7 @@ class Item:
 
 
 def items_of(one: Exported, corner_m: float) -> list[Item]:
-    """What is waited for, take-off, legs with their speeds, and landing.
+    """What is waited for, take-off, legs with their speeds and pictures, and landing.
 
     Args:
         one: The UAS.
@@ -45,14 +45,26 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
     if one.waits.start_s:  # the time of day is not what it waits for
         items.append(Item(DELAY, MISSION_FRAME, (one.waits.start_s, -1.0, -1.0, -1.0, 0, 0, 0)))
     items.append(Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height))))
-    set_mps = None
+    set_mps, apart_m = None, 0.0
     heading_deg = math.nan if one.looks_ahead else _NORTH_DEG
-    for leg, speed_mps, hold_s in zip(one.track.legs, one.speeds_mps, one.holds_s, strict=True):
+    for n, (leg, speed_mps, hold_s) in enumerate(
+        zip(one.track.legs, one.speeds_mps, one.holds_s, strict=True)
+    ):
         if speed_mps != set_mps:
             items.append(Item(CHANGE_SPEED, MISSION_FRAME, (1.0, speed_mps, -1.0, 0, 0, 0, 0)))
             set_mps = speed_mps
+        if one.triggers_m[n] != apart_m:
+            apart_m = one.triggers_m[n]
+            items.append(_trigger(apart_m))
         place = (float(number) for number in one.geodetic(leg.end_m))
         first = (hold_s, corner_m, 0.0, heading_deg)
         items.append(Item(WAYPOINT, RELATIVE_FRAME, (*first, *place)))
+    if apart_m:
+        items.append(_trigger(0.0))
     items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, *ground, 0.0)))
     return items
+
+
+def _trigger(apart_m: float) -> Item:
+    """A picture at once and then one each so many metres; 0 ends that."""
+    return Item(TRIGGER_DISTANCE, MISSION_FRAME, (apart_m, 0.0, float(apart_m > 0.0), 0, 0, 0, 0))

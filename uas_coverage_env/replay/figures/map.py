@@ -14,7 +14,7 @@ from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.labels import free_place
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, SeenGround, covered_at, seen_ground
-from uas_coverage_env.replay.figures.map_legend import SEEN_ALPHA, legend_of
+from uas_coverage_env.replay.figures.map_legend import LANDED, LOST, SEEN_ALPHA, legend_of
 from uas_coverage_env.replay.figures.style import (
     columns_of,
     printed,
@@ -49,7 +49,7 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
     low, high = fence.min(axis=0), fence.max(axis=0)
     with printed():
         seen = seen_ground(flight, now)
-        legend = legend_of(flight, seen)
+        legend = legend_of(flight, seen, now)
         columns = columns_of(max(len(str(entry.get_label())) for entry in legend), 6)
         legend_in = _LEGEND_IN + _LEGEND_ROW_IN * -(-len(legend) // columns)
         height_in = width_in() * float((high[0] - low[0]) / (high[1] - low[1]))
@@ -92,11 +92,11 @@ def _terrain(axes: Axes, flight: Flight) -> None:
     fence = _flat(outline_of(scenario.fence))
     axes.add_patch(Polygon(fence, facecolor=shade(colours.GROUND), edgecolor="none"))
     for item in scenario.decorations:
-        tint = colours.DECORATIONS.get(item.kind or "", colours.OTHER_DECORATION)
+        tint = colours.of_decoration(item.kind)
         corners = _flat(np.array(item.polygon_m))
         axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor="none"))
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        tint = colours.OBSTACLES.get(obstacle.kind or "", colours.OTHER_OBSTACLE)
+        tint = colours.of_obstacle(obstacle.kind)
         edge = shade(colours.shaded(tint, 0.6))
         corners = _flat(outline_of(hull))
         axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor=edge, linewidth=0.6))
@@ -142,7 +142,7 @@ def _heights(axes: Axes, flight: Flight, m_per_pt: float) -> None:
         box_m = m_per_pt * _LABEL_PT * np.array([0.62 * len(words), 1.1])
         place = free_place(_flat(outline_of(hull)), box_m, discs_m)
         if place is not None:
-            tint = colours.OBSTACLES.get(obstacle.kind or "", colours.OTHER_OBSTACLE)
+            tint = colours.of_obstacle(obstacle.kind)
             ink = shade(colours.shaded(tint, 0.35))
             axes.text(*place, words, color=ink, fontsize=_LABEL_PT, ha="center", va="center")
 
@@ -163,10 +163,11 @@ def _north(figure: Figure, axes: Axes) -> None:
 
 
 def _moving_obstacles(axes: Axes, flight: Flight, now: int) -> None:
-    for obstacle, position_m in zip(
-        flight.scenario.moving_obstacles, flight.moving_position_m[now], strict=True
-    ):
-        x, y = float(position_m[1]), float(position_m[0])
+    """Where they are, and a thin line where they have been."""
+    for m, obstacle in enumerate(flight.scenario.moving_obstacles):
+        been = _flat(flight.moving_position_m[: now + 1, m])
+        axes.plot(been[:, 0], been[:, 1], color=shade(colours.RED), linewidth=0.7)
+        x, y = been[-1].tolist()
         red = shade(colours.RED)
         axes.add_patch(Circle((x, y), obstacle.radius_m, facecolor=red, edgecolor="black", lw=0.6))
         kept_m = obstacle.radius_m + obstacle.safe_distance_m
@@ -186,9 +187,9 @@ def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
     x, y = path[-1]
     mode = MODES[flight.mode[now, i]]
     if mode == "lost":
-        axes.plot(x, y, "X", color=shade(colours.RED), markeredgecolor="white", markersize=9)
+        axes.plot(x, y, **LOST)
     elif mode == "landed":
-        axes.plot(x, y, "o", color=colour, markeredgecolor="white", markersize=6)
+        axes.plot(x, y, color=colour, **LANDED)
     else:
         _charge_ring(axes, (x, y), float(flight.soc[now, i]))
         heading = float(np.degrees(flight.x[now, i, PSI]))
@@ -228,4 +229,4 @@ def _violations(axes: Axes, flight: Flight, now: int) -> None:
         k = round(violation.time_s / flight.scenario.dt_s)
         if k <= now:
             x, y = _flat(flight.x[k, flight.names.index(violation.uas), :3])
-            axes.plot(x, y, "X", color=shade(colours.RED), markeredgecolor="white", markersize=9)
+            axes.plot(x, y, **LOST)

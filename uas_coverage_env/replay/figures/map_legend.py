@@ -1,25 +1,37 @@
 """What the signs of the map mean: of those that are on it, each once."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from uas_coverage_env.draw import colours
-from uas_coverage_env.flight import Flight, SeenGround
+from uas_coverage_env.draw.legend import decoration_kinds, in_words, obstacle_kinds
+from uas_coverage_env.flight import MODES, Flight, SeenGround
 from uas_coverage_env.replay.figures.style import shade, uas_colour
 
 SEEN_ALPHA = 0.4
+LOST: Mapping[str, Any] = {
+    "marker": "X",
+    "ls": "",
+    "color": shade(colours.RED),
+    "mec": "white",
+    "ms": 9,
+}
+LANDED: Mapping[str, Any] = {"marker": "o", "ls": "", "mec": "white", "ms": 6}
 _RING = {"marker": "o", "linestyle": "", "mfc": "none", "markersize": 8}
 
 
-def legend_of(flight: Flight, seen: Sequence[SeenGround]) -> list[Artist]:
+def legend_of(flight: Flight, seen: Sequence[SeenGround], now: int) -> list[Artist]:
     """The entries of the legend of a map.
 
     Args:
         flight: Whose map it is.
         seen: What its cameras have seen, as far as it is drawn.
+        now: Number of the sample that is drawn.
     """
     weights = {waypoint.weight for waypoint in flight.scenario.waypoints}
     ink = shade(colours.INK)
@@ -38,11 +50,24 @@ def legend_of(flight: Flight, seen: Sequence[SeenGround]) -> list[Artist]:
         )
     start = {"mfc": "white", "mec": uas_colour(0), "markersize": 4}
     marks.append(Line2D([], [], marker="o", ls="", **start, label="start, home"))
-    charge = [
-        Line2D([], [], **_RING, mec=shade(colours.of_charge(soc)), markeredgewidth=2, label=label)
-        for soc, label in ((0.9, "charged"), (0.5, "medium"), (0.1, "discharged"))
-    ]
-    return [*marks, *charge, *_seen(seen), *_places(flight)]
+    return [*marks, *_uas(flight, now), *_seen(seen), *_places(flight, now)]
+
+
+def _uas(flight: Flight, now: int) -> list[Artist]:
+    """What stands for a UAS: a ring of its charge while it flies, else how it ended."""
+    there = {MODES[mode] for mode in flight.mode[now]}
+    hit = any(violation.time_s <= flight.time_s[now] for violation in flight.violations)
+    entries: list[Artist] = []
+    if there - {"landed", "lost"}:
+        entries += [
+            Line2D([], [], **_RING, mec=shade(colours.of_charge(soc)), mew=2, label=label)
+            for soc, label in ((0.9, "charged"), (0.5, "medium"), (0.1, "discharged"))
+        ]
+    if "landed" in there:
+        entries.append(Line2D([], [], color=uas_colour(0), **LANDED, label="landed"))
+    if "lost" in there or hit:
+        entries.append(Line2D([], [], **LOST, label="violation" if hit else "lost"))
+    return entries
 
 
 def _seen(seen: Sequence[SeenGround]) -> list[Artist]:
@@ -55,41 +80,32 @@ def _seen(seen: Sequence[SeenGround]) -> list[Artist]:
     ]
 
 
-def _places(flight: Flight) -> list[Artist]:
-    """Kinds of obstacles and of other things on the ground, and what moves."""
-    scenario = flight.scenario
-    obstacles = {
-        item.kind or "obstacle": colours.OBSTACLES.get(item.kind or "", colours.OTHER_OBSTACLE)
-        for item in scenario.obstacles
-    }
-    others = {
-        item.kind or "": colours.DECORATIONS.get(item.kind or "", colours.OTHER_DECORATION)
-        for item in scenario.decorations
-    }
-    patches: list[Artist] = [
-        *_patches(obstacles.items(), colours.INK),
-        *_patches(((kind, tint) for kind, tint in others.items() if kind), None),
+def _places(flight: Flight, now: int) -> list[Artist]:
+    """Fence, kinds of obstacles and of other things on the ground, and what moves."""
+    scenario, ink = flight.scenario, shade(colours.INK)
+    ground = shade(colours.GROUND)
+    patches: list[Artist] = [Patch(facecolor=ground, edgecolor=ink, lw=1.2, label="geofence")]
+    patches += [
+        Patch(facecolor=shade(tint), edgecolor=ink, lw=0.5, label=words)
+        for words, tint in obstacle_kinds(scenario).items()
     ]
+    patches += [
+        Patch(facecolor=shade(tint), edgecolor="none", label=words)
+        for words, tint in decoration_kinds(scenario).items()
+    ]
+    if scenario.obstacles:
+        patches.append(
+            Line2D([], [], marker="$9\\,m$", ls="", color=ink, ms=13, mew=0, label="height")
+        )
     if scenario.moving_obstacles:
         red = shade(colours.RED)
         kinds = {item.kind or "moving obstacle" for item in scenario.moving_obstacles}
-        name = _words(kinds.pop()) if len(kinds) == 1 else "moving obstacle"
+        name = in_words(kinds.pop()) if len(kinds) == 1 else "moving obstacle"
         patches += [
             Line2D([], [], marker="o", ls="", color=red, mec="black", ms=6, label=name),
             Line2D([], [], color=red, ls="--", lw=0.8, label="safe distance of it"),
         ]
+        moved_m = np.ptp(flight.moving_position_m[: now + 1, :, :2], axis=0)
+        if moved_m.any():
+            patches.append(Line2D([], [], color=red, lw=0.7, label="path of it"))
     return patches
-
-
-def _patches(
-    kinds: Iterable[tuple[str, colours.Colour]], edge: colours.Colour | None
-) -> list[Patch]:
-    ink = "none" if edge is None else shade(edge)
-    return [
-        Patch(facecolor=shade(tint), edgecolor=ink, lw=0.5, label=_words(kind))
-        for kind, tint in kinds
-    ]
-
-
-def _words(kind: str) -> str:
-    return kind.replace("_", " ")

@@ -1,5 +1,6 @@
 """The look that all figures share."""
 
+import re
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import did_you_mean
 
@@ -38,6 +40,9 @@ _RC: dict[Any, Any] = {
     "savefig.dpi": 200,
 }
 
+
+_MOST_BYTES = 1_000_000
+_COMMENT = re.compile(r'("[^"]*")|#.*')
 
 _width_in: ContextVar[float] = ContextVar("width_in", default=WIDTH_IN)
 _style: ContextVar[dict[Any, Any]] = ContextVar("style")
@@ -82,11 +87,34 @@ def _settings(style: str) -> dict[Any, Any]:
         close = did_you_mean(style, styles.available, f"take the path of an .mplstyle or {known}")
         raise InputError(f"unknown style {style[:80]!r}; {close}")
     try:
-        return dict(mpl.rc_params_from_file(path, fail_on_error=True, use_default_template=False))
+        text = read_text(path, _MOST_BYTES)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{path}: is no style of matplotlib ({error})") from error
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is no style of matplotlib; save it as text in UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    read: Any = mpl.RcParams()
+    for number, line in enumerate(text.splitlines(), 1):
+        _set(read, _COMMENT.sub(r"\1", line).strip(), f"{path}, line {number}")
+    return dict(read)
+
+
+def _set(read: Any, line: str, where: str) -> None:
+    """Take over a line of a style: matplotlib itself only logs what it does not know."""
+    if not line:
+        return
+    key, colon, value = (part.strip() for part in line.partition(":"))
+    if not colon:
+        raise InputError(f"{where}: {key[:60]!r} has no colon; write KEY: VALUE")
+    if key not in mpl.rcParamsDefault:
+        close = did_you_mean(key, mpl.rcParamsDefault, "take one of matplotlib.rcParams")
+        raise InputError(f"{where}: unknown key {key[:60]!r}; {close}")
+    try:
+        read[key] = value.strip('"')
+    except ValueError as error:
+        reason = " ".join(str(error).removeprefix(f"Key {key}: ").split())
+        raise InputError(f"{where}, {key}: {reason[:160]}; correct the value") from error
 
 
 def printed() -> AbstractContextManager[None]:

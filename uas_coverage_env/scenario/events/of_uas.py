@@ -62,7 +62,7 @@ class PlannerLost(EventTable):
     then: Then = "return"
 
     def effect(self) -> Effect:
-        """Nobody hears anything."""
+        """No UAS hears anything."""
         return _deafen(self.then, math.inf, on_all=True)
 
 
