@@ -20,7 +20,7 @@ from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, Command, SwarmState
+from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 Observations = dict[str, Any]
 """Of each agent that acted: an array, or a dictionary with `mask_in_observation`."""
@@ -231,9 +231,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             return {}, {}, {}, {}, {}
         accept, asked = episode.actions.accept, episode.asked_rows
         for agent in agents:
-            if agent not in actions:
+            if agent in actions:
+                accept(agent, actions[agent], asked[index[agent]])
+            else:
                 self._check_agents(actions)
-            accept(agent, actions[agent], asked[index[agent]])
         report = episode.step()
 
         observation, amounts, told = episode.observation, episode.amounts, episode.infos
@@ -248,7 +249,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         for agent in agents:
             i = index[agent]
             row, paid = report[i], amounts[i]
-            flies = row[STATUS] == FLYING
+            flies = row[STATUS] in (FLYING, SWAPPING)
             observations[agent] = observation[i]
             rewards[agent] = paid[REWARD]
             terminations[agent] = not flies
@@ -355,5 +356,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
                     f"action {action!r} for {agent!r}: there is no such agent: {known}"
                 )
         missing = [agent for agent in self.agents if agent not in actions]
+        if missing:
+            report = self._episode.report
+            missing = [a for a in missing if report[self._index[a]][STATUS] != SWAPPING]
         if missing:
             raise ValueError(f"{missing[0]} has no action; give one for each agent that flies")

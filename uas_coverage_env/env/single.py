@@ -22,7 +22,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, Command, SwarmState
+from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 
 @with_tables
@@ -147,7 +147,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
             episode.actions.accept(name, row, asked)
         report = episode.step()
         told = self._told(report)
-        flies = any(row[STATUS] == FLYING for row in report)
+        flies = any(row[STATUS] in (FLYING, SWAPPING) for row in report)
         truncated = flies and episode.steps >= episode.max_cycles
         if self.render_mode is not None:
             self._see()

@@ -23,7 +23,7 @@ from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief, Relaunch
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
-from uas_coverage_env.world import Command, SwarmState, Velocity, pack
+from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
 
 _RECORDED_PACKAGES = ("uas-coverage-env", "numpy", "scipy", "numba", "highspy")
 _RECORDED_WHERE_INSTALLED = ("pyscipopt", "gurobipy")
@@ -191,12 +191,15 @@ def _fly(
             return "stopped"
         commands, packed, decision = _decide(planner, swarm)
         outcome = world.step(packed)
-        log.add(commands, packed, decision, getattr(planner, "last_decision", None), outcome)
-        swarm = world.swarm_state()
+        found = getattr(planner, "last_decision", None) if swarm.active else None
+        log.add(commands, packed, decision, found, outcome)
+        before, swarm = swarm, world.swarm_state()
         changed = world.revisions != revisions
         if changed:
             revisions = world.revisions
             relaunch = _relaunch(world)
+        # who took off with a fresh pack
+        changed |= bool(((before.status == LANDED) & (swarm.status == FLYING)).any())
         again = relaunch.due(swarm) if relaunch and log.steps < limit else None
         if again is not None and again.any():
             world.take_off(again)
@@ -214,7 +217,9 @@ def _relaunch(world: World) -> Relaunch | None:
 def _decide(
     planner: Planner, swarm: SwarmState
 ) -> tuple[Mapping[str, Command], NDArray[np.void], float]:
-    """One decision, checked and timed."""
+    """One decision, checked and timed; none is asked for while all swap packs."""
+    if not swarm.active:
+        return {}, pack({}, swarm.names, (), len(swarm.uncovered)), 0.0
     started = time.perf_counter()
     try:
         commands = planner.act(swarm)
