@@ -162,7 +162,7 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "energy_Wh": float(energy_Wh(flight).sum()),
         **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
         # where nobody swaps packs on its own, the file is as it was before that could be
-        **({"packs": packs_used(flight)} if flight.swaps else {}),
+        **({"packs": packs_used(flight), "swaps": _swaps(flight)} if flight.swaps else {}),
         # a record from before rewards were kept stays as it was
         **({"return": episode_return(flight)} if flight.reward_terms is not None else {}),
         **({"reward_terms": reward_sums(flight)} if flight.reward_terms is not None else {}),
@@ -183,6 +183,12 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "seed": flight.seed,
         "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
     }
+
+
+def _swaps(flight: FlightRecord) -> list[dict[str, Any]]:
+    return [
+        {"t_s": swap.time_s, "uas": swap.uas, "landed_s": swap.landed_s} for swap in flight.swaps
+    ]
 
 
 def _happened(event: EventRecord) -> dict[str, Any]:
