@@ -11,6 +11,7 @@ import csv
 import json
 import math
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -159,7 +160,7 @@ def read_record(directory: Path) -> FlightRecord:
     if scenario.get("events"):
         raise BadFlightError(f"{directory}: events happen in it, which are not judged here")
     for track in tracks:
-        drawn = np.flatnonzero(track.columns["current_A"] > 0.0)
+        drawn = np.flatnonzero((track.columns["current_A"] > 0.0) | track.rests)
         if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
             raise BadFlightError(
                 f"{directory}: {track.name} lands and takes off again, which is not judged here"

@@ -110,11 +110,8 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
     curves = {t.name: curve(t.position_m, t.velocity_mps, dt_s) for t in record.tracks}
     partners = [list(partners_of(record, row)) for row in range(n)]
     straight = [
-        [
-            _in_flight(on_segments(p, record.tracks[row]), names[row], p, rests)
-            for p in partners[row]
-        ]
-        for row in range(n)
+        [_in_flight(on_segments(p, track), track.name, p, rests) for p in partners[row]]
+        for row, track in enumerate(record.tracks)
     ]
     touched = [_first_contacts(record, row, partners[row], straight[row]) for row in range(n)]
     report.contacts = sorted(contact for found in touched for contact in found.values())

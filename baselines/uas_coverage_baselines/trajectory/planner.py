@@ -107,6 +107,7 @@ class Trajectory:
 
     Options = TrajectoryOptions
     comes_home_by_legs = True
+    plans_on_after_swaps = True
 
     def __init__(self, options: TrajectoryOptions | None = None) -> None:
         self.options = options or TrajectoryOptions()
