@@ -205,3 +205,13 @@ def test_where_nobody_lands_with_work_left_flights_are_what_they_were():
         for world in worlds:
             world.step(FIRST)
     np.testing.assert_array_equal(worlds[0].state.x, worlds[1].state.x)
+
+
+def test_where_its_home_was_closed_it_swaps_at_the_other_place():
+    other_m = (40.0, 40.0, -10.0)
+    closed = event("home_closed", 5.0, uas="uas_1", alternative_m=other_m)
+    world = World(mission(closed))
+    first_sortie(world)
+    assert world.state.status[0] == SWAPPING
+    fly(world, has(0, FLYING), BACK)
+    np.testing.assert_allclose(world.state.x[0, :3], other_m, atol=2.0)

@@ -78,7 +78,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Numbers and arrays, each of the same kind and shape in every step; enumerations of the
         package name the codes.
 
-        `status` (`UasStatus`: 0 flying, 1 landed, 2 lost); `contact`, what it was lost to
+        `status` (`UasStatus`: 0 flying, 1 landed, 2 lost, 3 swapping its pack); `contact`, what it was lost to
         (`ContactKind`: 0 nothing, 1 obstacle, 2 moving obstacle, 3 UAS, 4 geofence, 5 battery), and
         `contact_with`, its index among those of the scenario, else -1; `limits_exceeded` (the
         vehicle's limits beyond which it is, as a mask: bit k for `vehicle.LIMIT_NAMES[k]`);
@@ -98,7 +98,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
         lost (contact with an obstacle or a UAS, outside of the fence, battery overdrawn).
-        Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`.
+        Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`; one
+        that lands to swap its battery pack (`[sorties]`, `together = false`) has not ended.
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
