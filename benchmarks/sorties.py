@@ -36,14 +36,14 @@ def mission(charge: float, swap_s: float, town: Scenario | None = None) -> Scena
     """A town with packs charged to a share, swapped together."""
     town = town or generate_scenario(7, n_uas=3, n_waypoints=90)
     fleet = tuple(uas.model_copy(update={"soc_0": charge}) for uas in town.uas)
-    packs = Sorties(packs=10, swap_s=swap_s)
+    packs = Sorties(packs=20, swap_s=swap_s)
     return town.model_copy(update={"uas": fleet, "sorties": packs, "max_steps": 5000})
 
 
 def together(scenario: Scenario, planner: str) -> tuple[Any, ...]:
     """Covered, time [s], energy [Wh], packs and harm of sorties one after the other."""
     fly = partial(rollout, planner=planner)
-    result = sorties_summary(list(fly_sorties(scenario, fly, 10)))
+    result = sorties_summary(list(fly_sorties(scenario, fly, 20)))
     share = f"{result['covered']}/{result['covered'] + result['left']}"
     harm = result["violations"] + result["breaches"]
     return share, result["time_s"], result["energy_Wh"], sum(result["packs"].values()), harm
@@ -51,7 +51,7 @@ def together(scenario: Scenario, planner: str) -> tuple[Any, ...]:
 
 def alone(scenario: Scenario, planner: str) -> tuple[Any, ...]:
     """The same of one flight in which each swaps while the others fly on."""
-    packs = Sorties(packs=10, swap_s=scenario.sorties.swap_s if scenario.sorties else 0.0,
+    packs = Sorties(packs=20, swap_s=scenario.sorties.swap_s if scenario.sorties else 0.0,
                     together=False)  # fmt: skip
     flight: Flight = rollout(scenario.model_copy(update={"sorties": packs}), planner)
     covered = int(flight.covered[-1])

@@ -58,7 +58,8 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         That of `CoverageParallelEnv`.
 
     Episode End:
-        Terminated: no UAS flies any more, nor swaps its pack to fly again. Truncated: one still flies after `max_cycles` steps.
+        Terminated: no UAS flies any more, nor swaps its pack to fly again. Truncated: one still
+        flies after `max_cycles` steps.
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
