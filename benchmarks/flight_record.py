@@ -11,6 +11,7 @@ import csv
 import json
 import math
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,12 +44,22 @@ class Track:
         vehicle: Its vehicle's file.
         columns: Column name -> (n,) values, those of `NUMBERS`.
         modes: Mode of each row.
+        swaps: (landed, took off) sample numbers of each swap of battery packs, in order.
     """
 
     entry: dict[str, Any]
     vehicle: dict[str, Any]
     columns: dict[str, FloatArray]
     modes: tuple[str, ...]
+    swaps: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def rests(self) -> NDArray[np.bool_]:
+        """(n,) whether it stands on the ground in the step from a sample on, to fly again."""
+        rests = np.zeros(len(self.modes), np.bool_)
+        for landed, took_off in self.swaps:
+            rests[landed:took_off] = True
+        return rests
 
     @property
     def name(self) -> str:
@@ -134,7 +145,7 @@ def read_record(directory: Path) -> FlightRecord:
             path = directory / name if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
             vehicles.append(tomllib.loads(path.read_text(encoding="utf-8")))
         name = "flight.csv"
-        tracks = _tracks(_rows(directory / name), scenario, vehicles)
+        tracks = _tracks(_rows(directory / name), scenario, vehicles, summary.get("swaps", ()))
         steps = max(track.steps for track in tracks)
         name = "moving_obstacles.csv"
         moving_m = _moving(_rows(directory / name), scenario, steps)
@@ -149,7 +160,7 @@ def read_record(directory: Path) -> FlightRecord:
     if scenario.get("events"):
         raise BadFlightError(f"{directory}: events happen in it, which are not judged here")
     for track in tracks:
-        drawn = np.flatnonzero(track.columns["current_A"] > 0.0)
+        drawn = np.flatnonzero((track.columns["current_A"] > 0.0) | track.rests)
         if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
             raise BadFlightError(
                 f"{directory}: {track.name} lands and takes off again, which is not judged here"
@@ -178,7 +189,10 @@ def _step(row: dict[str, str], dt_s: float) -> int:
 
 
 def _tracks(
-    rows: list[dict[str, str]], scenario: dict[str, Any], vehicles: list[dict[str, Any]]
+    rows: list[dict[str, str]],
+    scenario: dict[str, Any],
+    vehicles: list[dict[str, Any]],
+    swaps: Sequence[dict[str, Any]],
 ) -> tuple[Track, ...]:
     of_uas: dict[str, list[dict[str, str]]] = {uas["name"]: [] for uas in scenario["uas"]}
     for row in rows:
@@ -196,7 +210,12 @@ def _tracks(
             raise ValueError(f"{entry['name']} has rows after it has landed or is lost")
         if modes[-1] not in (*FLYING_MODES, "landed", "lost"):
             raise ValueError(f"{entry['name']} has the unknown mode {modes[-1]!r}")
-        tracks.append(Track(entry, vehicle, columns, modes))
+        rests = tuple(
+            (round(swap["landed_s"] / scenario["dt_s"]), round(swap["t_s"] / scenario["dt_s"]))
+            for swap in swaps
+            if swap["uas"] == entry["name"]
+        )
+        tracks.append(Track(entry, vehicle, columns, modes, rests))
     return tuple(tracks)
 
 

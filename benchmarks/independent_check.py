@@ -106,9 +106,13 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
     """Contacts on segments and curves, breaches at samples, smallest distances."""
     dt_s, n = record.dt_s, len(record.tracks)
     names = [track.name for track in record.tracks]
+    rests = {track.name: track.rests[:-1] for track in record.tracks}
     curves = {t.name: curve(t.position_m, t.velocity_mps, dt_s) for t in record.tracks}
     partners = [list(partners_of(record, row)) for row in range(n)]
-    straight = [[on_segments(p, record.tracks[row]) for p in partners[row]] for row in range(n)]
+    straight = [
+        [_in_flight(on_segments(p, track), track.name, p, rests) for p in partners[row]]
+        for row, track in enumerate(record.tracks)
+    ]
     touched = [_first_contacts(record, row, partners[row], straight[row]) for row in range(n)]
     report.contacts = sorted(contact for found in touched for contact in found.values())
     smallest: dict[str, float] = {}
@@ -119,6 +123,7 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
             _keep_least(smallest, kind, distance)
             _keep_least(report.straight_room_m, kind, distance - partner.contact_m)
             curved = on_curves(partner, row, curves, dt_s) - partner.contact_m
+            curved = _in_flight(curved, track.name, partner, rests)
             _keep_least(report.curved_room_m, kind, curved)
             for step in np.flatnonzero((curved < -_SAME) & (distance >= partner.contact_m)):
                 report.problems.append(
@@ -130,12 +135,24 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
                 set(touched[names.index(str(partner.name))]) if kind == "uas" else set()
             )
             at_samples = partner.distance(relative_m(partner, track))[1:]
+            at_samples = _in_flight(at_samples, track.name, partner, rests)
             close = np.flatnonzero(at_samples < partner.safe_m - _ROUNDING)
             report.breaches += len(set(close.tolist()) - gone)
         low = len(set(too_low(record.scenario, track).tolist()) - set(touched[row]))
         report.height_breaches += low
         report.breaches += low
     _compare_smallest(record.summary, smallest, report)
+
+
+def _in_flight(
+    distance: FloatArray, name: str, partner: Partner, rests: dict[str, NDArray[np.bool_]]
+) -> FloatArray:
+    """Distances of steps; infinite where the UAS, or the one that is its partner, rests."""
+    away = distance.copy()
+    for resting in (rests[name], rests.get(str(partner.name)) if partner.kind == "uas" else None):
+        if resting is not None:
+            away[: len(resting)][resting[: len(away)]] = np.inf
+    return away
 
 
 def _end_without_cause(track: Track, contacts: Collection[int]) -> Iterator[str]:
@@ -255,7 +272,7 @@ def _oddities(track: Track, record: FlightRecord) -> Iterator[str]:
         time_s = step * record.dt_s
         yield f"moves {off[step]:.3g} m more than its velocity explains from {time_s:g} s on"
     drawn = column["current_A"][:-1] * record.dt_s
-    gained = np.diff(column["dod"])
+    gained = np.where(track.rests[:-1], 0.0, np.diff(column["dod"]))
     if len(drawn) and drawn.max() > 0.0:
         capacity_As = drawn.sum() / max(gained.sum(), 1e-12)
         if np.abs(gained - drawn / capacity_As).max() > _SAME:
@@ -270,9 +287,19 @@ def _oddities(track: Track, record: FlightRecord) -> Iterator[str]:
         if np.any(last):
             yield f"is {track.end} and still has inputs or a current"
     over = 1 if track.end in ("landed", "lost") else 0
-    settled = np.maximum.accumulate(~near) & near & slow
-    if settled[: len(settled) - over].any():
-        yield "is home and slow but has not landed"
+    begins = [0, *(took_off for _, took_off in track.swaps)]
+    ends = [*(landed for landed, _ in track.swaps), len(near) - over]
+    for first, last in zip(begins, ends, strict=True):
+        flown = slice(first, last)
+        if (np.maximum.accumulate(~near[flown]) & near[flown] & slow[flown]).any():
+            yield "is home and slow but has not landed"
+    for landed, took_off in track.swaps:
+        if home_m[landed] > scenario["landing_distance_m"] + _ROUNDING:
+            yield f"swaps its pack {home_m[landed]:.3g} m from its start"
+        if (took_off - landed) * record.dt_s < scenario["sorties"]["swap_s"] - _ROUNDING:
+            yield "swaps its pack faster than the scenario allows"
+    if len(track.swaps) >= scenario.get("sorties", {"packs": 1})["packs"]:
+        yield "has used more packs than it has"
 
 
 def _motion_gap_m(track: Track, dt_s: float, landing_speed_mps: float) -> FloatArray:
@@ -289,6 +316,8 @@ def _motion_gap_m(track: Track, dt_s: float, landing_speed_mps: float) -> FloatA
     allowed = np.full(len(moved), _DRAG_M_PER_S2 * dt_s**2 + _SAME)
     if track.end == "landed" and len(allowed):
         allowed[-1] += 0.5 * dt_s * landing_speed_mps + 0.5 * dt_s**2
+    for landed, _ in track.swaps:
+        allowed[landed - 1] += 0.5 * dt_s * landing_speed_mps + 0.5 * dt_s**2
     return np.abs(moved).max(axis=1) - allowed
 
 

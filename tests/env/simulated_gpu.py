@@ -13,13 +13,19 @@ from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.memory import LIMITS, REWARD
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Wind
+from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.vehicle import limit_names
 
 N_LANES, N_STEPS = 2, 13
 
 
-def compare(ground):
-    """Fly both ways, lanes with different actions, past the end of missions."""
+def compare(ground, ask=None):
+    """Fly both ways, lanes with different actions, past the end of missions.
+
+    Args:
+        ground: The mission.
+        ask: The actions of a step, by its number; None: any.
+    """
     missions = CudaMissions(N_LANES, ground)
     episodes = [Episode(ground, MissionSettings()) for _ in range(N_LANES)]
     for episode in episodes:
@@ -27,10 +33,12 @@ def compare(ground):
     rng = np.random.default_rng(0)
     different, restarts = 0, 0
     ended = [False] * N_LANES
-    for _ in range(N_STEPS):
-        asked = rng.uniform(-1, 1, (N_LANES, 2, 3))
+    statuses = set()
+    for k in range(N_STEPS):
+        asked = rng.uniform(-1, 1, (N_LANES, 2, 3)) if ask is None else ask(k)
         missions.step(asked)
         seen = missions.missions
+        statuses |= set(seen.worlds.status.ravel().tolist())
         for lane, episode in enumerate(episodes):
             if ended[lane]:
                 episode.reset()
@@ -51,6 +59,7 @@ def compare(ground):
     changed = (missions.missions.worlds.x != before).any(axis=(1, 2)).tolist()
     return {
         "different": different,
+        "statuses": sorted(statuses),
         "restarts": restarts,
         "refused": missions.missions.refused.tolist(),
         "changed": changed,
@@ -70,9 +79,28 @@ def limits_exceeded():
     return found
 
 
+def out_and_back(k):
+    """The first lane flies there and back; the other one a little later."""
+    asked = np.zeros((N_LANES, 2, 3))
+    asked[0, :, 0] = -0.5 if k % 6 < 2 else 0.5
+    asked[1, :, 0] = -0.5 if k % 6 < 3 else 0.5
+    asked[..., 2] = -0.5
+    return asked
+
+
+def swapping_ground():
+    """UAS land fast and far from their starts, cover a waypoint of two, and swap packs."""
+    waypoints_m = ((74.0, 100.0, -10.0), (120.0, 120.0, -10.0))
+    ground = practice_ground(n_uas=2, waypoints_m=waypoints_m, max_steps=16)
+    swapped = Sorties(packs=3, swap_s=2.0, together=False)
+    rules = {"landing_distance_m": 6.0, "landing_speed_mps": 20.0, "sorties": swapped}
+    return ground.model_copy(update=rules)
+
+
 if __name__ == "__main__":
     still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=5)
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
     high = with_roles(still.model_copy(update={"min_height_m": 6.0}))
     flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}
+    flown["packs"] = compare(swapping_ground(), out_and_back)
     print(json.dumps(flown))

@@ -5,6 +5,8 @@ import sys
 
 import simulated_gpu
 
+from uas_coverage_env.world import SWAPPING
+
 
 def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes():
     done = subprocess.run(
@@ -15,6 +17,9 @@ def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes():
     )
     assert done.returncode == 0, done.stderr
     flown = json.loads(done.stdout)
+    swapped = flown.pop("packs")
+    assert swapped["different"] == 0
+    assert SWAPPING in swapped["statuses"]
     for result in flown.values():
         assert result["different"] == 0
         assert result["restarts"] >= 2

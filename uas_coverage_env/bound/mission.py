@@ -167,6 +167,8 @@ def bound_of(scenario: Scenario) -> MissionBound | None:
 
 
 def _why_not(scenario: Scenario) -> str:
+    if scenario.sorties is not None and not scenario.sorties.together:
+        return "as its UAS swap packs on their own"
     if scenario.wind is not None or scenario.disturbances:
         return "the air is not still, or something else acts on the UAS"
     if len(scenario.waypoints) > MOST_WAYPOINTS:

@@ -9,6 +9,7 @@ from uas_coverage_env.flight import (
     energy_Wh,
     fallback_reasons,
     filtered_share,
+    packs_used,
     summary,
 )
 
@@ -53,6 +54,7 @@ def figures(flight: Flight) -> dict[str, str]:
     times = result["decision_time_s"]
     reasons = ", ".join(f"{n} {reason}" for reason, n in fallback_reasons(flight).items())
     seen: dict[str, float] = result.get("seen_ground", {})
+    packs = ", ".join(f"{name} {n}" for name, n in packs_used(flight).items())
     rows = {
         "scenario": flight.scenario.name,
         "planner": flight.planner,
@@ -65,6 +67,7 @@ def figures(flight: Flight) -> dict[str, str]:
         "all home": "yes" if result["all_home"] else f"not {', '.join(_not_home(flight))}",
         "steps": str(flight.steps),
         "energy, Wh": f"{result['energy_Wh']:.2f}",
+        "packs used": packs if flight.swaps else NONE,
         "least charge left": f"{flight.soc.min():.1%}",
         "least clearance of obstacles, m": _metres(flight.min_obstacle_clearance_m),
         "least separation of UAS, m": _metres(flight.min_separation_m),

@@ -12,6 +12,7 @@ from uas_coverage_env.flight import (
     draw_flight,
     fallback_reasons,
     filtered_share,
+    packs_used,
     summary,
 )
 
@@ -40,6 +41,9 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         f"{flight.breaches} breaches{low}",
         markup=False,
     )
+    if flight.swaps:
+        used = ", ".join(f"{name} {packs}" for name, packs in packs_used(flight).items())
+        screen.print(f"{len(flight.swaps)} swaps; packs used: {used}", markup=False)
     if any(decision.duration_s for decision in flight.decisions):  # none in a log
         times = ", ".join(
             f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()

@@ -116,6 +116,11 @@ def run(
     if sorties is not None and live:
         raise InputError("--live shows one flight: give either --live or --sorties")
     mission = loaded(scenario)
+    if sorties is not None and mission.sorties is not None and not mission.sorties.together:
+        raise InputError(
+            f"--sorties flies sorties one after the other, and in {mission.name!r} each UAS swaps "
+            f"packs on its own (sorties.together = false): leave --sorties out"
+        )
     player = load_planner(planner, options_of(option or ()))
     # KIND:ARGUMENT may hold a path
     player_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")

@@ -52,7 +52,7 @@ from uas_coverage_env.env.pool import (
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
-from uas_coverage_env.world import ABSENT, FLYING, WorldState
+from uas_coverage_env.world import ABSENT, FLYING, SWAPPING, WorldState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
 from uas_coverage_env.world.state import STATE
@@ -85,7 +85,7 @@ class SubEnvironments(NamedTuple):
     swarm: Annotated[NDArray[np.float64], "L", "Q"]
     """Sums over the UAS, see SWARM_COVERED."""
     terminated: Annotated[NDArray[np.bool_], "L"]
-    """No UAS flies any more."""
+    """No UAS flies any more, nor swaps packs."""
     truncated: Annotated[NDArray[np.bool_], "L"]
     """One still flies after the last step allowed."""
 
@@ -230,7 +230,7 @@ def _add_up(worlds, lanes, learners, lane, max_steps):
     for i in range(lanes.rewards.shape[1]):
         lanes.rewards[lane, i] = 0.0
         if i < n_uas:
-            flies |= worlds.status[lane, i] == FLYING
+            flies |= worlds.status[lane, i] in (FLYING, SWAPPING)
             lanes.rewards[lane, i] = amounts[i, REWARD]
     swarm = rows_view(lanes.swarm, lane, (lanes.swarm.shape[1],))
     # sums in variables: memory that has just been written is read late
@@ -263,7 +263,8 @@ def _keep_last_looks(worlds, settled, lane, n_uas, before, observation, width):
         if not flies and not settled[lane, i]:
             for k in range(width):
                 observation[lane, i, k] = before[lane, i, k]
-        settled[lane, i] = not flies
+        # one that swaps packs looks around
+        settled[lane, i] = not flies and (i >= n_uas or worlds.status[lane, i] != SWAPPING)
 
 
 @inlined_kernel

@@ -62,7 +62,7 @@ from uas_coverage_env.simulation.step import (
     move_all,
     write_all_inputs,
 )
-from uas_coverage_env.world import FLYING, WorldState
+from uas_coverage_env.world import FLYING, SWAPPING, WorldState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events, goes_home, heed
 from uas_coverage_env.world.state import STATE, as_told
@@ -147,7 +147,7 @@ def _finish(pool, paying, observing, missions, lane):
     for i in range(state.status.shape[0]):
         missions.rewards[lane, i] = learners.amounts[i, REWARD]
         missions.acted[lane] += scratch.outcome[i].flew
-        flies = flies or learners.report[i, STATUS] == FLYING
+        flies = flies or learners.report[i, STATUS] in (FLYING, SWAPPING)
     missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps
 
 

@@ -18,6 +18,7 @@ from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import fitted_to, in_slots
 from uas_coverage_env.world.events import goes_home, is_eventful
+from uas_coverage_env.world.packs import swaps_alone
 from uas_coverage_env.world.state import STATE
 
 _MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, FIRST_OBSERVATION)
@@ -60,6 +61,8 @@ class DrawnPool:
         self.sizes["E"] = max(len(scenario.events) for scenario in source.examples)
         eventful = any(is_eventful(scenario) for scenario in source.examples)
         self.sizes["S"] = source.room.n_uas if eventful else 0
+        swaps = any(swaps_alone(scenario) for scenario in source.examples)
+        self.sizes["B"] = source.room.n_uas if swaps else 0
         self._slots: list[Slots[Any]] = [Slots(memory, num_envs) for memory in _MEMORIES]
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self.drawn_from = np.zeros((num_envs, _WORDS), dtype=np.uint64)
@@ -128,9 +131,10 @@ class DrawnPool:
             n_events > self.sizes["E"]
             or n_sensed > self.sizes["S"]
             or goes_home(scenario) > self.goes_home
+            or swaps_alone(scenario) > (self.sizes["B"] > 0)
         ):
             raise ValueError(
-                f"scenario {scenario.name!r} has more events or [sensing], or others, than the "
+                f"scenario {scenario.name!r} has more events, [sensing] or [sorties] than the "
                 f"{len(self._source.examples)} examples that this batch was made for"
             )
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.scenario import Room
-from uas_coverage_env.world import LANDED, LOST
+from uas_coverage_env.world import LANDED, LOST, SWAPPING
 
 _MOVING_BOUND = 2.0
 _MOVING_MPS = 20.0
@@ -55,14 +55,15 @@ def global_state(
 
     Args:
         own: (U, size) the group `own` of all UAS, as each observed it last.
-        status: (U,) FLYING, LANDED or LOST.
+        status: (U,) FLYING, LANDED, LOST or SWAPPING.
         uncovered: (W,).
         moving_position_m: (M, 3) [m] centres.
         moving_velocity_mps: (M, 3) [m/s].
         scale: A record of SCALES_DTYPE, for the box around the fence.
         room: The largest mission.
     """
-    uas = np.column_stack([own, status == LANDED, status == LOST])
+    landed = (status == LANDED) | (status == SWAPPING)
+    uas = np.column_stack([own, landed, status == LOST])
     place = (moving_position_m - scale["centre_m"]) * scale["per_half_side"] * [1, 1, -1]
     moving = np.column_stack([place, moving_velocity_mps / _MOVING_MPS])
     moving = np.clip(moving, -_MOVING_BOUND, _MOVING_BOUND)

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from uas_coverage_env.compiled.array_views import slice_view
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.env.act import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
     CONTACT,
@@ -21,12 +21,12 @@ from uas_coverage_env.env.memory import (
     Observing,
     Paying,
 )
-from uas_coverage_env.env.observation.nearest import count_company
+from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
 from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.reward_kernel import compute_rewards
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.world import FLYING
-from uas_coverage_env.world.state import as_told
+from uas_coverage_env.world.state import SWAPPING, as_told
 
 ACCEPTED = -1
 
@@ -72,7 +72,11 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         count_company(state.uncovered, tables.neighbours, learners.company)
     seen = as_told(arena, state)
     for i in range(report.shape[0]):
-        if outcome[i].flew:
+        flew = outcome[i].flew
+        if rarely(not flew and state.status[i] == FLYING):
+            # where it was to go before it swapped packs is forgotten
+            learners.targets[i] = NO_TARGET
+        if flew or state.status[i] == FLYING or state.status[i] == SWAPPING:
             observe_one(arena, seen, tables, learners, observing, i, observation[i], on_gpu)
 
 

@@ -20,7 +20,7 @@ from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, Command, SwarmState
+from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 Observations = dict[str, Any]
 """Of each agent that acted: an array, or a dictionary with `mask_in_observation`."""
@@ -78,8 +78,9 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Numbers and arrays, each of the same kind and shape in every step; enumerations of the
         package name the codes.
 
-        `status` (`UasStatus`: 0 flying, 1 landed, 2 lost); `contact`, what it was lost to
-        (`ContactKind`: 0 nothing, 1 obstacle, 2 moving obstacle, 3 UAS, 4 geofence, 5 battery), and
+        `status` (`UasStatus`: 0 flying, 1 landed, 2 lost, 3 swapping its battery pack);
+        `contact`, what it was lost to (`ContactKind`: 0 nothing, 1 obstacle, 2 moving obstacle,
+        3 UAS, 4 geofence, 5 battery), and
         `contact_with`, its index among those of the scenario, else -1; `limits_exceeded` (the
         vehicle's limits beyond which it is, as a mask: bit k for `vehicle.LIMIT_NAMES[k]`);
         `returning` (it flies home); `covered` (waypoints the swarm has covered so far);
@@ -98,7 +99,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
         lost (contact with an obstacle or a UAS, outside of the fence, battery overdrawn).
-        Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`.
+        Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`; one
+        that lands to swap its battery pack (`[sorties]`, `together = false`) has not ended.
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
@@ -231,9 +233,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             return {}, {}, {}, {}, {}
         accept, asked = episode.actions.accept, episode.asked_rows
         for agent in agents:
-            if agent not in actions:
+            if agent in actions:
+                accept(agent, actions[agent], asked[index[agent]])
+            else:
                 self._check_agents(actions)
-            accept(agent, actions[agent], asked[index[agent]])
         report = episode.step()
 
         observation, amounts, told = episode.observation, episode.amounts, episode.infos
@@ -248,7 +251,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         for agent in agents:
             i = index[agent]
             row, paid = report[i], amounts[i]
-            flies = row[STATUS] == FLYING
+            flies = row[STATUS] in (FLYING, SWAPPING)
             observations[agent] = observation[i]
             rewards[agent] = paid[REWARD]
             terminations[agent] = not flies
@@ -355,5 +358,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
                     f"action {action!r} for {agent!r}: there is no such agent: {known}"
                 )
         missing = [agent for agent in self.agents if agent not in actions]
+        if missing:
+            report = self._episode.report
+            missing = [a for a in missing if report[self._index[a]][STATUS] != SWAPPING]
         if missing:
             raise ValueError(f"{missing[0]} has no action; give one for each agent that flies")

@@ -80,7 +80,9 @@ def _pay_as_usual(arena, state, tables, learners, scratch, i):
 
 @inlined_kernel
 def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
-    """Write the weighted terms of every UAS that flew in this step; those of the others are zero.
+    """Write the weighted terms of every UAS that flew in this step, or has now landed for good.
+
+    Those of the others are zero.
 
     Args:
         arena: The arena.
@@ -94,7 +96,7 @@ def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
     amounts = learners.amounts
     n_terms = paying.weights.shape[0]
     for i in range(amounts.shape[0]):
-        if not scratch.outcome[i].flew:
+        if not (scratch.outcome[i].flew or scratch.outcome[i].landed):
             for term in range(n_terms):
                 amounts[i, FIRST_TERM + term] = 0.0
             continue

@@ -22,7 +22,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, Command, SwarmState
+from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 
 @with_tables
@@ -58,7 +58,8 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         That of `CoverageParallelEnv`.
 
     Episode End:
-        Terminated: no UAS flies any more. Truncated: one still flies after `max_cycles` steps.
+        Terminated: no UAS flies any more, nor swaps its pack to fly again. Truncated: one still
+        flies after `max_cycles` steps.
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
@@ -147,7 +148,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
             episode.actions.accept(name, row, asked)
         report = episode.step()
         told = self._told(report)
-        flies = any(row[STATUS] == FLYING for row in report)
+        flies = any(row[STATUS] in (FLYING, SWAPPING) for row in report)
         truncated = flies and episode.steps >= episode.max_cycles
         if self.render_mode is not None:
             self._see()

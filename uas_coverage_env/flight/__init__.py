@@ -14,6 +14,7 @@ from uas_coverage_env.flight.metrics import (
     fallback_reasons,
     filtered_share,
     home,
+    packs_used,
     reward_sums,
     summary,
 )
@@ -26,7 +27,7 @@ from uas_coverage_env.flight.planner import (
     PlannerOptions,
 )
 from uas_coverage_env.flight.policy import Policy, as_planner
-from uas_coverage_env.flight.record import MODES, DecisionRecord, FlightRecord, Violation
+from uas_coverage_env.flight.record import MODES, DecisionRecord, FlightRecord, Swap, Violation
 from uas_coverage_env.flight.registry import (
     OptionDescription,
     PlannerDescription,
@@ -66,6 +67,7 @@ __all__ = [
     "Progress",
     "SeenGround",
     "SeenPictures",
+    "Swap",
     "Violation",
     "accomplished",
     "as_planner",
@@ -87,6 +89,7 @@ __all__ = [
     "footprints_m",
     "home",
     "load_planner",
+    "packs_used",
     "planner_names",
     "rest_of",
     "reward_sums",

@@ -137,6 +137,7 @@ def _run(flight: FlightRecord) -> dict[str, Any]:
         "safety_filter": flight.safety_filter,
         **disturbed,
         **_events(flight),
+        **_swaps(flight),
         "ended": flight.ended,
         "decisions": [dataclasses.asdict(decision) for decision in flight.decisions],
     }
@@ -149,6 +150,12 @@ def _events(flight: FlightRecord) -> dict[str, Any]:
         "events": [dataclasses.asdict(event) for event in flight.events],
         "open_waypoints": flight.open_waypoints,
     }
+
+
+def _swaps(flight: FlightRecord) -> dict[str, Any]:
+    if not flight.swaps:
+        return {}
+    return {"swaps": [dataclasses.asdict(swap) for swap in flight.swaps]}
 
 
 def _json(data: Any) -> str:

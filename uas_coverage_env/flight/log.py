@@ -21,6 +21,7 @@ from uas_coverage_env.flight.record import (
     RETURN,
     DecisionRecord,
     EventRecord,
+    Swap,
     Violation,
     last_samples,
 )
@@ -36,8 +37,8 @@ from uas_coverage_env.vehicle import (
     open_circuit_V,
     write_limited,
 )
-from uas_coverage_env.world import CONTACT_NAMES, FLYING, Command, command_mode
-from uas_coverage_env.world import LANDED as HAS_LANDED
+from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
+from uas_coverage_env.world import LOST as IS_LOST
 from uas_coverage_env.world.outcome import FAULT, NONE
 
 
@@ -139,6 +140,7 @@ class FlightLog:
             "breaches": sum(int(step.outcome["breaches"].sum()) for step in self._steps),
             "height_breaches": sum(int(step.outcome["too_low"].sum()) for step in self._steps),
             "events": self._events(),
+            "swaps": tuple(self._swaps()),
             "reward_terms": self._reward_terms(),
             "reward_names": () if self._meter is None else self._meter.names,
             "open_waypoints": int(self._world.state.uncovered.sum())
@@ -170,6 +172,19 @@ class FlightLog:
                 found.append(EventRecord(sample * self._scenario.dt_s, event.kind, name, e))
         return tuple(sorted(found, key=lambda event: event.time_s))
 
+    def _swaps(self) -> Iterator[Swap]:
+        """In order of their take-offs."""
+        landed_s: dict[str, float] = {}
+        for k, step in enumerate(self._steps):
+            time_s = (k + 1) * self._scenario.dt_s
+            for name, status in zip(self._world.names, step.sample.status.tolist(), strict=True):
+                if status == SWAPPING:
+                    landed_s.setdefault(name, time_s)
+                elif name in landed_s:
+                    if status == FLYING:
+                        yield Swap(name, landed_s[name], time_s)
+                    del landed_s[name]
+
     def _sample(self) -> _Sample:
         state = self._world.state
         return _Sample(state.x.copy(), state.status.copy(), self._covered)
@@ -187,7 +202,7 @@ class FlightLog:
         modes = [step.modes for step in self._steps]
         # nothing acts from the last sample on; a UAS that still flies there keeps its mode
         final = modes[-1] if modes else [COVERING] * status.shape[1]
-        ended = np.where(status == HAS_LANDED, LANDED, LOST)
+        ended = np.where(status == IS_LOST, LOST, LANDED)
         later = np.logical_or.accumulate(flies[::-1])[::-1]
         resting = np.where(later, RETURN, ended)
         return np.where(flies, [*modes, final], resting).astype(np.int8)

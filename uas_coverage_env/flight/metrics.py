@@ -10,6 +10,7 @@ from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, EventRecord, Fli
 from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH
+from uas_coverage_env.vehicle.vertical_flight import VerticalFlight
 from uas_coverage_env.world.coverage import covering_samples
 
 _J_PER_WH = 3600.0
@@ -48,6 +49,12 @@ def energy_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     """(U,) [Wh] sum over samples of voltage times current times dt."""
     power_W = flight.voltage_V * flight.current_A
     return power_W.sum(axis=0) * flight.scenario.dt_s / _J_PER_WH
+
+
+def packs_used(flight: FlightRecord) -> dict[str, int]:
+    """UAS -> battery packs that it has flown with, where each swaps on its own."""
+    swaps = Counter(swap.uas for swap in flight.swaps)
+    return {name: 1 + swaps[name] for name in flight.names}
 
 
 def reward_sums(flight: FlightRecord) -> dict[str, float]:
@@ -106,24 +113,35 @@ def ground_phases(flight: FlightRecord) -> list[dict[str, Any]]:
 
     Returns:
         One entry per UAS: seconds and Wh of both, and the charge on the ground afterwards. Landing
-        and charge are None of a UAS that has not come home.
+        and charge are None of a UAS that has not come home. Where it has swapped packs, seconds
+        and Wh are sums over all its flights.
     """
     entries = []
     for i, name in enumerate(flight.names):
         up = take_off(flight.scenario, i)
+        swaps = [swap for swap in flight.swaps if swap.uas == name]
         entry: dict[str, Any] = {
             "uas": name,
-            "take_off_s": up.time_s,
-            "take_off_Wh": up.energy_Wh,
+            "take_off_s": up.time_s * (1 + len(swaps)),
+            "take_off_Wh": up.energy_Wh * (1 + len(swaps)),
             **dict.fromkeys(("landing_s", "landing_Wh", "soc_on_ground")),
         }
+        landed = [round(swap.landed_s / flight.scenario.dt_s) for swap in swaps]
         if flight.mode[-1, i] == LANDED:
-            x = flight.x[-1, i]
-            down = landing(flight.scenario, i, x[:3].tolist(), float(x[DOD]), float(x[U_TH]))
-            entry |= {"landing_s": down.time_s, "landing_Wh": down.energy_Wh}
-            entry["soc_on_ground"] = 1.0 - down.dod
+            landed.append(-1)
+        downs = [_landing(flight, i, k) for k in landed]
+        if downs:
+            entry["landing_s"] = sum(down.time_s for down in downs)
+            entry["landing_Wh"] = sum(down.energy_Wh for down in downs)
+        if flight.mode[-1, i] == LANDED:
+            entry["soc_on_ground"] = 1.0 - downs[-1].dod
         entries.append(entry)
     return entries
+
+
+def _landing(flight: FlightRecord, i: int, k: int) -> VerticalFlight:
+    x = flight.x[k, i]
+    return landing(flight.scenario, i, x[:3].tolist(), float(x[DOD]), float(x[U_TH]))
 
 
 def fallback_reasons(flight: FlightRecord) -> dict[str, int]:
@@ -143,6 +161,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "steps": flight.steps,
         "energy_Wh": float(energy_Wh(flight).sum()),
         **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
+        # where nobody swaps packs on its own, the file is as it was before that could be
+        **({"packs": packs_used(flight), "swaps": _swaps(flight)} if flight.swaps else {}),
         # a record from before rewards were kept stays as it was
         **({"return": episode_return(flight)} if flight.reward_terms is not None else {}),
         **({"reward_terms": reward_sums(flight)} if flight.reward_terms is not None else {}),
@@ -163,6 +183,12 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "seed": flight.seed,
         "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
     }
+
+
+def _swaps(flight: FlightRecord) -> list[dict[str, Any]]:
+    return [
+        {"t_s": swap.time_s, "uas": swap.uas, "landed_s": swap.landed_s} for swap in flight.swaps
+    ]
 
 
 def _happened(event: EventRecord) -> dict[str, Any]:

@@ -48,6 +48,9 @@ class Planner(Protocol):
     - `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
     - `comes_home_by_legs`: whether, where an autopilot is to fly the mission (`[execution]`), it
       brings UAS home by itself, so that return mode is not needed.
+    - `plans_on_after_swaps`: whether `act` takes in a UAS that flies again with a fresh pack
+      (`[sorties]` with `together = false`); otherwise `reset` is called then, as after a change of
+      the scene, and both assistants fly along unless the caller says otherwise.
     - `options`: the pydantic model it was made with; goes into the record.
     - `fingerprint`: text that changes with the data it flies by (a policy's weights); part of the
       identity of its flights in a comparison.

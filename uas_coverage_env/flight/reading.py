@@ -29,6 +29,7 @@ from uas_coverage_env.flight.record import (
     PLAN_DTYPE,
     DecisionRecord,
     EventRecord,
+    Swap,
     Violation,
 )
 from uas_coverage_env.scenario import Scenario
@@ -98,6 +99,12 @@ class _Event(StrictModel):
     event: Count
 
 
+class _Swap(StrictModel):
+    uas: str
+    landed_s: Seconds
+    time_s: Seconds
+
+
 class _Run(StrictModel):
     dynamics: Dynamics
     return_mode: bool
@@ -105,6 +112,7 @@ class _Run(StrictModel):
     disturbances: tuple[str, ...] = ()
     events: tuple[_Event, ...] = ()
     open_waypoints: Count | None = None
+    swaps: tuple[_Swap, ...] = ()
     ended: Literal["complete", "steps", "stopped"]
     decisions: tuple[_Decision, ...]
 
@@ -122,7 +130,7 @@ def read_flight(directory: Path) -> dict[str, Any]:
     return {
         "scenario": scenario,
         **_summary_fields(directory / "summary.json", scenario),
-        **_run_fields(directory / "run.json", steps),
+        **_run_fields(directory / "run.json", scenario, steps),
         **samples,
         "moving_position_m": _read(
             directory / "moving_obstacles.csv", lambda text: _moving_array(text, scenario, steps)
@@ -233,7 +241,7 @@ def _reward_arrays(text: str, scenario: Scenario, steps: int) -> dict[str, Any]:
     return {"reward_terms": terms, "reward_names": names}
 
 
-def _run_fields(path: Path, steps: int) -> dict[str, Any]:
+def _run_fields(path: Path, scenario: Scenario, steps: int) -> dict[str, Any]:
     run = _parsed(path, _Run)
     if len(run.decisions) != steps:
         raise InputError(
@@ -241,7 +249,18 @@ def _run_fields(path: Path, steps: int) -> dict[str, Any]:
         )
     decisions = tuple(DecisionRecord(**decision.model_dump()) for decision in run.decisions)
     events = tuple(EventRecord(**event.model_dump()) for event in run.events)
-    return {**dict(run), "decisions": decisions, "events": events}
+    swaps = tuple(_swap(path, n, swap, scenario) for n, swap in enumerate(run.swaps))
+    return {**dict(run), "decisions": decisions, "events": events, "swaps": swaps}
+
+
+def _swap(path: Path, number: int, swap: _Swap, scenario: Scenario) -> Swap:
+    try:
+        _chosen("uas", swap.uas, {uas.name: i for i, uas in enumerate(scenario.uas)})
+        if _step(swap.landed_s, scenario) >= _step(swap.time_s, scenario):
+            raise ValueError("it flies on before it has landed")
+    except ValueError as error:
+        raise InputError(f"{path}: was damaged: swaps[{number}]: {error}") from error
+    return Swap(**swap.model_dump())
 
 
 def _summary_fields(path: Path, scenario: Scenario) -> dict[str, Any]:

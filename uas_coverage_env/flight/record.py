@@ -90,6 +90,21 @@ class EventRecord:
 
 
 @dataclass(frozen=True)
+class Swap:
+    """A UAS that landed, was given a fresh battery pack, and flew on with it.
+
+    Attributes:
+        uas: Which UAS.
+        landed_s: The sample at which it had landed [s].
+        time_s: The sample from which it flies with the fresh pack [s].
+    """
+
+    uas: str
+    landed_s: float
+    time_s: float
+
+
+@dataclass(frozen=True)
 class DecisionRecord:
     """One decision of the planner: how long it took, how it came about, what was left of it.
 
@@ -138,6 +153,7 @@ class FlightRecord:
         versions: Package -> version.
         height_breaches: How many of the breaches are below the least height.
         events: What has happened, in order of time; none where the scenario has no events.
+        swaps: Of battery packs while the others flew on, in order of time.
         open_waypoints: How many were still to be covered at the end, where the scenario has events;
             None: all of the scenario's that are not covered.
         reward_terms: (T - 1, U, R) the weighted terms of the reward that an environment pays for
@@ -171,6 +187,7 @@ class FlightRecord:
     versions: Mapping[str, str]
     height_breaches: int = 0
     events: tuple[EventRecord, ...] = ()
+    swaps: tuple[Swap, ...] = ()
     open_waypoints: int | None = None
     reward_terms: NDArray[np.float64] | None = None
     reward_names: tuple[str, ...] = ()
@@ -205,6 +222,15 @@ class FlightRecord:
     def soc(self) -> NDArray[np.float64]:
         """(T, U) state of charge, 0..1."""
         return 1.0 - self.x[..., DOD]
+
+    @property
+    def resting(self) -> NDArray[np.bool_]:
+        """(T, U) whether each stands on the ground until it flies on with a fresh pack."""
+        resting = np.zeros(self.mode.shape, np.bool_)
+        for swap in self.swaps:
+            first, last = np.rint(np.divide((swap.landed_s, swap.time_s), self.scenario.dt_s))
+            resting[int(first) : int(last), self.names.index(swap.uas)] = True
+        return resting
 
     @property
     def attitude_rad(self) -> NDArray[np.float64]:

@@ -23,7 +23,8 @@ from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief, Relaunch
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
-from uas_coverage_env.world import Command, SwarmState, Velocity, pack
+from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
+from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = ("uas-coverage-env", "numpy", "scipy", "numba", "highspy")
 _RECORDED_WHERE_INSTALLED = ("pyscipopt", "gurobipy")
@@ -73,7 +74,8 @@ def rollout(
         seed: The seed of the planner and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
         return_mode: Let the world bring UAS home in time; None: as the planner asks, and where
-            something pushes back (wind, wrong models, sensors, events).
+            something pushes back (wind, wrong models, sensors, events) or UAS swap packs while the
+            others fly on.
         safety_filter: Let the world keep commands clear of harm; None: likewise.
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
@@ -96,8 +98,11 @@ def rollout(
         raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
     assistants: Assistants = getattr(planner, "assistants", Assistants())
     # no plan is verified against what pushes back, nor one of legs against what moves
-    uncertain = _is_uncertain(scenario, disturbances)
     by_legs = scenario.execution is not None
+    plans_on = not by_legs and getattr(planner, "plans_on_after_swaps", False)
+    # in the air a plan that is made anew may come too late for the charge that is left
+    made_anew = swaps_alone(scenario) and not plans_on
+    uncertain = _is_uncertain(scenario, disturbances) or made_anew
     if return_mode is None:
         # return mode would fly home another way than the file
         comes_home = by_legs and getattr(planner, "comes_home_by_legs", False)
@@ -141,7 +146,7 @@ def rollout(
 
     ended = "stopped"
     with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid
-        ended = _fly(world, planner, log, limit, seed, tell, should_stop)
+        ended = _fly(world, planner, log, limit, seed, tell, should_stop, plans_on=plans_on)
     return flown(ended)
 
 
@@ -180,6 +185,8 @@ def _fly(
     seed: int,
     tell: Callable[[SwarmState, float | None], None],
     should_stop: Callable[[], bool] | None,
+    *,
+    plans_on: bool,
 ) -> str:
     """Fly until the end; returns how it came about, see `Flight.ended`."""
     swarm, revisions, relaunch = world.swarm_state(), 0, _relaunch(world)
@@ -191,12 +198,16 @@ def _fly(
             return "stopped"
         commands, packed, decision = _decide(planner, swarm)
         outcome = world.step(packed)
-        log.add(commands, packed, decision, getattr(planner, "last_decision", None), outcome)
-        swarm = world.swarm_state()
+        found = getattr(planner, "last_decision", None) if swarm.active else None
+        log.add(commands, packed, decision, found, outcome)
+        before, swarm = swarm, world.swarm_state()
         changed = world.revisions != revisions
         if changed:
             revisions = world.revisions
             relaunch = _relaunch(world)
+        if not plans_on:
+            # somebody flies again, with a fresh pack
+            changed |= bool(((before.status == LANDED) & (swarm.status == FLYING)).any())
         again = relaunch.due(swarm) if relaunch and log.steps < limit else None
         if again is not None and again.any():
             world.take_off(again)
@@ -214,7 +225,9 @@ def _relaunch(world: World) -> Relaunch | None:
 def _decide(
     planner: Planner, swarm: SwarmState
 ) -> tuple[Mapping[str, Command], NDArray[np.void], float]:
-    """One decision, checked and timed."""
+    """One decision, checked and timed; none is asked for while all swap packs."""
+    if not swarm.active:
+        return {}, pack({}, swarm.names, (), len(swarm.uncovered)), 0.0
     started = time.perf_counter()
     try:
         commands = planner.act(swarm)

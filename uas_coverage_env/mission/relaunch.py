@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
-from uas_coverage_env.geometry import outside_cylinder
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.mission.range import Range
@@ -15,7 +14,7 @@ from uas_coverage_env.mission.ways import Ways
 from uas_coverage_env.vehicle import DOD, VX
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import FLYING, LANDED, LOST, SwarmState
-from uas_coverage_env.world.contacts import obstacle_breaches
+from uas_coverage_env.world.packs import is_clear
 
 BoolArray = NDArray[np.bool_]
 
@@ -77,12 +76,5 @@ class Relaunch:
 
     def _is_clear(self, u: int, swarm: SwarmState, going: BoolArray) -> bool:
         """Whether a UAS that flies where it stands keeps all safe distances."""
-        brief, arena, here_m = self._brief, self._view.arena, swarm.x[u, :3]
-        if obstacle_breaches(arena, arena.moving_path_m[0], u, *here_m.tolist()):
-            return False
-        for other in np.flatnonzero((swarm.status == FLYING) | going).tolist():
-            kept_m = brief.uas[u].radius_m + brief.uas[other].radius_m + brief.uas_safe_distance_m
-            away_m = here_m - swarm.x[other, :3]
-            if interpreted(outside_cylinder)(0.0, 0.0, *away_m.tolist()) < kept_m:
-                return False
-        return True
+        arena, status = self._view.arena, np.where(going, FLYING, swarm.status)
+        return bool(interpreted(is_clear)(arena, arena.moving_path_m[0], swarm.x, status, u, 0.0))

@@ -185,7 +185,10 @@ def check_flight(flight: Flight) -> None:
     for i, name in enumerate(flight.names):
         drawn = np.flatnonzero(flight.current_A[:, i] > 0.0)
         if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
-            raise InputError(f"{name} lands and takes off again; export a flight without that")
+            raise InputError(
+                f"{name} lands and takes off again; export a flight without that, each sortie of "
+                f"`run --sorties` for one ([sorties] with together = true)"
+            )
     contacts = [violation for violation in flight.violations if violation.kind != LIMIT]
     if contacts:
         raise InputError(f"the flight has a contact ({contacts[0]}); export one without")

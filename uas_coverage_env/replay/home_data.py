@@ -40,6 +40,9 @@ def way_home(flight: Flight) -> WayHome:
     no_return: list[int | None] = []
     for i, last in enumerate(flight.last_sample):
         spare = np.array([range_.spare_dod(i, x) for x in flight.x[: last + 1, i]])
+        # on the ground nothing is needed
+        rests = flight.resting[: last + 1, i]
+        spare[rests] = 1.0 - flight.x[: last + 1, i, DOD][rests] - lowest_soc[i]
         needed[: last + 1, i] = 1.0 - flight.x[: last + 1, i, DOD] - spare
         # at the last sample it is down, where nothing is needed any more
         flown = spare[:last] if last else spare

@@ -25,7 +25,7 @@ _Reason = tuple[str, str]  # what is said, and of whom
 
 
 def marks(flight: Flight, rooms: dict[str, Nearest], home: WayHome) -> list[dict[str, Any]]:
-    """Breaches, points of no return, fallbacks, large gaps and events, in order of time.
+    """Breaches, points of no return, fallbacks, large gaps and events and swaps, in order of time.
 
     What lasts is one mark: `t_s`, `until_s`, `kind`, `uas` (None: of no one in particular) and
     `text`. Contacts and limits are not among them: the page has them as violations.
@@ -36,6 +36,7 @@ def marks(flight: Flight, rooms: dict[str, Nearest], home: WayHome) -> list[dict
         *_fallbacks(flight),
         *_gaps(flight),
         *_events(flight),
+        *_swaps(flight),
     ]
     return sorted(found, key=lambda mark: mark["t_s"])
 
@@ -114,6 +115,14 @@ def _events(flight: Flight) -> Iterator[dict[str, Any]]:
         what = event.kind.replace("_", " ")
         of = f"{event.uas}: " if event.uas else ""
         yield _mark(flight, k, k, "event", f"{of}{what}", event.uas)
+
+
+def _swaps(flight: Flight) -> Iterator[dict[str, Any]]:
+    for swap in flight.swaps:
+        first, last = (
+            round(time_s / flight.scenario.dt_s) for time_s in (swap.landed_s, swap.time_s)
+        )
+        yield _mark(flight, first, last, "event", f"{swap.uas}: swaps its battery pack", swap.uas)
 
 
 def _runs(values: Sequence[Any]) -> Iterator[tuple[int, int]]:

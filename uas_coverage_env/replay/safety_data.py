@@ -35,7 +35,7 @@ def rooms(flight: Flight) -> dict[str, Nearest]:
     at_m = flight.x[..., :3]
     radii_m = np.array([uas.radius_m for uas in scenario.uas])
     flies = np.arange(len(at_m))[:, None] <= flight.last_sample
-    flies &= flight.mode < MODES.index("landed")
+    flies &= (flight.mode < MODES.index("landed")) & ~flight.resting
     found: dict[str, Nearest] = {}
 
     def add(kind: str, each_m: list[FloatArray]) -> None:

@@ -189,6 +189,11 @@ def _relaunch(scenario: UncheckedScenario) -> Iterator[str]:
             "relaunch: true does not go with from_ground: climbs and descents between flights are "
             "not counted; leave one of them out"
         )
+    if scenario.relaunch and scenario.sorties and not scenario.sorties.together:
+        yield (
+            "relaunch: true does not go with sorties.together = false, by which UAS take off again "
+            "with fresh packs; leave one of them out"
+        )
 
 
 def _events(scenario: UncheckedScenario) -> Iterator[str]:

@@ -49,7 +49,8 @@ class FlownWorld(World):
     def __init__(self, scenario: Scenario, x: NDArray[np.float64]) -> None:
         if scenario.events:
             raise ValueError("events cannot be judged from a track; leave them out")
-        super().__init__(scenario, disturbances=())
+        # packs are swapped when a log says so, not by the rule of the world
+        super().__init__(scenario.model_copy(update={"sorties": None}), disturbances=())
         self.state.x[:] = x
         self._commands = np.zeros(len(self.names), dtype=COMMAND_DTYPE)
 

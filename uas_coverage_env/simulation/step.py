@@ -37,6 +37,7 @@ from uas_coverage_env.world.contacts import (
 from uas_coverage_env.world.coverage import cover, land
 from uas_coverage_env.world.events import happen, heed, rest, sense
 from uas_coverage_env.world.outcome import NONE
+from uas_coverage_env.world.packs import swap_packs
 from uas_coverage_env.world.state import FLYING, LOST, STATE, as_felt, as_sensed
 
 ACCEPTED = -1
@@ -250,6 +251,8 @@ def judge(arena, state, nonlinear, outcome):
     check_limits(arena, state, nonlinear, outcome)
     _mark_lost(state, outcome)
     state.step[0] += 1
+    if rarely(arena.packs.shape[0] > 0):
+        swap_packs(arena, state, outcome)
     if rarely(eventful):
         sense(arena, state)
 

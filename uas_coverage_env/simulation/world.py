@@ -21,10 +21,12 @@ from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, 
 from uas_coverage_env.world.disturbance import checked_disturbances
 from uas_coverage_env.world.events import begin_events, is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
+from uas_coverage_env.world.packs import swaps_alone
 from uas_coverage_env.world.state import (
     FLYING,
     LANDED,
     STATE,
+    SWAPPING,
     SwarmState,
     WorldState,
     responding,
@@ -40,6 +42,7 @@ def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
     n_uas = len(scenario.uas)
     sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": n_disturbances}
     sizes |= {"E": len(scenario.events), "S": n_uas if is_eventful(scenario) else 0}
+    sizes["B"] = n_uas if swaps_alone(scenario) else 0
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
     state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
@@ -76,7 +79,7 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         names=tuple(uas.name for uas in scenario.uas),
         x=x,
         reference_mps=state.reference.copy(),
-        status=state.status.copy(),
+        status=np.where(state.status == SWAPPING, LANDED, state.status),
         departed=state.departed.copy(),
         returning=state.returning.copy(),
         uncovered=state.uncovered.copy(),
@@ -306,8 +309,9 @@ class World:
 
     @property
     def done(self) -> bool:
-        """Whether no UAS flies any more."""
-        return FLYING not in self.state.status
+        """Whether no UAS flies any more, nor swaps packs to fly again."""
+        status = self.state.status
+        return FLYING not in status and SWAPPING not in status
 
     @property
     def time_s(self) -> float:

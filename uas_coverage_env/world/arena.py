@@ -33,6 +33,7 @@ from uas_coverage_env.world.obstacles import (
     obstacle_records,
     overfly_limit,
 )
+from uas_coverage_env.world.packs import PACKS_DTYPE, pack_records
 from uas_coverage_env.world.routes import node_distances
 from uas_coverage_env.world.tubes import route_tube_m, tubes_m
 from uas_coverage_env.world.waypoints import (
@@ -154,6 +155,8 @@ class Arena(NamedTuple):
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
+    packs: Annotated[NDArray[np.void], PACKS_DTYPE, "B"]
+    """One for each UAS, or none where none swaps packs while the others fly on."""
     tube_m: Annotated[NDArray[np.float64], "U", "predicted"]
     """See `tubes_m`: what is kept more for what disturbances do to what is predicted."""
 
@@ -228,6 +231,7 @@ def build_arena(
         disturbance_parameters=parameters,
         events=event_records(scenario),
         sensing=sensing_records(scenario),
+        packs=pack_records(scenario),
         tube_m=tube_m,
     )
 

@@ -13,6 +13,8 @@ class UasStatus(IntEnum):
     FLYING = state.FLYING
     LANDED = state.LANDED
     LOST = state.LOST
+    SWAPPING = state.SWAPPING
+    """It has landed and waits for a fresh battery pack, to fly again if there is need."""
 
 
 class ContactKind(IntEnum):

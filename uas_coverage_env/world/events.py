@@ -87,16 +87,16 @@ def event_records(scenario: Scenario) -> NDArray[np.void]:
         record["effect"] = EFFECTS.index(effect.name)
         record["uas"] = EVERY if effect.on_all else BY_LOT if name is None else index[name]
         if event.at_s is not None:
-            record["at_step"] = _steps(event.at_s, scenario.dt_s)
+            record["at_step"] = steps_until(event.at_s, scenario.dt_s)
         else:
             record["per_step"] = (event.rate_per_h or 0.0) * scenario.dt_s / 3600.0
         lasts = math.isfinite(effect.for_s)
-        record["for_steps"] = _steps(effect.for_s, scenario.dt_s) if lasts else NEVER
+        record["for_steps"] = steps_until(effect.for_s, scenario.dt_s) if lasts else NEVER
         record["values"][: len(effect.values)] = effect.values
     return records
 
 
-def _steps(seconds: float, dt_s: float) -> int:
+def steps_until(seconds: float, dt_s: float) -> int:
     """Steps until a time has come, one at least; times are decimal, their quotients are not."""
     return max(1, math.ceil(round(seconds / dt_s, 9)))
 
@@ -291,6 +291,20 @@ def sense(arena, state):
         for k in range(N_STATES):
             kept[step % N_DELAYED, k] = sensed[k]
             state.told[i, k] = kept[late, k]
+
+
+@rare_kernel
+def deaf_until(arena, state, i, step):
+    """The sample from which UAS i hears commands again; the present one where it hears them."""
+    until = step
+    for e in range(arena.events.shape[0]):
+        if arena.events[e].effect != DEAFEN or not concerns(state, e, i):
+            continue
+        if lasts(arena, state, e, step):
+            if arena.events[e].for_steps >= NEVER:
+                return NEVER
+            until = max(until, state.event_step[e] + arena.events[e].for_steps)
+    return until
 
 
 @kernel

@@ -12,8 +12,9 @@ from uas_coverage_env.vehicle import N_STATES, PSI
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
 from uas_coverage_env.world.events import EVERY, N_DELAYED, N_HEARD, NEVER, write_responds
 
-FLYING, LANDED, LOST = range(3)
-"""Status of a UAS. Landed and lost are final."""
+FLYING, LANDED, LOST, SWAPPING = range(4)
+"""Status of a UAS. Landed and lost are final; one that swaps has landed, and may fly again with a
+fresh battery pack (`world.packs`)."""
 
 ABSENT = -1
 """Status of a UAS that a mission does not have, in arrays with room for more."""
@@ -26,7 +27,12 @@ velocity north, east, down [m/s], and depth of discharge [-]."""
 
 N_BELIEF = 8
 
-STATUS_NAMES = ("flying", "landed", "lost")
+PACK_NUMBER, PACK_READY, PACK_COVERED, PACK_OUT = range(4)
+"""Places in `WorldState.packs`: which of its packs a UAS flies with, from 0 on; the sample at which
+it has the next one; whether it has covered anything with this one; and how many UAS were lost or
+had landed for good at its take-off."""
+
+STATUS_NAMES = ("flying", "landed", "lost", "swapping")
 
 
 class WorldState(NamedTuple):
@@ -39,8 +45,9 @@ class WorldState(NamedTuple):
     belief: Annotated[NDArray[np.float64], "U", N_BELIEF]
     """What the inner loop believes of disturbances, see `WIND` and the names beside it. Zero where
     none is declared."""
-    status: Annotated[NDArray[np.int64], "U", Values(ABSENT, LOST)]
-    """FLYING, LANDED or LOST; ABSENT in a batch, where a mission has fewer UAS than others."""
+    status: Annotated[NDArray[np.int64], "U", Values(ABSENT, SWAPPING)]
+    """FLYING, LANDED, LOST or SWAPPING; ABSENT in a batch, where a mission has fewer UAS than
+    others."""
     departed: Annotated[NDArray[np.bool_], "U"]
     """Has been farther from its start than the landing distance."""
     returning: Annotated[NDArray[np.bool_], "U"]
@@ -75,6 +82,8 @@ class WorldState(NamedTuple):
     """The states of the generators that sensors draw from."""
     heard: Annotated[NDArray[np.float64], "S", N_HEARD]
     """The latest command that reached each UAS."""
+    packs: Annotated[NDArray[np.int64], "B", 4]
+    """Of each UAS what is named beside `PACK_NUMBER`; of none where none swaps on its own."""
 
     def copy(self) -> Self:
         """The same state in arrays of its own."""
@@ -119,6 +128,7 @@ def _with_x(state, x):
         state.uncovered, state.step, state.disturbance_memory, state.disturbance_random,
         state.event_step, state.event_uas, state.event_random, state.felt, state.sensed,
         state.told, state.delayed, state.bias, state.sensing_random, state.heard,
+        state.packs,
     )  # fmt: skip
 
 
@@ -142,7 +152,7 @@ class SwarmState:
             where it flies has heading and yaw rate 0 here: its autopilot turns it, and nothing that
             a player plans depends on that.
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
-        status: (U,) FLYING, LANDED or LOST.
+        status: (U,) FLYING, LANDED or LOST; one that swaps packs has landed.
         departed: (U,) has been farther from its start than the landing distance.
         returning: (U,) return mode has taken over: commands are replaced by the way home.
         uncovered: (W,) waypoint still to be covered.

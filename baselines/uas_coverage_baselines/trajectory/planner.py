@@ -29,7 +29,7 @@ from uas_coverage_env.flight import PlannerOptions
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight, without
 from uas_coverage_env.vehicle import VX, VZ
-from uas_coverage_env.world import FLYING, Command, GoTo, SwarmState, Wrench
+from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -107,6 +107,7 @@ class Trajectory:
 
     Options = TrajectoryOptions
     comes_home_by_legs = True
+    plans_on_after_swaps = True
 
     def __init__(self, options: TrajectoryOptions | None = None) -> None:
         self.options = options or TrajectoryOptions()
@@ -144,6 +145,8 @@ class Trajectory:
         swarm = first_sight(brief)
         self._world.update(swarm)
         self._silent = self._silent_then = np.zeros(len(brief.uas), np.bool_)
+        self._down = np.zeros(len(brief.uas), np.bool_)
+        self._back = self._down
         self._make_plan(swarm, self._seen_movers(swarm))
         if brief.conditions is not None and brief.conditions.mean_mps > 0.0:
             self._steering = self._steer()  # no flight that is planned in still air is flown
@@ -156,6 +159,9 @@ class Trajectory:
         self._world.update(swarm)
         self._silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
         movers = self._seen_movers(swarm)
+        # with a fresh battery pack
+        self._back = (swarm.status == FLYING) & self._down
+        self._down = swarm.status == LANDED
         swarm = without(swarm, self._silent)
         home = {swarm.names[u]: GoTo(None, "return") for u in np.flatnonzero(self._silent)}
         if self._steering is None and self._failures.are_many:
@@ -303,7 +309,7 @@ class Trajectory:
             return "no plan"
         if not np.array_equal(flying & self._may_fly, self._may_fly & self._flew(swarm)):
             return "a UAS is lost"
-        if (flying & self._silent_then).any():
+        if (flying & self._silent_then).any() or self._back.any():
             return "a UAS is back"
         if waited and (swarm.uncovered & ~self._thought_of(swarm)).any() and self._planned:
             return "missed a waypoint"
@@ -370,7 +376,8 @@ class Trajectory:
             moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
-        if self.mission_plan is not None and not (flying & self._silent_then).any():
+        back = (flying & self._silent_then).any() or self._back.any()
+        if self.mission_plan is not None and not back:
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
         plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)

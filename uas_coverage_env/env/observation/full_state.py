@@ -5,7 +5,7 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.scenario import MissionSource, ScenarioLike
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world import FLYING, LANDED
+from uas_coverage_env.world import FLYING, LANDED, SWAPPING
 
 _MOVING_MPS = 20.0
 
@@ -49,12 +49,13 @@ def _write_uas(arena, state, tables, learners, i, parameters, row):
         row[k] = 0.0
     for j in range(min(state.status.shape[0], row.shape[0] // _U_WIDTH)):
         x = state.x[j]
+        status = state.status[j]
         scale = tables.scales[j]
         at = _U_WIDTH * j
         row[at + _U.valid] = 1.0
         row[at + _U.itself] = 1.0 if j == i else 0.0
-        row[at + _U.flying] = 1.0 if state.status[j] == FLYING else 0.0
-        row[at + _U.landed] = 1.0 if state.status[j] == LANDED else 0.0
+        row[at + _U.flying] = 1.0 if status == FLYING else 0.0
+        row[at + _U.landed] = 1.0 if status in (LANDED, SWAPPING) else 0.0
         _place(scale, x[X], x[Y], x[Z], row, at + _U.position)
         row[at + _U.velocity] = within(x[VX] * scale.per_v_xy, -2.0, 2.0)
         row[at + _U.velocity + 1] = within(x[VY] * scale.per_v_xy, -2.0, 2.0)

@@ -60,8 +60,8 @@ def filter_change(arena, state, tables, learners, scratch, i, parameters):
 
 @inlined_kernel
 def time(arena, state, tables, learners, scratch, i, parameters):
-    """-1."""
-    return -1.0
+    """-1 where it flew."""
+    return -1.0 if scratch.outcome[i].flew else 0.0
 
 
 @rare_kernel

@@ -1,0 +1,206 @@
+"""Fresh battery packs for UAS that have landed at home, while the others fly on."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
+from uas_coverage_env.geometry import cylinder_clearance, outside_cylinder
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.ground_phases import landing, take_off
+from uas_coverage_env.vehicle import DOD, U_TH, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.world.contacts import obstacle_breaches
+from uas_coverage_env.world.coverage import can_cover
+from uas_coverage_env.world.events import N_DELAYED, NEVER, deaf_until, steps_until
+from uas_coverage_env.world.state import (
+    FLYING,
+    LANDED,
+    LOST,
+    PACK_COVERED,
+    PACK_NUMBER,
+    PACK_OUT,
+    PACK_READY,
+    SWAPPING,
+)
+
+AHEAD_S = 5.0
+"""Nobody takes off where another who flies on as he does would come too near within this [s]."""
+
+PACKS_DTYPE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                # how many packs it has, and the steps from a landing to its next take-off
+                ("number", "i8"),
+                ("swap_steps", "i8"),
+                # a fresh one at the start
+                ("dod", "f8"),
+                ("u_th_V", "f8"),
+            ],
+            align=True,
+        ),
+    )
+)
+
+
+def swaps_alone(scenario: Scenario) -> bool:
+    """Whether each UAS swaps packs on its own while the others fly on."""
+    return scenario.sorties is not None and not scenario.sorties.together
+
+
+def pack_records(scenario: Scenario) -> NDArray[np.void]:
+    """(B,) of PACKS_DTYPE: one for each UAS, or none where none swaps while the others fly."""
+    sorties = scenario.sorties
+    if sorties is None or sorties.together:
+        return np.zeros(0, dtype=PACKS_DTYPE)
+    records = np.zeros(len(scenario.uas), dtype=PACKS_DTYPE)
+    for i, (record, uas) in enumerate(zip(records, scenario.uas, strict=True)):
+        seconds, record["dod"] = sorties.swap_s, 1.0 - uas.soc_0
+        if scenario.from_ground:
+            up = take_off(scenario, i)
+            down = landing(scenario, i, uas.start_m, uas.dod_max, 0.0)
+            seconds += down.time_s + up.time_s
+            record["dod"], record["u_th_V"] = up.dod, up.u_th_V
+        record["number"] = sorties.packs
+        record["swap_steps"] = steps_until(seconds, scenario.dt_s)
+    return records
+
+
+@rare_kernel
+def is_clear(arena, moving_m, x, status, i, ahead_s):
+    """Whether UAS i keeps all safe distances where it stands.
+
+    Args:
+        arena: The arena.
+        moving_m: (M, 3) [m] where the moving obstacles are.
+        x: (U, 14) states.
+        status: (U,) of them.
+        i: Which.
+        ahead_s: For how long those that fly are taken to fly straight on [s].
+    """
+    here = x[i]
+    if obstacle_breaches(arena, moving_m, i, here[X], here[Y], here[Z]) > 0:
+        return False
+    for j in range(status.shape[0]):
+        if j == i or status[j] != FLYING:
+            continue
+        kept_m = arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
+        dx = here[X] - x[j, X]
+        dy = here[Y] - x[j, Y]
+        dz = here[Z] - x[j, Z]
+        apart_m = outside_cylinder(0.0, 0.0, dx, dy, dz)
+        if ahead_s > 0.0:
+            apart_m = min(
+                apart_m,
+                cylinder_clearance(
+                    0.0, 0.0, dx, dy, dz,
+                    dx - ahead_s * x[j, VX], dy - ahead_s * x[j, VY], dz - ahead_s * x[j, VZ],
+                ),
+            )  # fmt: skip
+        if apart_m < kept_m:
+            return False
+    return True
+
+
+@inlined_kernel
+def _has_something_to_do(arena, state, i):
+    """Whether a waypoint is open that UAS i can cover, and time left to fly there and back.
+
+    Straight and at full speed: what is too late so, is too late by any route.
+    """
+    rules = arena.rules[0]
+    uas = arena.uas[i]
+    begins = max(state.step[0], state.packs[i, PACK_READY])
+    reach_m = 0.5 * uas.speed_mps * rules.dt_s * (rules.max_steps - begins)
+    for w in range(state.uncovered.shape[0]):
+        if state.uncovered[w] and can_cover(arena, i, w):
+            waypoint = arena.waypoints[w]
+            north_m = waypoint.position_m[0] - state.x[i, X]
+            east_m = waypoint.position_m[1] - state.x[i, Y]
+            if math.sqrt(north_m * north_m + east_m * east_m) - waypoint.radius_m < reach_m:
+                return True
+    return False
+
+
+@inlined_kernel
+def _take_off(arena, state, i, out):
+    """Let UAS i fly with its next pack, at rest where it has landed."""
+    pack = arena.packs[i]
+    state.status[i] = FLYING
+    state.departed[i] = False
+    state.returning[i] = False
+    state.x[i, DOD] = pack.dod
+    state.x[i, U_TH] = pack.u_th_V
+    if state.told.shape[0] > 0:
+        # which pack is in is known at once
+        for k in range(N_DELAYED):
+            state.delayed[i, k, DOD] = pack.dod
+            state.delayed[i, k, U_TH] = pack.u_th_V
+    kept = state.packs[i]
+    kept[PACK_NUMBER] += 1
+    kept[PACK_COVERED] = 0
+    kept[PACK_OUT] = out
+
+
+@inlined_kernel
+def _end(state, i, outcome):
+    """UAS i has landed for good."""
+    state.status[i] = LANDED
+    outcome[i].landed = True
+
+
+@rare_kernel
+def swap_packs(arena, state, outcome):
+    """Let UAS that have landed swap packs, and fly again when they have a fresh one.
+
+    One that lands with a pack left swaps. It has landed for good where no waypoint is open any
+    more that it can cover in time, or where it will hear no command again. It takes off as soon as
+    its pack is in, it takes commands and `is_clear`; but where its last sortie has covered
+    nothing, only once somebody was lost or has landed for good since: what it left to the others
+    may be its own then. Where nobody flies and nobody is going to, all have landed for good.
+
+    Args:
+        arena: The arena.
+        state: The state at the new sample, judged; written.
+        outcome: (U,) of OUTCOME_DTYPE; landed is written: whether it has landed for good.
+    """
+    n_uas = state.status.shape[0]
+    step = state.step[0]
+    over = step >= arena.rules[0].max_steps
+    for i in range(n_uas):
+        kept = state.packs[i]
+        if outcome[i].newly_covered > 0:
+            kept[PACK_COVERED] = 1
+        if outcome[i].landed and kept[PACK_NUMBER] + 1 < arena.packs[i].number:
+            state.status[i] = SWAPPING
+            outcome[i].landed = False
+            kept[PACK_READY] = step + arena.packs[i].swap_steps
+    out = 0
+    works = False
+    for i in range(n_uas):
+        if state.status[i] == SWAPPING and (
+            over
+            or not _has_something_to_do(arena, state, i)
+            or deaf_until(arena, state, i, step) == NEVER
+        ):
+            _end(state, i, outcome)
+        out += state.status[i] == LANDED or state.status[i] == LOST
+        works |= state.status[i] == FLYING
+    moving_m = arena.moving_path_m[min(step, arena.moving_path_m.shape[0] - 1)]
+    for i in range(n_uas):
+        kept = state.packs[i]
+        if state.status[i] != SWAPPING or (kept[PACK_COVERED] == 0 and out <= kept[PACK_OUT]):
+            continue
+        works = True
+        if (
+            step >= kept[PACK_READY]
+            and deaf_until(arena, state, i, step) <= step
+            and is_clear(arena, moving_m, state.x, state.status, i, AHEAD_S)
+        ):
+            _take_off(arena, state, i, out)
+    if not works:
+        for i in range(n_uas):
+            if state.status[i] == SWAPPING:
+                _end(state, i, outcome)
