@@ -24,6 +24,7 @@ N_FLIGHT = 21
 """Numbers that the network reads about a state and the next three places."""
 
 HORIZON = 12
+_LATER = 2
 AHEAD = 4
 """Places ahead that matter: three are looked at after the first is covered."""
 
@@ -39,11 +40,15 @@ _CORNER_M = 4.0
 _WITHIN_M = 0.15
 _TRIED = 16
 _HELD = 4
-_LANDING_M = 12.0
+_LANDING_SHARE = 0.9
+_BRAKING_STEPS = 7
+_BRAKING_FROM_S = 6.0
+_LANDING_SPEEDS = np.array([1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.4, 0.3, 0.15])
+_BRAKES = np.array([1.0, 0.75, 0.5, 0.25, 0.0])
 
 
 @allocating_kernel
-def aim_ahead(x, ahead, aims_m):
+def aim_ahead(vehicle, x, ahead, aims_m):
     """Where the coming spheres are touched on a short way: (AHEAD, 3), by coordinate descent."""
     n = ahead.shape[0]
     for k in range(n):
@@ -57,7 +62,14 @@ def aim_ahead(x, ahead, aims_m):
             if k > 0:
                 bx, by, bz = aims_m[k - 1, 0], aims_m[k - 1, 1], aims_m[k - 1, 2]
             off_m = 0.5 * at[RADIUS]
-            dz = min(max(0.5 * (bz + following[2]) - at[DOWN], -off_m), off_m)
+            # its own height, where climb and descent are quick enough
+            before_s = math.hypot(at[NORTH] - bx, at[EAST] - by) / vehicle.v_xy_max_mps
+            after_s = math.hypot(at[NORTH] - following[0], at[EAST] - following[1])
+            after_s /= vehicle.v_xy_max_mps
+            up, down = vehicle.v_up_max_mps, vehicle.v_down_max_mps
+            z = min(max(at[DOWN], bz - up * before_s), bz + down * before_s)
+            z = min(max(z, following[2] - down * after_s), following[2] + up * after_s)
+            dz = min(max(z - at[DOWN], -off_m), off_m)
             radius_m = 0.97 * math.sqrt(at[RADIUS] ** 2 - dz * dz)
             radius_m = max(radius_m - 2.0 * _WITHIN_M, 0.5 * radius_m)
             dx, dy = following[0] - bx, following[1] - by
@@ -132,60 +144,155 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
         costs: (N_VELOCITIES,) written: time to the end of the places ahead [s].
         command: A record of COMMAND_DTYPE; written.
     """
-    aim_ahead(x, ahead, aims_m)
+    bent, held_first, every = 8, 2, 11
+    aim_ahead(vehicle, x, ahead, aims_m)
     to_first = math.atan2(aims_m[0, 1] - x[Y], aims_m[0, 0] - x[X])
     turn = math.atan2(aims_m[1, 1] - x[Y], aims_m[1, 0] - x[X]) - to_first
     turn = math.atan2(math.sin(turn), math.cos(turn))
     sign = 1.0 if turn > 0.0 else -1.0
-    at = ahead[0]
-    within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
-    beyond_m = math.hypot(ahead[3, NORTH] - ahead[2, NORTH], ahead[3, EAST] - ahead[2, EAST])
     there, governed, u = np.zeros(14), np.zeros(2), np.zeros(5)
     row = np.empty(N_FLIGHT)
-    n = 0
+    n, most = 0, HORIZON
     for q in range(-_TURNS_BACK, _TURNS_ON):
         angle = to_first + (turn * q / 8.0 if q >= 0 else 0.15 * q * sign)
         for s in range(_SPEEDS.shape[0]):
-            north_mps = _SPEEDS[s] * speed_mps * math.cos(angle)
-            east_mps = _SPEEDS[s] * speed_mps * math.sin(angle)
-            commands[n, 0], commands[n, 1], commands[n, 2] = north_mps, east_mps, -aims_m[0, 2]
+            commands[n, 0] = _SPEEDS[s] * speed_mps * math.cos(angle)
+            commands[n, 1] = _SPEEDS[s] * speed_mps * math.sin(angle)
+            commands[n, 2] = -aims_m[0, 2]
             there[:] = x
             governed[:] = reference
-            steps, covers = 0, False
-            while steps < HORIZON and not covers:
-                write_command(command, VELOCITY, north_mps, east_mps, -aims_m[0, 2])
-                command_wrench(vehicle, there, governed, command, u)
-                fly_kinematics(vehicle, there, u)
-                steps += 1
-                dx, dy, dz = there[X] - at[NORTH], there[Y] - at[EAST], there[Z] - at[DOWN]
-                covers = dx * dx + dy * dy + dz * dz <= within_m * within_m
-            costs[n] = steps * vehicle.dt_s
-            if covers:
-                costs[n] += look_ahead(
-                    there, governed, speed_mps, ahead[1], ahead[2], ahead[3], row
-                )
-            else:
-                costs[n] += beyond_m / speed_mps + look_ahead(
-                    there, governed, speed_mps, ahead[0], ahead[1], ahead[2], row
-                )
-            costs[n] += value_of(layers, row)
+            steps = _fly_on(vehicle, there, governed, commands[n], ahead[0], most, command, u)
+            costs[n] = np.inf
+            if steps < 0 or most == HORIZON:
+                costs[n] = _cost_s(vehicle, speed_mps, there, governed, steps, ahead, layers, row)
+            if steps < 0:
+                most = min(most, _LATER - steps)
             n += 1
+    left = costs.copy()
+    after, governed_after = np.zeros(14), np.zeros(2)
+    for _ in range(bent):
+        first = left.argmin()
+        left[first] = np.inf
+        after[:] = x
+        governed_after[:] = reference
+        for held in range(1, held_first + 1):
+            if _fly_on(vehicle, after, governed_after, commands[first], ahead[0], 1, command, u) < 0:
+                break
+            for second in range(0, N_VELOCITIES, every):
+                if second == first:
+                    continue
+                there[:] = after
+                governed[:] = governed_after
+                steps = _fly_on(
+                    vehicle, there, governed, commands[second], ahead[0], most - held, command, u
+                )
+                if steps < 0 or most == HORIZON:
+                    steps = steps - held if steps < 0 else steps + held
+                    cost = _cost_s(vehicle, speed_mps, there, governed, steps, ahead, layers, row)
+                    costs[first] = min(costs[first], cost)
 
 
 @allocating_kernel
-def towards_home(uas, x, home_m, altitude_floor_m, values):
-    """Write the velocity (north, east) and altitude that flies straight home, to rest there."""
-    dx, dy = home_m[0] - x[X], home_m[1] - x[Y]
+def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
+    """Fly a velocity until a place is covered; steps, negative where it is."""
+    within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
+    steps = 0
+    while steps < most_steps:
+        write_command(command, VELOCITY, values[0], values[1], values[2])
+        command_wrench(vehicle, x, reference, command, u)
+        fly_kinematics(vehicle, x, u)
+        steps += 1
+        dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
+        if dx * dx + dy * dy + dz * dz <= within_m * within_m:
+            return -steps
+    return steps
+
+
+@allocating_kernel
+def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
+    if steps < 0:
+        rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[3], row)
+    else:
+        beyond_m = math.hypot(ahead[3, NORTH] - ahead[2, NORTH], ahead[3, EAST] - ahead[2, EAST])
+        rest_s = beyond_m / speed_mps
+        rest_s += look_ahead(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
+    return abs(steps) * vehicle.dt_s + rest_s + value_of(layers, row)
+
+
+@allocating_kernel
+def _homewards(uas, x, speed_mps, altitude_floor_m, values):
+    """Write the velocity (north, east) and altitude that flies straight home at a speed."""
+    dx, dy = uas.home_m[0] - x[X], uas.home_m[1] - x[Y]
     way_m, now_mps = math.hypot(dx, dy), math.hypot(x[VX], x[VY])
     lead_s = min(LEAD_S, way_m / (2.0 * now_mps + 1e-9))
-    left_m = max(way_m - lead_s * now_mps, 0.0)
-    speed_mps = min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
     dx, dy = dx - lead_s * x[VX], dy - lead_s * x[VY]
     length_m = math.hypot(dx, dy) + 1e-9
     values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
-    glide_m = -home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - 1.0, 0.0)
-    cruise_m = max(-x[Z], altitude_floor_m + CRUISE_ALTITUDE_M)
-    values[2] = min(glide_m, cruise_m)
+    glide_m = -uas.home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - 3.0, 0.0)
+    values[2] = min(glide_m, max(-x[Z], altitude_floor_m + CRUISE_ALTITUDE_M))
+
+
+@allocating_kernel
+def _cautious_mps(uas, x):
+    """Speed homewards that comes to rest at home without being planned."""
+    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
+    left_m = max(way_m - min(LEAD_S * math.hypot(x[VX], x[VY]), 0.5 * way_m), 0.0)
+    return min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
+
+
+@allocating_kernel
+def is_landed(uas, rules, x):
+    """Whether a UAS is near and slow enough to land."""
+    away_m = math.hypot(x[X] - uas.home_m[0], x[Y] - uas.home_m[1])
+    away_m = math.hypot(away_m, x[Z] - uas.home_m[2])
+    now_mps = math.hypot(math.hypot(x[VX], x[VY]), x[VZ])
+    return (
+        away_m < _LANDING_SHARE * rules.landing_distance_m
+        and now_mps < _LANDING_SHARE * rules.landing_speed_mps
+    )
+
+
+@allocating_kernel
+def towards_home(vehicle, uas, rules, x, reference, values, command):
+    """Write the velocity (north, east) and altitude that flies straight home and lands soonest.
+
+    Speeds held for some steps, and brakes put on after them, are simulated to the landing, which
+    may be in mid-braking: who is slow enough for a moment has landed.
+    """
+    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
+    _homewards(uas, x, _cautious_mps(uas, x), rules.floor_m, values)
+    if way_m > _BRAKING_FROM_S * uas.speed_mps:
+        return
+    on, on_reference, there, governed = np.zeros(14), np.zeros(2), np.zeros(14), np.zeros(2)
+    u, trial, first = np.zeros(5), np.zeros(3), np.zeros(3)
+    most = 2 * _BRAKING_STEPS
+    for speed in _LANDING_SPEEDS:
+        on[:] = x
+        on_reference[:] = reference
+        for held in range(_BRAKING_STEPS):
+            for brake in _BRAKES:
+                there[:] = on
+                governed[:] = on_reference
+                now_mps = math.hypot(there[VX], there[VY]) + 1e-9
+                north = -brake * uas.speed_mps * there[VX] / now_mps
+                east = -brake * uas.speed_mps * there[VY] / now_mps
+                for steps in range(held + 1, min(held + _BRAKING_STEPS, most)):
+                    _homewards(uas, there, 0.0, rules.floor_m, trial)
+                    if steps == 1:
+                        first[0], first[1], first[2] = north, east, trial[2]
+                    write_command(command, VELOCITY, north, east, trial[2])
+                    command_wrench(vehicle, there, governed, command, u)
+                    fly_kinematics(vehicle, there, u)
+                    if is_landed(uas, rules, there):
+                        most = steps
+                        values[:] = first
+                        break
+            _homewards(uas, on, speed * uas.speed_mps, rules.floor_m, trial)
+            if held == 0:
+                first[:] = trial
+            write_command(command, VELOCITY, trial[0], trial[1], trial[2])
+            command_wrench(vehicle, on, on_reference, command, u)
+            fly_kinematics(vehicle, on, u)
 
 
 @allocating_kernel
@@ -251,10 +358,8 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
         ahead[0, RADIUS] = _CORNER_M
         n = 1
     elif n_targets == 0:
-        if math.hypot(to_m[0] - x[X], to_m[1] - x[Y]) < _LANDING_M:
-            return False
         values = np.empty(3)
-        towards_home(uas, x, to_m, rules.floor_m, values)
+        towards_home(arena.vehicles[i], uas, rules, x, reference, values, command)
         altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
         share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
         write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)
