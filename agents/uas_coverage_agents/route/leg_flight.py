@@ -1,18 +1,20 @@
 """Flying along a route without stopping: which velocity next, past the coming spheres.
 
-Constant velocities in several directions and speeds are simulated with the vehicle's own inner
-loop until the next waypoint is covered, or for `HORIZON` steps. A network says how long the flight
-past the two waypoints after it takes from the state reached; the quickest velocity is flown, for
-one step. So nothing that the network gets wrong misses a waypoint.
+Velocities in several directions and speeds are simulated with the vehicle's own inner loop until
+the next waypoint is covered, at most for `HORIZON` steps: held all the way, and, of the best, held
+for a step or two and then changed once, since a flight that turns at a waypoint begins to turn
+before it. A network says how long the two waypoints after it take from the state reached; what is
+quickest is flown, for one step. So nothing that the network gets wrong misses a waypoint.
 """
 
 import math
 
 import numpy as np
 
+from uas_coverage_agents.route.landing import towards_home
 from uas_coverage_agents.route.layers import value_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
-from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, HEADROOM_M, LEAD_S, passes_over
+from uas_coverage_env.autopilot.guidance import HEADROOM_M, LEAD_S, passes_over
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_hold_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z, fly_kinematics
@@ -24,7 +26,11 @@ N_FLIGHT = 21
 """Numbers that the network reads about a state and the next three places."""
 
 HORIZON = 12
-_LATER = 2
+_LATER_STEPS = 2  # than the soonest visit so far, and a velocity comes after all others
+_TOO_LATE_S = 100.0
+_CHANGED = 8  # velocities, the best if held, that are changed
+_CHANGED_AFTER = 2  # steps at most
+_EVERY = 11  # of the velocities is one that they are changed to
 AHEAD = 4
 """Places ahead that matter: three are looked at after the first is covered."""
 
@@ -40,11 +46,6 @@ _CORNER_M = 4.0
 _WITHIN_M = 0.15
 _TRIED = 16
 _HELD = 4
-_LANDING_SHARE = 0.9
-_BRAKING_STEPS = 7
-_BRAKING_FROM_S = 6.0
-_LANDING_SPEEDS = np.array([1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.4, 0.3, 0.15])
-_BRAKES = np.array([1.0, 0.75, 0.5, 0.25, 0.0])
 
 
 @allocating_kernel
@@ -130,7 +131,7 @@ def look_ahead(x, reference, speed_mps, first, second, third, row):
 
 @allocating_kernel
 def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, costs, command):
-    """Simulate the velocities that may be flown next.
+    """Simulate the velocities that may be flown next: held, and changed once.
 
     Args:
         vehicle: Record of VEHICLE_DTYPE.
@@ -144,7 +145,6 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
         costs: (N_VELOCITIES,) written: time to the end of the places ahead [s].
         command: A record of COMMAND_DTYPE; written.
     """
-    bent, held_first, every = 8, 2, 11
     aim_ahead(vehicle, x, ahead, aims_m)
     to_first = math.atan2(aims_m[0, 1] - x[Y], aims_m[0, 0] - x[X])
     turn = math.atan2(aims_m[1, 1] - x[Y], aims_m[1, 0] - x[X]) - to_first
@@ -162,39 +162,38 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
             there[:] = x
             governed[:] = reference
             steps = _fly_on(vehicle, there, governed, commands[n], ahead[0], most, command, u)
-            costs[n] = np.inf
-            if steps < 0 or most == HORIZON:
-                costs[n] = _cost_s(vehicle, speed_mps, there, governed, steps, ahead, layers, row)
+            costs[n] = _cost_s(vehicle, speed_mps, there, governed, steps, ahead, layers, row)
             if steps < 0:
-                most = min(most, _LATER - steps)
+                most = min(most, _LATER_STEPS - steps)
+            elif most < HORIZON:
+                costs[n] += _TOO_LATE_S
             n += 1
     left = costs.copy()
-    after, governed_after = np.zeros(14), np.zeros(2)
-    for _ in range(bent):
+    held, held_reference = np.zeros(14), np.zeros(2)
+    for _ in range(_CHANGED):
         first = left.argmin()
         left[first] = np.inf
-        after[:] = x
-        governed_after[:] = reference
-        for held in range(1, held_first + 1):
-            if _fly_on(vehicle, after, governed_after, commands[first], ahead[0], 1, command, u) < 0:
+        held[:] = x
+        held_reference[:] = reference
+        for after in range(1, _CHANGED_AFTER + 1):
+            if _fly_on(vehicle, held, held_reference, commands[first], ahead[0], 1, command, u) < 0:
                 break
-            for second in range(0, N_VELOCITIES, every):
-                if second == first:
-                    continue
-                there[:] = after
-                governed[:] = governed_after
+            for second in range(0, N_VELOCITIES, _EVERY):
+                there[:] = held
+                governed[:] = held_reference
                 steps = _fly_on(
-                    vehicle, there, governed, commands[second], ahead[0], most - held, command, u
+                    vehicle, there, governed, commands[second], ahead[0], most - after, command, u
                 )
-                if steps < 0 or most == HORIZON:
-                    steps = steps - held if steps < 0 else steps + held
-                    cost = _cost_s(vehicle, speed_mps, there, governed, steps, ahead, layers, row)
-                    costs[first] = min(costs[first], cost)
+                if steps < 0:
+                    cost_s = _cost_s(
+                        vehicle, speed_mps, there, governed, steps - after, ahead, layers, row
+                    )
+                    costs[first] = min(costs[first], cost_s)
 
 
 @allocating_kernel
 def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
-    """Fly a velocity until a place is covered; steps, negative where it is."""
+    """Fly a velocity until a place is covered, at most so long; steps, negative if it is."""
     within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
     steps = 0
     while steps < most_steps:
@@ -210,6 +209,7 @@ def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
 
 @allocating_kernel
 def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
+    """Time [s] to the last of the places ahead, after so many steps (see `_fly_on`)."""
     if steps < 0:
         rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[3], row)
     else:
@@ -217,82 +217,6 @@ def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
         rest_s = beyond_m / speed_mps
         rest_s += look_ahead(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
     return abs(steps) * vehicle.dt_s + rest_s + value_of(layers, row)
-
-
-@allocating_kernel
-def _homewards(uas, x, speed_mps, altitude_floor_m, values):
-    """Write the velocity (north, east) and altitude that flies straight home at a speed."""
-    dx, dy = uas.home_m[0] - x[X], uas.home_m[1] - x[Y]
-    way_m, now_mps = math.hypot(dx, dy), math.hypot(x[VX], x[VY])
-    lead_s = min(LEAD_S, way_m / (2.0 * now_mps + 1e-9))
-    dx, dy = dx - lead_s * x[VX], dy - lead_s * x[VY]
-    length_m = math.hypot(dx, dy) + 1e-9
-    values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
-    glide_m = -uas.home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - 3.0, 0.0)
-    values[2] = min(glide_m, max(-x[Z], altitude_floor_m + CRUISE_ALTITUDE_M))
-
-
-@allocating_kernel
-def _cautious_mps(uas, x):
-    """Speed homewards that comes to rest at home without being planned."""
-    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
-    left_m = max(way_m - min(LEAD_S * math.hypot(x[VX], x[VY]), 0.5 * way_m), 0.0)
-    return min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
-
-
-@allocating_kernel
-def is_landed(uas, rules, x):
-    """Whether a UAS is near and slow enough to land."""
-    away_m = math.hypot(x[X] - uas.home_m[0], x[Y] - uas.home_m[1])
-    away_m = math.hypot(away_m, x[Z] - uas.home_m[2])
-    now_mps = math.hypot(math.hypot(x[VX], x[VY]), x[VZ])
-    return (
-        away_m < _LANDING_SHARE * rules.landing_distance_m
-        and now_mps < _LANDING_SHARE * rules.landing_speed_mps
-    )
-
-
-@allocating_kernel
-def towards_home(vehicle, uas, rules, x, reference, values, command):
-    """Write the velocity (north, east) and altitude that flies straight home and lands soonest.
-
-    Speeds held for some steps, and brakes put on after them, are simulated to the landing, which
-    may be in mid-braking: who is slow enough for a moment has landed.
-    """
-    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
-    _homewards(uas, x, _cautious_mps(uas, x), rules.floor_m, values)
-    if way_m > _BRAKING_FROM_S * uas.speed_mps:
-        return
-    on, on_reference, there, governed = np.zeros(14), np.zeros(2), np.zeros(14), np.zeros(2)
-    u, trial, first = np.zeros(5), np.zeros(3), np.zeros(3)
-    most = 2 * _BRAKING_STEPS
-    for speed in _LANDING_SPEEDS:
-        on[:] = x
-        on_reference[:] = reference
-        for held in range(_BRAKING_STEPS):
-            for brake in _BRAKES:
-                there[:] = on
-                governed[:] = on_reference
-                now_mps = math.hypot(there[VX], there[VY]) + 1e-9
-                north = -brake * uas.speed_mps * there[VX] / now_mps
-                east = -brake * uas.speed_mps * there[VY] / now_mps
-                for steps in range(held + 1, min(held + _BRAKING_STEPS, most)):
-                    _homewards(uas, there, 0.0, rules.floor_m, trial)
-                    if steps == 1:
-                        first[0], first[1], first[2] = north, east, trial[2]
-                    write_command(command, VELOCITY, north, east, trial[2])
-                    command_wrench(vehicle, there, governed, command, u)
-                    fly_kinematics(vehicle, there, u)
-                    if is_landed(uas, rules, there):
-                        most = steps
-                        values[:] = first
-                        break
-            _homewards(uas, on, speed * uas.speed_mps, rules.floor_m, trial)
-            if held == 0:
-                first[:] = trial
-            write_command(command, VELOCITY, trial[0], trial[1], trial[2])
-            command_wrench(vehicle, on, on_reference, command, u)
-            fly_kinematics(vehicle, on, u)
 
 
 @allocating_kernel

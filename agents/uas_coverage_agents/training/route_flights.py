@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.leg_flight import (
     AHEAD,
@@ -15,20 +16,17 @@ from uas_coverage_agents.route.leg_flight import (
     N_VELOCITIES,
     NORTH,
     RADIUS,
-    is_landed,
     look_ahead,
-    towards_home,
     weigh,
 )
 from uas_coverage_agents.training.route_labels import Label, town_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import X, Y, Z, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 from uas_coverage_env.world.commands import VELOCITY
 
 MOST_STEPS = 900
-KN = np.array([8, 2, 1])
 
 
 class Course(NamedTuple):
@@ -55,7 +53,7 @@ def _places_ahead(places, covered, ahead):
 
 
 @allocating_kernel
-def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table, knobs):
+def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table):
     """Fly a route; (steps, covered). Rows of `table`: covered so far, and the straight way [s]."""
     n = places.shape[0] - 1
     x, reference, u = np.zeros(14), np.zeros(2), np.zeros(5)
@@ -82,9 +80,6 @@ def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table, knobs):
             towards_home(vehicle, uas, rules, x, reference, commands[0], command)
             best = 0
         else:
-            costs[0] = knobs[0]
-            costs[1] = knobs[1]
-            costs[2] = knobs[2]
             weigh(
                 vehicle, uas.speed_mps, x, reference, ahead, layers, aims_m, commands, costs,
                 command,
@@ -124,7 +119,7 @@ def flown(
     for course in courses:
         rows, table = np.zeros((MOST_STEPS, N_FLIGHT)), np.zeros((MOST_STEPS, 2))
         uas, vehicle, rules, places, planned_steps = course
-        end, covered = _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table, KN)
+        end, covered = _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table)
         steps, planned = steps + end, planned + planned_steps
         n = len(places) - 1
         if covered < n or end == MOST_STEPS:
@@ -133,7 +128,7 @@ def flown(
         times = np.full(n + 3, float(end))  # at which each place is reached; home at the end
         times[:n] = np.searchsorted(done, np.arange(1, n + 1))
         third = times[(done + 2).astype(int)]
-        rows_of.append(rows[: end + 1].astype(np.float32))
         beyond = third - np.arange(end + 1) - table[: end + 1, 1]
+        rows_of.append(rows[: end + 1].astype(np.float32))
         beyond_of.append(beyond.astype(np.float32))
     return Samples(np.concatenate(rows_of), np.concatenate(beyond_of)), steps / planned
