@@ -11,8 +11,8 @@ from uas_coverage_agents.route.order import build, desk, no_record
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
 
 from uas_coverage_env import generate_scenario, rollout
-from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.autopilot.control import command_wrench, write_command
+from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.vehicle import THETA, VX, X, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena

@@ -107,7 +107,9 @@ def courses_of(labels: list[Label]) -> list[Course]:
                     places[k, RADIUS] = scenario.waypoints[w].radius_m
                 places[-1, :3] = scenario.uas[u].start_m
                 places[-1, IS_HOME] = 1.0
-                courses.append(Course(arena.uas[u], arena.vehicles[u], arena.rules[0], places, steps))
+                courses.append(
+                    Course(arena.uas[u], arena.vehicles[u], arena.rules[0], places, steps)
+                )
     return courses
 
 
