@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
+from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import layers_of, value_of
 from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.mission import MissionMaker
@@ -11,10 +12,12 @@ from uas_coverage_agents.route.order import build, desk, no_record
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
 
 from uas_coverage_env import generate_scenario, rollout
+from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
-from uas_coverage_env.vehicle import VX, VY
-from uas_coverage_env.world import COMMAND_DTYPE
+from uas_coverage_env.vehicle import THETA, VX, VY, X, fly_kinematics
+from uas_coverage_env.world import COMMAND_DTYPE, build_arena
+from uas_coverage_env.world.commands import VELOCITY
 
 
 @pytest.fixture(scope="module")
@@ -115,3 +118,21 @@ def test_the_networks_of_the_file_are_those_that_are_compiled():
     layers = layers_of(network.order, policy.tensors, "order.")
     expected = policy.forward(rows)[0]
     assert value_of(layers, rows[: network.order.inputs]) == pytest.approx(expected)
+
+
+def test_at_full_speed_it_brakes_so_late_that_it_lands_two_steps_after_flying_past_would(town):
+    arena = build_arena(town)
+    vehicle, uas, rules = arena.vehicles[0], arena.uas[0], arena.rules[0]
+    command, u, values = np.zeros(1, COMMAND_DTYPE)[0], np.zeros(5), np.zeros(3)
+    x, reference = np.zeros(14), np.array([uas.speed_mps, 0.0])
+    x[:3] = uas.home_m
+    x[X] -= 60.0
+    x[VX], x[THETA] = uas.speed_mps, -vehicle.trim_rad_per_mps * uas.speed_mps
+    steps = 0
+    while not is_landed(uas, rules, x) and steps < 30:
+        towards_home(vehicle, uas, rules, x, reference, values, command)
+        write_command(command, VELOCITY, *values)
+        command_wrench(vehicle, x, reference, command, u)
+        fly_kinematics(vehicle, x, u)
+        steps += 1
+    assert steps * vehicle.dt_s <= 60.0 / uas.speed_mps + 2.0

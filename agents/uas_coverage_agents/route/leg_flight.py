@@ -1,18 +1,20 @@
 """Flying along a route without stopping: which velocity next, past the coming spheres.
 
-Constant velocities in several directions and speeds are simulated with the vehicle's own inner
-loop until the next waypoint is covered, or for `HORIZON` steps. A network says how long the flight
-past the two waypoints after it takes from the state reached; the quickest velocity is flown, for
-one step. So nothing that the network gets wrong misses a waypoint.
+Velocities in several directions and speeds are simulated with the vehicle's own inner loop until
+the next waypoint is covered, at most for `HORIZON` steps: held all the way, and, of the best, held
+for a step or two and then changed once, since a flight that turns at a waypoint begins to turn
+before it. A network says how long the two waypoints after it take from the state reached; what is
+quickest is flown, for one step. So nothing that the network gets wrong misses a waypoint.
 """
 
 import math
 
 import numpy as np
 
+from uas_coverage_agents.route.landing import towards_home
 from uas_coverage_agents.route.layers import value_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
-from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, HEADROOM_M, LEAD_S, passes_over
+from uas_coverage_env.autopilot.guidance import HEADROOM_M, LEAD_S, passes_over
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_hold_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z, fly_kinematics
@@ -24,6 +26,11 @@ N_FLIGHT = 21
 """Numbers that the network reads about a state and the next three places."""
 
 HORIZON = 12
+_LATER_STEPS = 2  # than the soonest visit so far, and a velocity comes after all others
+_TOO_LATE_S = 100.0
+_CHANGED = 8  # velocities, the best if held, that are changed
+_CHANGED_AFTER = 2  # steps at most
+_EVERY = 11  # of the velocities is one that they are changed to
 AHEAD = 4
 """Places ahead that matter: three are looked at after the first is covered."""
 
@@ -39,11 +46,10 @@ _CORNER_M = 4.0
 _WITHIN_M = 0.15
 _TRIED = 16
 _HELD = 4
-_LANDING_M = 12.0
 
 
 @allocating_kernel
-def aim_ahead(x, ahead, aims_m):
+def aim_ahead(vehicle, x, ahead, aims_m):
     """Where the coming spheres are touched on a short way: (AHEAD, 3), by coordinate descent."""
     n = ahead.shape[0]
     for k in range(n):
@@ -57,7 +63,14 @@ def aim_ahead(x, ahead, aims_m):
             if k > 0:
                 bx, by, bz = aims_m[k - 1, 0], aims_m[k - 1, 1], aims_m[k - 1, 2]
             off_m = 0.5 * at[RADIUS]
-            dz = min(max(0.5 * (bz + following[2]) - at[DOWN], -off_m), off_m)
+            # its own height, where climb and descent are quick enough
+            before_s = math.hypot(at[NORTH] - bx, at[EAST] - by) / vehicle.v_xy_max_mps
+            after_s = math.hypot(at[NORTH] - following[0], at[EAST] - following[1])
+            after_s /= vehicle.v_xy_max_mps
+            up, down = vehicle.v_up_max_mps, vehicle.v_down_max_mps
+            z = min(max(at[DOWN], bz - up * before_s), bz + down * before_s)
+            z = min(max(z, following[2] - down * after_s), following[2] + up * after_s)
+            dz = min(max(z - at[DOWN], -off_m), off_m)
             radius_m = 0.97 * math.sqrt(at[RADIUS] ** 2 - dz * dz)
             radius_m = max(radius_m - 2.0 * _WITHIN_M, 0.5 * radius_m)
             dx, dy = following[0] - bx, following[1] - by
@@ -118,7 +131,7 @@ def look_ahead(x, reference, speed_mps, first, second, third, row):
 
 @allocating_kernel
 def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, costs, command):
-    """Simulate the velocities that may be flown next.
+    """Simulate the velocities that may be flown next: held, and changed once.
 
     Args:
         vehicle: Record of VEHICLE_DTYPE.
@@ -132,60 +145,78 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
         costs: (N_VELOCITIES,) written: time to the end of the places ahead [s].
         command: A record of COMMAND_DTYPE; written.
     """
-    aim_ahead(x, ahead, aims_m)
+    aim_ahead(vehicle, x, ahead, aims_m)
     to_first = math.atan2(aims_m[0, 1] - x[Y], aims_m[0, 0] - x[X])
     turn = math.atan2(aims_m[1, 1] - x[Y], aims_m[1, 0] - x[X]) - to_first
     turn = math.atan2(math.sin(turn), math.cos(turn))
     sign = 1.0 if turn > 0.0 else -1.0
-    at = ahead[0]
-    within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
-    beyond_m = math.hypot(ahead[3, NORTH] - ahead[2, NORTH], ahead[3, EAST] - ahead[2, EAST])
     there, governed, u = np.zeros(14), np.zeros(2), np.zeros(5)
     row = np.empty(N_FLIGHT)
-    n = 0
+    n, most = 0, HORIZON
     for q in range(-_TURNS_BACK, _TURNS_ON):
         angle = to_first + (turn * q / 8.0 if q >= 0 else 0.15 * q * sign)
         for s in range(_SPEEDS.shape[0]):
-            north_mps = _SPEEDS[s] * speed_mps * math.cos(angle)
-            east_mps = _SPEEDS[s] * speed_mps * math.sin(angle)
-            commands[n, 0], commands[n, 1], commands[n, 2] = north_mps, east_mps, -aims_m[0, 2]
+            commands[n, 0] = _SPEEDS[s] * speed_mps * math.cos(angle)
+            commands[n, 1] = _SPEEDS[s] * speed_mps * math.sin(angle)
+            commands[n, 2] = -aims_m[0, 2]
             there[:] = x
             governed[:] = reference
-            steps, covers = 0, False
-            while steps < HORIZON and not covers:
-                write_command(command, VELOCITY, north_mps, east_mps, -aims_m[0, 2])
-                command_wrench(vehicle, there, governed, command, u)
-                fly_kinematics(vehicle, there, u)
-                steps += 1
-                dx, dy, dz = there[X] - at[NORTH], there[Y] - at[EAST], there[Z] - at[DOWN]
-                covers = dx * dx + dy * dy + dz * dz <= within_m * within_m
-            costs[n] = steps * vehicle.dt_s
-            if covers:
-                costs[n] += look_ahead(
-                    there, governed, speed_mps, ahead[1], ahead[2], ahead[3], row
-                )
-            else:
-                costs[n] += beyond_m / speed_mps + look_ahead(
-                    there, governed, speed_mps, ahead[0], ahead[1], ahead[2], row
-                )
-            costs[n] += value_of(layers, row)
+            steps = _fly_on(vehicle, there, governed, commands[n], ahead[0], most, command, u)
+            costs[n] = _cost_s(vehicle, speed_mps, there, governed, steps, ahead, layers, row)
+            if steps < 0:
+                most = min(most, _LATER_STEPS - steps)
+            elif most < HORIZON:
+                costs[n] += _TOO_LATE_S
             n += 1
+    left = costs.copy()
+    held, held_reference = np.zeros(14), np.zeros(2)
+    for _ in range(_CHANGED):
+        first = left.argmin()
+        left[first] = np.inf
+        held[:] = x
+        held_reference[:] = reference
+        for after in range(1, _CHANGED_AFTER + 1):
+            if _fly_on(vehicle, held, held_reference, commands[first], ahead[0], 1, command, u) < 0:
+                break
+            for second in range(0, N_VELOCITIES, _EVERY):
+                there[:] = held
+                governed[:] = held_reference
+                steps = _fly_on(
+                    vehicle, there, governed, commands[second], ahead[0], most - after, command, u
+                )
+                if steps < 0:
+                    cost_s = _cost_s(
+                        vehicle, speed_mps, there, governed, steps - after, ahead, layers, row
+                    )
+                    costs[first] = min(costs[first], cost_s)
 
 
 @allocating_kernel
-def towards_home(uas, x, home_m, altitude_floor_m, values):
-    """Write the velocity (north, east) and altitude that flies straight home, to rest there."""
-    dx, dy = home_m[0] - x[X], home_m[1] - x[Y]
-    way_m, now_mps = math.hypot(dx, dy), math.hypot(x[VX], x[VY])
-    lead_s = min(LEAD_S, way_m / (2.0 * now_mps + 1e-9))
-    left_m = max(way_m - lead_s * now_mps, 0.0)
-    speed_mps = min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
-    dx, dy = dx - lead_s * x[VX], dy - lead_s * x[VY]
-    length_m = math.hypot(dx, dy) + 1e-9
-    values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
-    glide_m = -home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - 1.0, 0.0)
-    cruise_m = max(-x[Z], altitude_floor_m + CRUISE_ALTITUDE_M)
-    values[2] = min(glide_m, cruise_m)
+def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
+    """Fly a velocity until a place is covered, at most so long; steps, negative if it is."""
+    within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
+    steps = 0
+    while steps < most_steps:
+        write_command(command, VELOCITY, values[0], values[1], values[2])
+        command_wrench(vehicle, x, reference, command, u)
+        fly_kinematics(vehicle, x, u)
+        steps += 1
+        dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
+        if dx * dx + dy * dy + dz * dz <= within_m * within_m:
+            return -steps
+    return steps
+
+
+@allocating_kernel
+def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
+    """Time [s] to the last of the places ahead, after so many steps (see `_fly_on`)."""
+    if steps < 0:
+        rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[3], row)
+    else:
+        beyond_m = math.hypot(ahead[3, NORTH] - ahead[2, NORTH], ahead[3, EAST] - ahead[2, EAST])
+        rest_s = beyond_m / speed_mps
+        rest_s += look_ahead(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
+    return abs(steps) * vehicle.dt_s + rest_s + value_of(layers, row)
 
 
 @allocating_kernel
@@ -251,10 +282,8 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
         ahead[0, RADIUS] = _CORNER_M
         n = 1
     elif n_targets == 0:
-        if math.hypot(to_m[0] - x[X], to_m[1] - x[Y]) < _LANDING_M:
-            return False
         values = np.empty(3)
-        towards_home(uas, x, to_m, rules.floor_m, values)
+        towards_home(arena.vehicles[i], uas, rules, x, reference, values, command)
         altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
         share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
         write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.leg_flight import (
     AHEAD,
@@ -16,18 +17,16 @@ from uas_coverage_agents.route.leg_flight import (
     NORTH,
     RADIUS,
     look_ahead,
-    towards_home,
     weigh,
 )
 from uas_coverage_agents.training.route_labels import Label, town_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import X, Y, Z, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 from uas_coverage_env.world.commands import VELOCITY
 
 MOST_STEPS = 900
-_AT_HOME_M, _AT_HOME_MPS = 3.0, 2.0
 
 
 class Course(NamedTuple):
@@ -35,6 +34,7 @@ class Course(NamedTuple):
 
     uas: Any
     vehicle: Any
+    rules: Any
     places: NDArray[np.float64]
     planned_steps: int
 
@@ -53,7 +53,7 @@ def _places_ahead(places, covered, ahead):
 
 
 @allocating_kernel
-def _fly(uas, vehicle, places, layers, noise_s, rng, rows, table):
+def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table):
     """Fly a route; (steps, covered). Rows of `table`: covered so far, and the straight way [s]."""
     n = places.shape[0] - 1
     x, reference, u = np.zeros(14), np.zeros(2), np.zeros(5)
@@ -75,11 +75,9 @@ def _fly(uas, vehicle, places, layers, noise_s, rng, rows, table):
             x, reference, uas.speed_mps, ahead[0], ahead[1], ahead[2], rows[step]
         )
         if covered == n:
-            way_m = np.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
-            low = uas.home_m[2] - x[Z] < _AT_HOME_M
-            if way_m < _AT_HOME_M and low and np.hypot(x[VX], x[VY]) < _AT_HOME_MPS:
+            if is_landed(uas, rules, x):
                 return step, covered
-            towards_home(uas, x, uas.home_m, 0.0, commands[0])
+            towards_home(vehicle, uas, rules, x, reference, commands[0], command)
             best = 0
         else:
             weigh(
@@ -109,7 +107,9 @@ def courses_of(labels: list[Label]) -> list[Course]:
                     places[k, RADIUS] = scenario.waypoints[w].radius_m
                 places[-1, :3] = scenario.uas[u].start_m
                 places[-1, IS_HOME] = 1.0
-                courses.append(Course(arena.uas[u], arena.vehicles[u], places, steps))
+                courses.append(
+                    Course(arena.uas[u], arena.vehicles[u], arena.rules[0], places, steps)
+                )
     return courses
 
 
@@ -120,8 +120,8 @@ def flown(
     rows_of, beyond_of, steps, planned = [], [], 0, 0
     for course in courses:
         rows, table = np.zeros((MOST_STEPS, N_FLIGHT)), np.zeros((MOST_STEPS, 2))
-        uas, vehicle, places, planned_steps = course
-        end, covered = _fly(uas, vehicle, places, layers, noise_s, rng, rows, table)
+        uas, vehicle, rules, places, planned_steps = course
+        end, covered = _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table)
         steps, planned = steps + end, planned + planned_steps
         n = len(places) - 1
         if covered < n or end == MOST_STEPS:
@@ -130,7 +130,7 @@ def flown(
         times = np.full(n + 3, float(end))  # at which each place is reached; home at the end
         times[:n] = np.searchsorted(done, np.arange(1, n + 1))
         third = times[(done + 2).astype(int)]
-        rows_of.append(rows[: end + 1].astype(np.float32))
         beyond = third - np.arange(end + 1) - table[: end + 1, 1]
+        rows_of.append(rows[: end + 1].astype(np.float32))
         beyond_of.append(beyond.astype(np.float32))
     return Samples(np.concatenate(rows_of), np.concatenate(beyond_of)), steps / planned

@@ -1,0 +1,105 @@
+"""Flying home and landing: how long to fly on, how hard to brake."""
+
+import math
+
+import numpy as np
+
+from uas_coverage_env.autopilot.control import command_wrench, write_command
+from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
+from uas_coverage_env.world.commands import VELOCITY
+
+_LANDING_SHARE = 0.9
+"""Of the distance and the speed at which a UAS has landed."""
+
+_BRAKING_FROM_S = 6.0
+_BRAKING_STEPS = 7
+_GLIDE_S = 3.0
+_SPEEDS = np.array([1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4, 0.3, 0.15])
+_BRAKES = np.array([1.0, 0.4, 0.2, 0.0, -0.05, -0.1, -0.2, -0.3])
+
+
+@allocating_kernel
+def _homewards(uas, x, speed_mps, altitude_floor_m, values):
+    """Write the velocity (north, east) and altitude that flies straight home at a speed."""
+    dx, dy = uas.home_m[0] - x[X], uas.home_m[1] - x[Y]
+    way_m, now_mps = math.hypot(dx, dy), math.hypot(x[VX], x[VY])
+    lead_s = min(LEAD_S, way_m / (2.0 * now_mps + 1e-9))
+    dx, dy = dx - lead_s * x[VX], dy - lead_s * x[VY]
+    length_m = math.hypot(dx, dy) + 1e-9
+    values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
+    glide_m = -uas.home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - _GLIDE_S, 0.0)
+    values[2] = min(glide_m, max(-x[Z], altitude_floor_m + CRUISE_ALTITUDE_M))
+
+
+@allocating_kernel
+def _cautious_mps(uas, x):
+    """Speed homewards that comes to rest at home without being planned."""
+    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
+    left_m = max(way_m - min(LEAD_S * math.hypot(x[VX], x[VY]), 0.5 * way_m), 0.0)
+    return min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
+
+
+@allocating_kernel
+def is_landed(uas, rules, x):
+    """Whether a UAS is near and slow enough to land."""
+    away_m = math.hypot(x[X] - uas.home_m[0], x[Y] - uas.home_m[1])
+    away_m = math.hypot(away_m, x[Z] - uas.home_m[2])
+    now_mps = math.hypot(math.hypot(x[VX], x[VY]), x[VZ])
+    return (
+        away_m < _LANDING_SHARE * rules.landing_distance_m
+        and now_mps < _LANDING_SHARE * rules.landing_speed_mps
+    )
+
+
+@allocating_kernel
+def towards_home(vehicle, uas, rules, x, reference, values, command):
+    """Write the velocity (north, east) and altitude that flies straight home and lands soonest.
+
+    Speeds held for some steps, and brakes put on after them (a velocity the other way), are
+    simulated until the UAS is slow enough for a sample: it has landed then, tilted as it is.
+
+    Args:
+        vehicle: Record of VEHICLE_DTYPE.
+        uas: Record of the arena.
+        rules: Record of the arena.
+        x: (14,) state.
+        reference: (2,) [m/s] of the inner loop.
+        values: (3,) written: velocity north and east [m/s], altitude [m].
+        command: A record of COMMAND_DTYPE; written.
+    """
+    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
+    _homewards(uas, x, _cautious_mps(uas, x), rules.floor_m, values)
+    if way_m > _BRAKING_FROM_S * uas.speed_mps:
+        return
+    on, on_reference, there, governed = np.zeros(14), np.zeros(2), np.zeros(14), np.zeros(2)
+    u, trial, first = np.zeros(5), np.zeros(3), np.zeros(3)
+    most = 2 * _BRAKING_STEPS
+    for speed in _SPEEDS:
+        on[:] = x
+        on_reference[:] = reference
+        for held in range(_BRAKING_STEPS):
+            for brake in _BRAKES:
+                there[:] = on
+                governed[:] = on_reference
+                now_mps = math.hypot(there[VX], there[VY]) + 1e-9
+                north = -brake * uas.speed_mps * there[VX] / now_mps
+                east = -brake * uas.speed_mps * there[VY] / now_mps
+                for steps in range(held + 1, min(held + _BRAKING_STEPS, most)):
+                    _homewards(uas, there, 0.0, rules.floor_m, trial)
+                    if steps == 1:
+                        first[0], first[1], first[2] = north, east, trial[2]
+                    write_command(command, VELOCITY, north, east, trial[2])
+                    command_wrench(vehicle, there, governed, command, u)
+                    fly_kinematics(vehicle, there, u)
+                    if is_landed(uas, rules, there):
+                        most = steps
+                        values[:] = first
+                        break
+            _homewards(uas, on, speed * uas.speed_mps, rules.floor_m, trial)
+            if held == 0:
+                first[:] = trial
+            write_command(command, VELOCITY, trial[0], trial[1], trial[2])
+            command_wrench(vehicle, on, on_reference, command, u)
+            fly_kinematics(vehicle, on, u)
