@@ -34,6 +34,7 @@ class RoutingTask:
         budget_s: (U,) how long each UAS may fly; -inf (with `idle_s` 0) where it may not at all.
         turn_of_cosine: What turning costs, in `turn_s`, by cosine from -1 to 1; None: of flights
             that cut through waypoints.
+        barred: (U, W) which UAS must not visit which waypoint; None: any may visit any.
     """
 
     open_waypoints: NDArray[np.int64]
@@ -54,6 +55,7 @@ class RoutingTask:
     not_before_s: FloatArray
     budget_s: FloatArray
     turn_of_cosine: FloatArray | None = None
+    barred: NDArray[np.bool_] | None = None
 
     @property
     def n_uas(self) -> int:

@@ -45,6 +45,7 @@ class Moment:
         uncovered: (W,).
         earliest: (W,) steps from now before which a waypoint is not to be visited.
         time_s: Since the start.
+        barred: (U, W) which UAS are not to visit which waypoint; None: any may visit any.
     """
 
     x: FloatArray
@@ -52,6 +53,7 @@ class Moment:
     uncovered: NDArray[np.bool_]
     earliest: IntArray
     time_s: float
+    barred: NDArray[np.bool_] | None = None
 
 
 class Fleet:
@@ -134,6 +136,7 @@ class Fleet:
             weight=self._weight,
             not_before_s=self.brief.dt_s * moment.earliest.astype(float),
             budget_s=np.where(may, budget_s, -np.inf),
+            barred=moment.barred,
         )
 
     def program(

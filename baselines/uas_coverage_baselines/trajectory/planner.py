@@ -25,9 +25,17 @@ from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
+from uas_coverage_baselines.trajectory.waiting import who_waits
 from uas_coverage_env.flight import PlannerOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight, without
+from uas_coverage_env.mission import (
+    Handover,
+    MissionBrief,
+    Range,
+    WorldView,
+    first_sight,
+    without,
+)
 from uas_coverage_env.vehicle import VX, VZ
 from uas_coverage_env.world import FLYING, Command, GoTo, SwarmState, Wrench
 
@@ -43,7 +51,8 @@ _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
-_SOON_S = 22.0  # a visit to what is still blocked so soon is put off
+_SOON_S = 22.0  # a visit to what is still blocked so soon is put off,
+_AT_LAST_S = 8.0  # given up where it cannot be put off
 
 
 class TrajectoryOptions(PlannerOptions):
@@ -134,6 +143,7 @@ class Trajectory:
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
+        self._way_home = Range(brief)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
@@ -318,11 +328,13 @@ class Trajectory:
         if not np.array_equal((opens > 0) & swarm.uncovered, self._blocked & swarm.uncovered):
             return "a waypoint opened or closed"
         if (opens >= NEVER).any():
-            soon = round(_SOON_S / self._brief.dt_s)
             for planned in self._planned.values():
-                ahead = planned.flight.visits + planned.course.begin - swarm.step
+                visits = planned.flight.visits + planned.course.begin
+                at_last = visits >= self._latest_visit[planned.route]
+                soon_s = np.where(at_last, _AT_LAST_S, _SOON_S)
+                ahead = visits - swarm.step
                 waits = (opens[planned.route] >= NEVER) & swarm.uncovered[planned.route]
-                if (waits & (ahead < soon) & (ahead > 0)).any():
+                if (waits & (self._brief.dt_s * ahead < soon_s) & (ahead > 0)).any():
                     return "a waypoint is still blocked"
         return None
 
@@ -366,8 +378,15 @@ class Trajectory:
             self.total_weight,
             options.threads,
         )
+        self._latest_visit = np.full(len(unknown), NEVER)
         if unknown.any():
-            moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
+            waiting = who_waits(self._fleet, self._way_home, moment, unknown)
+            guess = self._guess(moment, unknown, effort)
+            given_up = waiting.latest == NEVER
+            later = np.where(given_up, NEVER, np.minimum(waiting.latest, guess))
+            moment.earliest[unknown] = later[unknown]
+            moment = replace(moment, barred=waiting.barred)
+            self._latest_visit = swarm.step + waiting.latest
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
         if self.mission_plan is not None and not (flying & self._silent_then).any():
