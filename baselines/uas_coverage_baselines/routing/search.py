@@ -107,8 +107,12 @@ def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed:
     wanted = np.zeros(W, bool)
     wanted[task.open_waypoints] = True
     for u, route in enumerate((*order.routes, order.left_out)):
-        grounded = u < U and task.budget_s[u] == -np.inf
-        kept = [w for w in route if wanted[w] and not grounded]
+        allowed = wanted
+        if u < U and task.budget_s[u] == -np.inf:
+            allowed = np.zeros(W, bool)
+        elif u < U and task.barred is not None:
+            allowed = wanted & ~task.barred[u]
+        kept = [w for w in route if allowed[w]]
         wanted[kept] = False
         routes[u, : len(kept)] = kept
         lengths[u] = len(kept)

@@ -149,6 +149,7 @@ class Trajectory:
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
+        self._is_handed_over = False
         self._without_plan_since = np.full(len(brief.uas), -1)
         self._flown_as_planned = set(range(len(brief.uas)))
         swarm = first_sight(brief)
@@ -336,6 +337,10 @@ class Trajectory:
                 waits = (opens[planned.route] >= NEVER) & swarm.uncovered[planned.route]
                 if (waits & (self._brief.dt_s * ahead < soon_s) & (ahead > 0)).any():
                     return "a waypoint is still blocked"
+            if not self._is_handed_over and self._waiting.is_left_to_others(
+                self._planned, swarm.step, swarm.uncovered
+            ):
+                return "a UAS that could wait longer is about to fly home"
         return None
 
     def _flew(self, swarm: SwarmState) -> BoolArray:
@@ -350,6 +355,7 @@ class Trajectory:
         assert self.mission_plan is not None
         known = np.zeros(len(swarm.uncovered), np.bool_)
         known[self.mission_plan.order.left_out] = True
+        known |= self._latest_visit < self._planned_at
         for planned in self._planned.values():
             known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
         return known
@@ -379,20 +385,31 @@ class Trajectory:
             options.threads,
         )
         self._latest_visit = np.full(len(unknown), NEVER)
+        self._waiting = who_waits(self._fleet, self._way_home, moment, unknown)
         if unknown.any():
-            waiting = who_waits(self._fleet, self._way_home, moment, unknown)
-            guess = self._guess(moment, unknown, effort)
-            given_up = waiting.latest == NEVER
-            later = np.where(given_up, NEVER, np.minimum(waiting.latest, guess))
-            moment.earliest[unknown] = later[unknown]
-            moment = replace(moment, barred=waiting.barred)
-            self._latest_visit = swarm.step + waiting.latest
+            latest = self._waiting.latest
+            self._latest_visit = swarm.step + latest
+            moment.earliest[unknown] = np.minimum(latest, self._guess(moment, unknown, effort))[
+                unknown
+            ]
+            moment = replace(moment, uncovered=moment.uncovered & ~(unknown & (latest < 0)))
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
         if self.mission_plan is not None and not (flying & self._silent_then).any():
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
-        plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)
+
+        def found(barred: BoolArray | None) -> MissionPlan:
+            now = replace(moment, barred=barred)
+            return plan_mission(self._fleet, now, swarm.step, bodies, effort, seed, kept, flown)
+
+        barred = self._waiting.barred if self._is_handed_over and unknown.any() else None
+        plan = found(barred)
+        if barred is None and self._waiting.is_left_to_others(
+            plan.planned, swarm.step, swarm.uncovered
+        ):
+            self._is_handed_over = True
+            plan = found(self._waiting.barred)
         self.mission_plan, self._planned = plan, dict(plan.planned)
         self._planned_at, self._seen = swarm.step, movers
         self._silent_then = self._silent
