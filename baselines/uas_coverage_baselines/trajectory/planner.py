@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
@@ -21,12 +20,12 @@ from uas_coverage_baselines.trajectory.mission_plan import (
     plan_mission,
 )
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
+from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
 from uas_coverage_baselines.trajectory.waiting import who_waits
-from uas_coverage_env.flight import PlannerOptions
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
     Handover,
@@ -53,56 +52,6 @@ _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _SOON_S = 22.0  # a visit to what is still blocked so soon is put off,
 _AT_LAST_S = 8.0  # given up where it cannot be put off
-
-
-class TrajectoryOptions(PlannerOptions):
-    """Options of `trajectory`."""
-
-    orders: int = Field(
-        default=3,
-        ge=1,
-        le=100,
-        description="orders searched before take-off; one where more than 8 UAS fly",
-    )
-    moves: int = Field(
-        default=300_000,
-        ge=0,
-        description="changes tried in each search; up to six times as many for large fleets",
-    )
-    programs: int = Field(
-        default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
-    )
-    weight_energy: float = Field(
-        default=0.6,
-        ge=0.0,
-        le=100.0,
-        description="worth of a second of each UAS's flight against one of the mission; "
-        "of more than four UAS, of four seconds shared by all",
-    )
-    speed_share: float = Field(
-        default=1.0,
-        ge=0.2,
-        le=1.0,
-        description="of the largest horizontal speed: so fast is flown at most",
-    )
-    margin_m: float = Field(
-        default=0.3,
-        ge=0.0,
-        le=10.0,
-        description="added to every clearance, for the path between samples",
-    )
-    moving_margin_m: float = Field(
-        default=3.0,
-        ge=0.0,
-        le=50.0,
-        description="added for a moving obstacle's next change of velocity",
-    )
-    threads: int = Field(
-        default=2,
-        ge=1,
-        le=64,
-        description="searches and UAS planned side by side; plans stay the same",
-    )
 
 
 class Trajectory:
@@ -388,10 +337,9 @@ class Trajectory:
         self._waiting = who_waits(self._fleet, self._way_home, moment, unknown)
         if unknown.any():
             latest = self._waiting.latest
-            self._latest_visit = swarm.step + latest
-            moment.earliest[unknown] = np.minimum(latest, self._guess(moment, unknown, effort))[
-                unknown
-            ]
+            self._latest_visit[unknown] = swarm.step + latest[unknown]
+            visit = np.minimum(latest, self._guess(moment, unknown, effort))
+            moment.earliest[unknown] = visit[unknown]
             moment = replace(moment, uncovered=moment.uncovered & ~(unknown & (latest < 0)))
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
