@@ -80,7 +80,7 @@ def test_looking_farther_around_a_turn_finds_no_less_cost(turning):
 def test_between_tabulated_angles_the_bound_holds(vehicle, prices):
     from uas_coverage_env.bound import turning as module
 
-    motion = module._motion(vehicle, 1.0)
+    motion = module.motion_of(vehicle, 1.0)
     speed = WITHIN * vehicle.limits.v_xy_max_mps
     table = turning_of_fleet([vehicle], 1.0, prices, 0.5)
     window = module._Window(motion, prices, speed, table.per_m)

@@ -312,3 +312,17 @@ def test_short_routes_are_searched_as_a_whole():
     part = RouteWindow.of(whole, order, 8)
     assert part.task is whole
     assert [r.tolist() for r in part.joined(order).routes] == [r.tolist() for r in order.routes]
+
+
+@few
+@given(seeds, st.booleans())
+def test_nobody_is_sent_where_it_must_not_go(seed, by_pieces):
+    barred = np.zeros((2, 12), bool)
+    barred[0, :4] = barred[1, 3:6] = True
+    problem = task(seed, 12, barred=barred)
+    nothing = np.zeros(0, np.int64)
+    against = Routes((np.arange(12), nothing), nothing, np.zeros(2), np.inf)
+    found = improve_routes(problem, against, SearchEffort(4000, by_pieces=by_pieces), seed)
+    for u, route in enumerate(found.routes):
+        assert not barred[u, route].any()
+    assert found.left_out.tolist() == [3], "nobody may go there"

@@ -122,7 +122,7 @@ def turning_of(
         speed_mps: Full speed, at least that of the vehicle [m/s].
         landing_mps: Speed at which it lands, at most [m/s].
     """
-    motion = _motion(vehicle, dt_s)
+    motion = motion_of(vehicle, dt_s)
     per_m = (prices.step / speed_mps + prices.mps) / dt_s
     window = _Window(motion, prices, speed_mps, per_m)
     sizes = range(LONGEST + 1)
@@ -149,7 +149,8 @@ def _chord_loss(prices: Prices, motion: Motion, per_m: float) -> FloatArray:
     return stretch * ((2.0 + stretch) * steps * prices.step + 4.0 * per_m * potential_m)
 
 
-def _motion(vehicle: VehicleParams, dt_s: float) -> Motion:
+def motion_of(vehicle: VehicleParams, dt_s: float) -> Motion:
+    """The horizontal motion of a vehicle in steps of `dt_s`, with the limits of the bound."""
     A, B = horizontal_axis(vehicle, dt_s)
     inner, forced = A[1:, 1:], B[1:]
     ahead = A[0, 1:] - np.array([dt_s, 0.0, 0.0])

@@ -27,6 +27,7 @@ class RoutingArrays(NamedTuple):
     acceleration: FloatArray
     turn: FloatArray
     opens: FloatArray
+    """(U, W) from when on each UAS may visit."""
     budget: FloatArray
     left_out_s: FloatArray
     neighbours: NDArray[np.int64]
@@ -59,7 +60,7 @@ def route_s(task, u, route, length):
     """Flight time of one UAS along a route and home."""
     if length == 0:
         return task.idle[u]
-    place, kind, opens = task.place, task.kind[u], task.opens
+    place, kind, opens = task.place, task.kind[u], task.opens[u]
     n_waypoints, n_uas = len(opens), len(task.kind)
     before, here = n_waypoints + u, route[0]
     time = task.first[u, here]
@@ -111,16 +112,22 @@ def sums_of(task, n_uas, width):
 
 
 @allocating_kernel
+def opens_late(task, waypoint):
+    """Whether a waypoint may not be visited at any time by every UAS."""
+    return task.opens[:, waypoint].max() > 0.0
+
+
+@allocating_kernel
 def sum_up(task, sums, u, route, length):
     """Write the sums of one route."""
     place, kind = task.place, task.kind[u]
-    n_waypoints = len(task.opens)
+    n_waypoints = task.opens.shape[1]
     home = n_waypoints + len(task.kind) + u
     before, late = n_waypoints + u, 0
     legs, back, turns = 0.0, 0.0, 0.0
     for k in range(length):
         here = route[k]
-        if task.opens[here] > 0.0:
+        if opens_late(task, here):
             late += 1
         if k > 0:
             legs += task.between[kind, before, here]
@@ -161,7 +168,7 @@ def pieces_s(task, sums, u, routes, pieces, n):
     if n == 0:
         return task.idle[u]
     place, table, kind = task.place, task.turn_of_cosine, task.kind[u]
-    n_waypoints, n_uas = len(task.opens), len(task.kind)
+    n_waypoints, n_uas = task.opens.shape[1], len(task.kind)
     before, here, time = n_waypoints + u, -1, 0.0
     for p in range(n):
         row, low, high = pieces[p, 0], pieces[p, 1], pieces[p, 2]

@@ -17,6 +17,7 @@ from uas_coverage_baselines.routing.route_time import (
     RoutingArrays,
     add_piece,
     joined,
+    opens_late,
     pieces_s,
     route_s,
     sum_up,
@@ -37,6 +38,7 @@ _TURN_OF_COSINE = np.interp(
 )
 _SAME_TEMPERATURE = 64  # moves
 _OVERTIME = 200.0  # cost of a second beyond the budget, in seconds
+_BARRED_S = 1e5  # later than any battery lasts
 _LEFT_OUT_S = 120.0  # cost of leaving out a waypoint of weight 1, beyond that of a visit
 
 
@@ -105,8 +107,12 @@ def improve_routes(task: RoutingTask, order: Routes, effort: SearchEffort, seed:
     wanted = np.zeros(W, bool)
     wanted[task.open_waypoints] = True
     for u, route in enumerate((*order.routes, order.left_out)):
-        grounded = u < U and task.budget_s[u] == -np.inf
-        kept = [w for w in route if wanted[w] and not grounded]
+        allowed = wanted
+        if u < U and task.budget_s[u] == -np.inf:
+            allowed = np.zeros(W, bool)
+        elif u < U and task.barred is not None:
+            allowed = wanted & ~task.barred[u]
+        kept = [w for w in route if allowed[w]]
         wanted[kept] = False
         routes[u, : len(kept)] = kept
         lengths[u] = len(kept)
@@ -149,6 +155,14 @@ def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
     return _LEFT_OUT_S * task.weight + (1.0 + total_weight) * visit_s
 
 
+def _opens_s(task: RoutingTask) -> FloatArray:
+    """(U, W) from when on each UAS may visit, beyond every budget where it must not at all."""
+    opens_s = np.tile(task.not_before_s, (task.n_uas, 1))
+    if task.barred is not None:
+        opens_s[task.barred] = _BARRED_S
+    return opens_s
+
+
 def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
     turning = _TURN_OF_COSINE if task.turn_of_cosine is None else task.turn_of_cosine
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
@@ -163,7 +177,7 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         speed=task.speed_mps,
         acceleration=task.acceleration_mps2,
         turn=task.turn_s,
-        opens=task.not_before_s,
+        opens=_opens_s(task),
         budget=task.budget_s,
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
@@ -204,7 +218,7 @@ def _insert_missing(task, routes, lengths, missing, total_weight, by_pieces):
         while routes[n_uas, k] != waypoint:
             k += 1
         for u in range(n_uas):
-            quick = by_pieces and sums.late[u] == 0 and not task.opens[waypoint] > 0.0
+            quick = by_pieces and sums.late[u] == 0 and not opens_late(task, waypoint)
             for at in range(lengths[u] + 1):
                 n = add_piece(pieces, 0, u, 0, at - 1, 0)
                 n = add_piece(pieces, n, n_uas, k, k, 0)

@@ -39,6 +39,7 @@ class RoutingTask:
         budget_s: (U,) how long each UAS may fly; -inf (with `idle_s` 0) where it may not at all.
         turn_of_cosine: What turning costs, in `turn_s`, by cosine from -1 to 1; None: of flights
             that cut through waypoints.
+        barred: (U, W) which UAS must not visit which waypoint; None: any may visit any.
     """
 
     open_waypoints: NDArray[np.int64]
@@ -59,6 +60,7 @@ class RoutingTask:
     not_before_s: FloatArray
     budget_s: FloatArray
     turn_of_cosine: FloatArray | None = None
+    barred: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(
@@ -74,6 +76,7 @@ class RoutingTask:
         not_before_s: FloatArray | None = None,
         stretch: float = 1.0,
         speed_share: float = 1.0,
+        barred: BoolArray | None = None,
     ) -> RoutingTask:
         """The routing problem of UAS where they are.
 
@@ -88,6 +91,7 @@ class RoutingTask:
             not_before_s: (W,) from now on; None: any time.
             stretch: How much longer legs take than their times say.
             speed_share: Share of the cruising speed that is flown.
+            barred: (U, W) which UAS must not visit which waypoint; None: any may.
         """
         own = legs.legs if isinstance(legs, Terrain) else legs
         position_m = x[:, :3]
@@ -113,6 +117,7 @@ class RoutingTask:
             not_before_s=np.zeros(n_waypoints) if not_before_s is None else not_before_s,
             budget_s=np.where(may_work, budget_s, -np.inf),
             turn_of_cosine=own.turn_of_cosine,
+            barred=barred,
         )
 
     @property

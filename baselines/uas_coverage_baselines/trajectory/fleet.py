@@ -45,6 +45,7 @@ class Moment:
         uncovered: (W,).
         earliest: (W,) steps from now before which a waypoint is not to be visited.
         time_s: Since the start.
+        barred: (U, W) which UAS are not to visit which waypoint; None: any may visit any.
     """
 
     x: FloatArray
@@ -52,6 +53,7 @@ class Moment:
     uncovered: NDArray[np.bool_]
     earliest: IntArray
     time_s: float
+    barred: NDArray[np.bool_] | None = None
 
 
 class Fleet:
@@ -123,6 +125,7 @@ class Fleet:
             not_before_s=self.brief.dt_s * moment.earliest.astype(float),
             stretch=_LEGS / self._speed_share,
             speed_share=self._speed_share,
+            barred=moment.barred,
         )
 
     def program(

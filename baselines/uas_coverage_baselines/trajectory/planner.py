@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
@@ -21,13 +20,21 @@ from uas_coverage_baselines.trajectory.mission_plan import (
     plan_mission,
 )
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
+from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
-from uas_coverage_env.flight import PlannerOptions
+from uas_coverage_baselines.trajectory.waiting import who_waits
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight, without
+from uas_coverage_env.mission import (
+    Handover,
+    MissionBrief,
+    Range,
+    WorldView,
+    first_sight,
+    without,
+)
 from uas_coverage_env.vehicle import VX, VZ
 from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Wrench
 
@@ -43,57 +50,8 @@ _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
-_SOON_S = 22.0  # a visit to what is still blocked so soon is put off
-
-
-class TrajectoryOptions(PlannerOptions):
-    """Options of `trajectory`."""
-
-    orders: int = Field(
-        default=3,
-        ge=1,
-        le=100,
-        description="orders searched before take-off; one where more than 8 UAS fly",
-    )
-    moves: int = Field(
-        default=300_000,
-        ge=0,
-        description="changes tried in each search; up to six times as many for large fleets",
-    )
-    programs: int = Field(
-        default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
-    )
-    weight_energy: float = Field(
-        default=0.6,
-        ge=0.0,
-        le=100.0,
-        description="worth of a second of each UAS's flight against one of the mission; "
-        "of more than four UAS, of four seconds shared by all",
-    )
-    speed_share: float = Field(
-        default=1.0,
-        ge=0.2,
-        le=1.0,
-        description="of the largest horizontal speed: so fast is flown at most",
-    )
-    margin_m: float = Field(
-        default=0.3,
-        ge=0.0,
-        le=10.0,
-        description="added to every clearance, for the path between samples",
-    )
-    moving_margin_m: float = Field(
-        default=3.0,
-        ge=0.0,
-        le=50.0,
-        description="added for a moving obstacle's next change of velocity",
-    )
-    threads: int = Field(
-        default=2,
-        ge=1,
-        le=64,
-        description="searches and UAS planned side by side; plans stay the same",
-    )
+_SOON_S = 22.0  # a visit to what is still blocked so soon is put off,
+_AT_LAST_S = 8.0  # given up where it cannot be put off
 
 
 class Trajectory:
@@ -135,11 +93,13 @@ class Trajectory:
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
+        self._way_home = Range(brief)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
+        self._is_handed_over = False
         self._without_plan_since = np.full(len(brief.uas), -1)
         self._flown_as_planned = set(range(len(brief.uas)))
         swarm = first_sight(brief)
@@ -324,12 +284,18 @@ class Trajectory:
         if not np.array_equal((opens > 0) & swarm.uncovered, self._blocked & swarm.uncovered):
             return "a waypoint opened or closed"
         if (opens >= NEVER).any():
-            soon = round(_SOON_S / self._brief.dt_s)
             for planned in self._planned.values():
-                ahead = planned.flight.visits + planned.course.begin - swarm.step
+                visits = planned.flight.visits + planned.course.begin
+                at_last = visits >= self._latest_visit[planned.route]
+                soon_s = np.where(at_last, _AT_LAST_S, _SOON_S)
+                ahead = visits - swarm.step
                 waits = (opens[planned.route] >= NEVER) & swarm.uncovered[planned.route]
-                if (waits & (ahead < soon) & (ahead > 0)).any():
+                if (waits & (self._brief.dt_s * ahead < soon_s) & (ahead > 0)).any():
                     return "a waypoint is still blocked"
+            if not self._is_handed_over and self._waiting.is_left_to_others(
+                self._planned, swarm.step, swarm.uncovered
+            ):
+                return "a UAS that could wait longer is about to fly home"
         return None
 
     def _flew(self, swarm: SwarmState) -> BoolArray:
@@ -344,6 +310,7 @@ class Trajectory:
         assert self.mission_plan is not None
         known = np.zeros(len(swarm.uncovered), np.bool_)
         known[self.mission_plan.order.left_out] = True
+        known |= self._latest_visit < self._planned_at
         for planned in self._planned.values():
             known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
         return known
@@ -372,15 +339,32 @@ class Trajectory:
             self.total_weight,
             options.threads,
         )
+        self._latest_visit = np.full(len(unknown), NEVER)
+        self._waiting = who_waits(self._fleet, self._way_home, moment, unknown)
         if unknown.any():
-            moment.earliest[opens >= NEVER] = self._guess(moment, unknown, effort)
+            latest = self._waiting.latest
+            self._latest_visit[unknown] = swarm.step + latest[unknown]
+            visit = np.minimum(latest, self._guess(moment, unknown, effort))
+            moment.earliest[unknown] = visit[unknown]
+            moment = replace(moment, uncovered=moment.uncovered & ~(unknown & (latest < 0)))
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
         back = (flying & self._silent_then).any() or self._back.any()
         if self.mission_plan is not None and not back:
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
-        plan = plan_mission(self._fleet, moment, swarm.step, bodies, effort, seed, kept, flown)
+
+        def found(barred: BoolArray | None) -> MissionPlan:
+            now = replace(moment, barred=barred)
+            return plan_mission(self._fleet, now, swarm.step, bodies, effort, seed, kept, flown)
+
+        barred = self._waiting.barred if self._is_handed_over and unknown.any() else None
+        plan = found(barred)
+        if barred is None and self._waiting.is_left_to_others(
+            plan.planned, swarm.step, swarm.uncovered
+        ):
+            self._is_handed_over = True
+            plan = found(self._waiting.barred)
         self.mission_plan, self._planned = plan, dict(plan.planned)
         self._planned_at, self._seen = swarm.step, movers
         self._silent_then = self._silent

@@ -1,0 +1,74 @@
+"""Who waits for a waypoint that is blocked, nobody knows for how long, and until when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
+from uas_coverage_baselines.trajectory.mission_plan import Planned
+from uas_coverage_env.mission import Range
+from uas_coverage_env.vehicle import DOD
+
+_AS_LONG_S = 10.0  # who can wait nearly as long as another may do so, too
+_TOO_LATE_S = 12.0  # before a UAS has to set off home: then it no longer waits
+
+
+class Waiting(NamedTuple):
+    """Who could wait for what is blocked, and when it is visited at the latest.
+
+    Attributes:
+        barred: (U, W) UAS that must not be the ones to wait: another one could wait longer.
+        latest: (W,) steps from now; negative where nobody can wait any longer.
+    """
+
+    barred: NDArray[np.bool_]
+    latest: NDArray[np.int64]
+
+    def is_left_to_others(
+        self, planned: Mapping[int, Planned], step: int, uncovered: NDArray[np.bool_]
+    ) -> bool:
+        """Whether all that could wait longest for a waypoint have nothing to do but fly home.
+
+        Args:
+            planned: What the UAS are to do.
+            step: Number of the sample.
+            uncovered: (W,).
+        """
+        busy = [u for u, p in planned.items() if p.open_visits(step, uncovered).any()]
+        asked = uncovered & self.barred.any(axis=0) & (self.latest >= 0)
+        return bool(self.barred[busy][:, asked].all(axis=0).any())
+
+
+def who_waits(fleet: Fleet, way_home: Range, moment: Moment, blocked: NDArray[np.bool_]) -> Waiting:
+    """The UAS that can wait longest, and all whose battery outlasts the mission.
+
+    Were these to fly home while another one waits, nobody would be left when its charge runs out.
+
+    Args:
+        fleet: The mission.
+        way_home: Of its UAS.
+        moment: From where.
+        blocked: (W,) for nobody knows how long.
+    """
+    brief, x = fleet.brief, moment.x
+    there = np.flatnonzero(blocked)
+    mission_s = brief.max_steps * brief.dt_s - moment.time_s
+    battery_s = fleet.battery_s(x)
+    until_s = np.full((len(x), len(blocked)), -np.inf)
+    may_cover = moment.may_work[:, None] & brief.can_cover
+    for u in np.flatnonzero(moment.may_work):
+        for w in there[may_cover[u, there]]:
+            hover = np.zeros(x.shape[1])
+            hover[:3], hover[DOD] = fleet.waypoints_m[w], x[u, DOD]
+            home = way_home.home(int(u), hover)
+            back_s = home.time_s + home.time_margin_s
+            until_s[u, w] = min(float(battery_s[u]), mission_s) - back_s
+    longest_s = until_s.max(axis=0)
+    keeps = until_s >= longest_s - _AS_LONG_S
+    keeps |= may_cover & (battery_s >= mission_s)[:, None]
+    latest = np.where(longest_s >= _TOO_LATE_S, np.round(longest_s / brief.dt_s), -1.0)
+    return Waiting(blocked & ~keeps, latest.astype(np.int64))
