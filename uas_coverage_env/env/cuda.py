@@ -147,7 +147,9 @@ def _finish(pool, paying, observing, missions, lane):
     for i in range(state.status.shape[0]):
         missions.rewards[lane, i] = learners.amounts[i, REWARD]
         missions.acted[lane] += scratch.outcome[i].flew
-        flies = flies or learners.report[i, STATUS] in (FLYING, SWAPPING)
+        status = learners.report[i, STATUS]
+        flies = flies or status == FLYING
+        flies = flies or status == SWAPPING
     missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps
 
 

@@ -80,9 +80,9 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
         `status` (`UasStatus`: 0 flying, 1 landed, 2 lost, 3 swapping its battery pack);
         `contact`, what it was lost to (`ContactKind`: 0 nothing, 1 obstacle, 2 moving obstacle,
-        3 UAS, 4 geofence, 5 battery), and
-        `contact_with`, its index among those of the scenario, else -1; `limits_exceeded` (the
-        vehicle's limits beyond which it is, as a mask: bit k for `vehicle.LIMIT_NAMES[k]`);
+        3 UAS, 4 geofence, 5 battery), and `contact_with`, its index among those of the scenario,
+        else -1; `limits_exceeded` (the vehicle's limits beyond which it is, as a mask: bit k for
+        `vehicle.LIMIT_NAMES[k]`);
         `returning` (it flies home); `covered` (waypoints the swarm has covered so far);
         `energy_Wh` (drawn by this UAS so far); `reward_terms`, a dictionary; `action_mask` with the
         waypoint action; with the safety filter `filter`, a dictionary of `changed`, and of the
