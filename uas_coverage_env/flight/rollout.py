@@ -206,7 +206,7 @@ def _fly(
             revisions = world.revisions
             relaunch = _relaunch(world)
         if not plans_on:
-            # somebody flies again, with a fresh pack
+            # a UAS flies again, with a fresh pack
             changed |= bool(((before.status == LANDED) & (swarm.status == FLYING)).any())
         again = relaunch.due(swarm) if relaunch and log.steps < limit else None
         if again is not None and again.any():

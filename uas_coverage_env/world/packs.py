@@ -25,7 +25,7 @@ from uas_coverage_env.world.state import (
 )
 
 AHEAD_S = 5.0
-"""Nobody takes off where another who flies on as he does would come too near within this [s]."""
+"""No UAS takes off where another one, flying on as it does, would come too near within this [s]."""
 
 PACKS_DTYPE = np.dtype(
     (
@@ -158,8 +158,8 @@ def swap_packs(arena, state, outcome):
     One that lands with a pack left swaps. It has landed for good where no waypoint is open any
     more that it can cover in time, or where it will hear no command again. It takes off as soon as
     its pack is in, it takes commands and `is_clear`; but where its last sortie has covered
-    nothing, only once somebody was lost or has landed for good since: what it left to the others
-    may be its own then. Where nobody flies and nobody is going to, all have landed for good.
+    nothing, only once another UAS was lost or has landed for good since: what it left to the others
+    may be its own then. Where none flies or is going to, all have landed for good.
 
     Args:
         arena: The arena.
