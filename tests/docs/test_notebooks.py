@@ -125,13 +125,12 @@ def test_the_cells_of_a_notebook_run_one_after_the_other(path, tmp_path, monkeyp
     cut_short(notebook, path.stem)
     names = {"__name__": "lesson"}
     for cell in code_cells(notebook):
-        *statements, last = ast.parse(cell.source.replace(INLINE, "")).body
-        exec(compile(ast.Module(statements, []), cell.id, "exec"), names)
-        if not isinstance(last, ast.Expr):
-            exec(compile(ast.Module([last], []), cell.id, "exec"), names)
-        elif isinstance(
-            shown := eval(compile(ast.Expression(last.value), cell.id, "eval"), names), Figure
-        ):
-            drawn.append(shown)
-            shown.canvas.draw()
+        statements = ast.parse(cell.source.replace(INLINE, ""))
+        shown = statements.body.pop() if isinstance(statements.body[-1], ast.Expr) else None
+        exec(compile(statements, cell.id, "exec"), names)
+        if isinstance(shown, ast.Expr):
+            value = eval(compile(ast.Expression(shown.value), cell.id, "eval"), names)
+            if isinstance(value, Figure):
+                value.canvas.draw()
+                drawn.append(value)
     assert len(drawn) >= 3
