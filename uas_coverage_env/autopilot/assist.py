@@ -1,4 +1,4 @@
-"""Who helps to fly: return mode, guidance and safety filter, each compiled by itself.
+"""What helps to fly: return mode, guidance and safety filter, each compiled by itself.
 
 The assistants are more code than all the rest of a step, so a step does not contain them: it is
 given their addresses. What is not requested is not compiled.

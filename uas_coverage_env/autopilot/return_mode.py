@@ -84,7 +84,7 @@ def has_to_return(arena, state, i):
 
 @kernel
 def call_home(arena, state, nonlinear, outcome):
-    """Call those home who have to return; they fly home from then on.
+    """Call those home that have to return; they fly home from then on.
 
     Args:
         arena: The arena.

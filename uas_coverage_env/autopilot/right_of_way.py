@@ -3,9 +3,9 @@
 A UAS that only waits until the others let it pass may wait until its battery is empty. So the UAS
 decide in a fixed order, those on their way home first, by index; and each of these claims the way
 that it would fly if no other UAS were there: its command held for some seconds, then braking. Those
-who decide later keep out of the claimed ways as well as they safely can (`safety`); those who are
-on their way home themselves only out of that of one who is held up. A claim is no
-obstacle: no UAS gives up its room for braking because of it.
+that decide later keep out of the claimed ways as well as they safely can (`safety`); those that are
+on their way home themselves only out of that of one that is held up. A claim is no obstacle: no UAS
+gives up its room for braking because of it.
 """
 
 from uas_coverage_env.autopilot.evasion import LINGERING
@@ -23,7 +23,7 @@ command home is not quite the one that was claimed."""
 
 @kernel
 def decision_order(state, order):
-    """Who decides when.
+    """The order in which UAS decide.
 
     Args:
         state: The state.

@@ -46,7 +46,7 @@ class Compilations:
     """What a process compiles for Python, one kernel after the other.
 
     Attributes:
-        listener: Who is told once the process has spent more than PATIENCE_S.
+        listener: Told once the process has spent more than PATIENCE_S.
         n_compiled: Kernels compiled so far, each of its parts counted.
     """
 

@@ -1,7 +1,7 @@
 """Disturbances in a step: their kernels are called at their addresses, and so compiled alone.
 
-What calls them is called at an address, too: the step of those who fly in still air stays as short
-as it was.
+What calls them is called at an address, too: the step in still air stays as short as it
+was.
 """
 
 import math

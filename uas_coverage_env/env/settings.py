@@ -1,6 +1,6 @@
 """How missions are flown and paid: what every environment can be told, in one record."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, get_args
 
@@ -108,17 +108,22 @@ class MissionSettings:
             object.__setattr__(self, "disturbances", checked_disturbances(self.disturbances))
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "MissionSettings":
+    def of(cls, given: Mapping[str, Any], beside: Sequence[str] = ()) -> "MissionSettings":
         """The settings of keyword arguments.
+
+        Args:
+            given: Name -> value.
+            beside: Other keyword arguments of the function that takes them, for its error.
 
         Raises:
             ValueError: There is no such setting, or a value is none of what is allowed.
         """
         known = [field.name for field in fields(cls)]
+        taken = ", ".join((*beside, *known))
         for name in given:
             if name not in known:
                 raise UnknownArgumentError(
-                    f"unexpected keyword argument {name!r}; there are {', '.join(known)}"
+                    f"unexpected keyword argument {name!r}; there are {taken}"
                 )
         named = given.get("observation")
         if isinstance(named, str):

@@ -138,7 +138,8 @@ def evaluate(
         InputError: Unknown scenario or planner, or the planner refuses a mission.
         ValueError: A setting is wrong, there is no seed, or an action is not of the action space.
     """
-    source, made = MissionSource.of(scenario), MissionSettings.of(settings)
+    source = MissionSource.of(scenario)
+    made = MissionSettings.of(settings, beside=("seeds", "swarm_of", "on_episode"))
     if isinstance(player, str):
         player = load_planner(player)
     planner: Any = player

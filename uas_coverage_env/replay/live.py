@@ -19,7 +19,7 @@ _COST = 4.0
 """So many times as long as the last picture took to make passes until the next one is made."""
 
 _WATCHED_S = 3.0
-"""Who has not asked for so long has gone; at the end it is waited for the others so long."""
+"""A page that has not asked for so long has gone; at the end the others are waited for so long."""
 
 
 class LivePage:

@@ -269,7 +269,7 @@ def advance(arena, state, commands, nonlinear, assistants, disturbances, outcome
         state: The state; written in place.
         commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
         nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
-        assistants: Who helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
+        assistants: What helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
         disturbances: `DisturbanceCode` of those in the arena; None, where there are none or they
             are those of the package: no call of an address is compiled then.
         outcome: (U,) of OUTCOME_DTYPE; written.
@@ -302,7 +302,7 @@ def step_world(at, commands, nonlinear, assistants, outcome):
         at: Addresses of arena and state, see `MISSION`, then of the disturbances.
         commands: See `advance`, also the next three.
         nonlinear: Whether.
-        assistants: Who helps to fly.
+        assistants: What helps to fly.
         outcome: Written.
 
     Returns:

@@ -261,7 +261,7 @@ class World:
             if isinstance(obstacle, NoFlyZone):
                 uncovered &= hull.signed_distance(positions_m) >= 0.0
         if len(uncovered) > len(state.uncovered):
-            # who was called home because nothing was left may have something to do now
+            # one that was called home because nothing was left may have something to do now
             state.returning[:] = False
         self._state = state._replace(uncovered=uncovered)
         self.revisions += 1

@@ -1,7 +1,7 @@
 """The attitude of a body whose tilts are on axes that do not turn, for what draws and looks.
 
-A state says pitch, then roll, then the turn about the body's own axis (`layout`); everybody else
-says yaw, then pitch, then roll.
+A state says pitch, then roll, then the turn about the body's own axis (`layout`); others
+say yaw, then pitch, then roll.
 """
 
 import numpy as np

@@ -22,7 +22,7 @@ def planners_of(names: str) -> list[str]:
     """The planners of `--baselines`.
 
     Args:
-        names: With commas; `none` for nobody.
+        names: With commas; `none` for none.
 
     Raises:
         InputError: There is no such planner.
@@ -47,7 +47,7 @@ def fly_baselines(
         planners: Their names; they fly with their default options and assistants.
         scenarios: Those of the learning curve.
         directory: Of the training.
-        say: Told what is flown, and who cannot fly these missions.
+        say: Told what is flown, and which cannot fly these missions.
     """
     for name in planners:
         folder = directory / BASELINES / re.sub(r"[/:\\]", "-", name)

@@ -69,7 +69,7 @@ def train(
         str,
         typer.Option(
             metavar="NAME,...",
-            help="Planners whose flights stand beside the learning curve; `none` for nobody.",
+            help="Planners whose flights stand beside the learning curve; `none` for none.",
         ),
     ] = "nearest-waypoint,trajectory",
     overwrite: Annotated[

@@ -75,7 +75,7 @@ class LegPilot:
 
     @property
     def returns(self) -> NDArray[np.bool_]:
-        """(U,) who has been called home for its charge."""
+        """(U,) called home for its charge."""
         return self._returns
 
     def commands(self, swarm: SwarmState, routes: Sequence[Sequence[int]]) -> Mapping[str, Command]:

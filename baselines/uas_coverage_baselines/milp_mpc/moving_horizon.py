@@ -71,7 +71,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         """The waypoint that a UAS flies to, `world.HOME`, or None where it is to none of them."""
 
     def waits_for(self) -> Set[int]:
-        """Waypoints that moving obstacles block now: who waits for them is at no standstill."""
+        """Waypoints that moving obstacles block now: waiting for them is no standstill."""
         return frozenset()
 
     def rehearsal(self) -> Self:

@@ -66,7 +66,7 @@ class SearchEffort:
 
 @dataclass(frozen=True)
 class Routes:
-    """Who visits what.
+    """Which UAS visits what.
 
     Attributes:
         routes: (U) waypoints of each UAS in the order of their visit.

@@ -1,4 +1,4 @@
-"""Who covers what: the order of the swarm, searched before take-off and again on events."""
+"""Which UAS covers what: the order of the swarm, searched before take-off and again on events."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ class Schedule:
         work_s = self._legs_left(view)[view.may_work]
         opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0
         open_ = view.uncovered.copy()
-        if view.may_work.any():  # what nobody can cover is no reason to search again
+        if view.may_work.any():  # what no UAS can cover is no reason to search again
             open_ &= self._can_cover[view.may_work].any(axis=0)
         return RoutingTask.of(
             self.legs,

@@ -1,4 +1,4 @@
-"""The whole mission, the same for all UAS but for who is who: for central critics and planners."""
+"""The whole mission, the same for all UAS but for their order: for central critics and planners."""
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag

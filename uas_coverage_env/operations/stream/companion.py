@@ -229,7 +229,7 @@ class Companion:
                 yield link, self._plans[name]
 
     def _allowed_rate(self, now_s: float) -> tuple[float, str]:
-        """How fast plan time may pass, 1 for as fast as time, and who keeps it from passing."""
+        """How fast plan time may pass, 1 for as fast as time, and what keeps it from passing."""
         rate, why = 1.0, ""
         for link, plan in self._flown():
             if link.heard_s is None or now_s - link.heard_s > self._options.silent_s:
@@ -252,7 +252,7 @@ class Companion:
             if at_end:
                 self._landing.add(link.name)
                 link.set_mode(LAND)
-            elif link.mode == GUIDED:  # who has been taken over by a pilot is left alone
+            elif link.mode == GUIDED:  # one that a pilot has taken over is left alone
                 link.go(plan.place_m(self.plan_s), rate * plan.velocity_mps(self.plan_s))
         for name in self._landing:
             link = self._links[name]
