@@ -88,7 +88,9 @@ def test_commands_do_not_depend_on_what_lies_behind_the_arrays_in_memory(town):
     view = WorldView(MissionBrief.of(town))
     tube_m = view.arena.tube_m
     policy = load_policy(SHIPPED)
-    flight = layers_of(policy.description.network.flight, policy.tensors, "flight.")
+    network = policy.description.network
+    assert isinstance(network, RouteNetworks)
+    flight = layers_of(network.flight, policy.tensors, "flight.")
 
     def commands(behind_m):
         memory = np.full(tube_m.size + 100, behind_m)

@@ -213,7 +213,10 @@ def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
 
 def test_who_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes, nothing_for_b):
     out = backup_trajectory(problem, by_nodes, 1.0)
-    plan = planned(decide(problem, None, 1.0, BY_TEAM, backup=out))
+    # of b alone: with one of a, which plan is the cheaper one depends on the solver's
+    of_b = {key: getattr(out, key)[1:] for key in ("names", "x", "u", "covers")}
+    backup = dataclasses.replace(out, **of_b)
+    plan = planned(decide(problem, None, 1.0, BY_TEAM, backup=backup))
     assert plan.x[1] == pytest.approx(out.x[1, :8])
     assert first_trouble(problem, plan) is None
 

@@ -90,4 +90,5 @@ class LegMission:
             weight=self._weight,
             budget_s=left_s,
             landing_s=_LANDING_S,
+            stops=True,
         )
