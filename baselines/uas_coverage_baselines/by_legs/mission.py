@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class LegMission:
         open_ = swarm.uncovered.copy()
         if works.any():
             open_ &= brief.can_cover[works].any(axis=0)
-        return RoutingTask.of(
+        task = RoutingTask.of(
             terrain,
             x,
             works,
@@ -90,5 +91,5 @@ class LegMission:
             weight=self._weight,
             budget_s=left_s,
             landing_s=_LANDING_S,
-            stops=True,
         )
+        return replace(task, turn_of_cosine=terrain.legs.turn_of_cosine)  # it stops at corners

@@ -77,9 +77,8 @@ class RoutingTask:
         stretch: float = 1.0,
         speed_share: float = 1.0,
         barred: BoolArray | None = None,
-        stops: bool = False,
     ) -> RoutingTask:
-        """The routing problem of UAS where they are.
+        """The routing problem of UAS where they are, whose flights cut through waypoints.
 
         Args:
             legs: Leg times; with `Terrain`, the shorter of the ways over and round obstacles.
@@ -93,7 +92,6 @@ class RoutingTask:
             stretch: How much longer legs take than their times say.
             speed_share: Share of the cruising speed that is flown.
             barred: (U, W) which UAS must not visit which waypoint; None: any may.
-            stops: Whether a UAS stops at corners, as an autopilot does that flies legs.
         """
         own = legs.legs if isinstance(legs, Terrain) else legs
         position_m = x[:, :3]
@@ -118,7 +116,6 @@ class RoutingTask:
             weight=weight,
             not_before_s=np.zeros(n_waypoints) if not_before_s is None else not_before_s,
             budget_s=np.where(may_work, budget_s, -np.inf),
-            turn_of_cosine=own.turn_of_cosine if stops else None,
             barred=barred,
         )
 
