@@ -28,16 +28,21 @@ def can_cover(arena, i, w):
 
 
 @inlined_kernel
+def speed_of(x):
+    """Magnitude of the velocity of a state [m/s]."""
+    return math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
+
+
+@inlined_kernel
 def _is_as_asked(arena, i, w, x):
     """Whether UAS i covers waypoint w from where it is: with its sensor, height and speed."""
     waypoint = arena.waypoints[w]
     if not waypoint.asks:
         return True
-    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
     return (
         can_cover(arena, i, w)
         and waypoint.lowest_m <= -x[Z] <= waypoint.highest_m
-        and speed_mps <= waypoint.max_speed_mps
+        and speed_of(x) <= waypoint.max_speed_mps
     )
 
 
@@ -93,6 +98,16 @@ def cover(arena, state, outcome):
 
 
 @inlined_kernel
+def away_from_home_m(uas, x):
+    """Distance of a state from the start of a UAS, a record of the arena [m]."""
+    home_m = uas.home_m
+    dx = x[X] - home_m[0]
+    dy = x[Y] - home_m[1]
+    dz = x[Z] - home_m[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@inlined_kernel
 def land(arena, state, outcome):
     """Land the UAS that are slow and near their starts, and have left before or return.
 
@@ -102,16 +117,8 @@ def land(arena, state, outcome):
     for i in range(state.status.shape[0]):
         if state.status[i] != FLYING or outcome[i].contact != NONE:
             continue
-        home_m = arena.uas[i].home_m
-        dx = state.x[i, X] - home_m[0]
-        dy = state.x[i, Y] - home_m[1]
-        dz = state.x[i, Z] - home_m[2]
-        away = math.sqrt(dx * dx + dy * dy + dz * dz) > rules.landing_distance_m
-        vx = state.x[i, VX]
-        vy = state.x[i, VY]
-        vz = state.x[i, VZ]
-        slow = math.sqrt(vx * vx + vy * vy + vz * vz) < rules.landing_speed_mps
-        if away:
+        slow = speed_of(state.x[i]) < rules.landing_speed_mps
+        if away_from_home_m(arena.uas[i], state.x[i]) > rules.landing_distance_m:
             state.departed[i] = True
         elif slow and (state.departed[i] or outcome[i].returning):
             state.status[i] = LANDED

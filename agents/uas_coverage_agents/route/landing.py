@@ -7,8 +7,9 @@ import numpy as np
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import VELOCITY
+from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
 _LANDING_SHARE = 0.9
 """Of the distance and the speed at which a UAS has landed."""
@@ -44,12 +45,9 @@ def _cautious_mps(uas, x):
 @allocating_kernel
 def is_landed(uas, rules, x):
     """Whether a UAS is near and slow enough to land."""
-    away_m = math.hypot(x[X] - uas.home_m[0], x[Y] - uas.home_m[1])
-    away_m = math.hypot(away_m, x[Z] - uas.home_m[2])
-    now_mps = math.hypot(math.hypot(x[VX], x[VY]), x[VZ])
     return (
-        away_m < _LANDING_SHARE * rules.landing_distance_m
-        and now_mps < _LANDING_SHARE * rules.landing_speed_mps
+        away_from_home_m(uas, x) < _LANDING_SHARE * rules.landing_distance_m
+        and speed_of(x) < _LANDING_SHARE * rules.landing_speed_mps
     )
 
 
