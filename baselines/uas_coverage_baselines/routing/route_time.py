@@ -28,6 +28,8 @@ class RoutingArrays(NamedTuple):
     turn: FloatArray
     opens: FloatArray
     """(U, W) from when on each UAS may visit."""
+    opens_late: NDArray[np.bool_]
+    """(W,) not at any time by every UAS."""
     budget: FloatArray
     left_out_s: FloatArray
     neighbours: NDArray[np.int64]
@@ -112,12 +114,6 @@ def sums_of(task, n_uas, width):
 
 
 @allocating_kernel
-def opens_late(task, waypoint):
-    """Whether a waypoint may not be visited at any time by every UAS."""
-    return task.opens[:, waypoint].max() > 0.0
-
-
-@allocating_kernel
 def sum_up(task, sums, u, route, length):
     """Write the sums of one route."""
     place, kind = task.place, task.kind[u]
@@ -127,7 +123,7 @@ def sum_up(task, sums, u, route, length):
     legs, back, turns = 0.0, 0.0, 0.0
     for k in range(length):
         here = route[k]
-        if opens_late(task, here):
+        if task.opens_late[here]:
             late += 1
         if k > 0:
             legs += task.between[kind, before, here]

@@ -17,7 +17,6 @@ from uas_coverage_baselines.routing.route_time import (
     RoutingArrays,
     add_piece,
     joined,
-    opens_late,
     pieces_s,
     route_s,
     sum_up,
@@ -166,6 +165,7 @@ def _opens_s(task: RoutingTask) -> FloatArray:
 def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
     turning = _TURN_OF_COSINE if task.turn_of_cosine is None else task.turn_of_cosine
     place = np.vstack([task.waypoints_m[:, :2], task.position_m, task.start_m])
+    opens_s = _opens_s(task)
     return RoutingArrays(
         first=task.first_s,
         between=task.between_s,
@@ -177,7 +177,8 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         speed=task.speed_mps,
         acceleration=task.acceleration_mps2,
         turn=task.turn_s,
-        opens=_opens_s(task),
+        opens=opens_s,
+        opens_late=(opens_s > 0.0).any(axis=0),
         budget=task.budget_s,
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
@@ -218,7 +219,7 @@ def _insert_missing(task, routes, lengths, missing, total_weight, by_pieces):
         while routes[n_uas, k] != waypoint:
             k += 1
         for u in range(n_uas):
-            quick = by_pieces and sums.late[u] == 0 and not opens_late(task, waypoint)
+            quick = by_pieces and sums.late[u] == 0 and not task.opens_late[waypoint]
             for at in range(lengths[u] + 1):
                 n = add_piece(pieces, 0, u, 0, at - 1, 0)
                 n = add_piece(pieces, n, n_uas, k, k, 0)
