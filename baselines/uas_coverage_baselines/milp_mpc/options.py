@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
+from uas_coverage_baselines.margins import MarginM, MovingMarginM
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named
 from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.solvers import solver_named
@@ -39,18 +40,8 @@ class OcpOptions(PlannerOptions):
     horizon: int = Field(default=18, ge=8, le=60, description="N, steps of the prediction")
     obstacle_sides: int = Field(default=8, ge=4, le=32, multiple_of=2, description="H_O")
     waypoint_sides: int = Field(default=4, ge=4, le=16, multiple_of=4, description="H_WP")
-    margin_m: float = Field(
-        default=0.3,
-        ge=0.0,
-        le=10.0,
-        description="added to every clearance, for the path between samples",
-    )
-    moving_margin_m: float = Field(
-        default=3.0,
-        ge=0.0,
-        le=50.0,
-        description="added for a moving obstacle's next change of velocity",
-    )
+    margin_m: MarginM = 0.3
+    moving_margin_m: MovingMarginM = 3.0
     moving_acceleration_mps2: float = Field(
         default=0.0,
         ge=0.0,

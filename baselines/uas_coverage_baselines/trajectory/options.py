@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from uas_coverage_baselines.margins import MarginM, MovingMarginM
 from uas_coverage_env.flight import PlannerOptions
 
 
@@ -37,18 +38,8 @@ class TrajectoryOptions(PlannerOptions):
         le=1.0,
         description="of the largest horizontal speed: so fast is flown at most",
     )
-    margin_m: float = Field(
-        default=0.3,
-        ge=0.0,
-        le=10.0,
-        description="added to every clearance, for the path between samples",
-    )
-    moving_margin_m: float = Field(
-        default=3.0,
-        ge=0.0,
-        le=50.0,
-        description="added for a moving obstacle's next change of velocity",
-    )
+    margin_m: MarginM = 0.3
+    moving_margin_m: MovingMarginM = 3.0
     threads: int = Field(
         default=2,
         ge=1,
