@@ -96,7 +96,7 @@ def write(notebook: Path) -> None:
 
 
 def _save(png: bytes, path: Path) -> None:
-    """A picture of its most frequent colours: a fraction of the size, which nobody sees.
+    """A picture of its most frequent colours: a fraction of the size, without a visible difference.
 
     Those of Pillow's own palettes are means, so that areas change and thin lines take the colours
     of others.

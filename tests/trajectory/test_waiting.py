@@ -1,4 +1,4 @@
-"""A waypoint that is blocked nobody knows how long: who waits for it, and until when."""
+"""A waypoint that is blocked for an unknown time: which UAS waits for it, and until when."""
 
 import numpy as np
 import pytest
@@ -93,6 +93,6 @@ def test_who_can_wait_until_the_mission_ends_may_wait_wherever_its_home_is():
     assert 60 < both.latest[PARKED_ON] < 120
 
 
-def test_nobody_waits_where_the_charge_lasts_for_the_way_home_only():
+def test_no_uas_waits_where_the_charge_lasts_for_the_way_home_only():
     given_up = waiting((0.28, 0.27))
     assert given_up.latest[PARKED_ON] < 0

@@ -161,7 +161,7 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "steps": flight.steps,
         "energy_Wh": float(energy_Wh(flight).sum()),
         **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
-        # where nobody swaps packs on its own, the file is as it was before that could be
+        # where no UAS swaps packs on its own, the file is as it was before that could be
         **({"packs": packs_used(flight), "swaps": _swaps(flight)} if flight.swaps else {}),
         # a record from before rewards were kept stays as it was
         **({"return": episode_return(flight)} if flight.reward_terms is not None else {}),

@@ -1,4 +1,4 @@
-"""Who waits for a waypoint that is blocked, nobody knows for how long, and until when."""
+"""Which UAS waits for a waypoint that is blocked for an unknown time, and until when."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_env.mission import Range
 from uas_coverage_env.vehicle import DOD
 
-_AS_LONG_S = 10.0  # who can wait nearly as long as another may do so, too
+_AS_LONG_S = 10.0  # a UAS that can wait nearly as long as another may do so, too
 _TOO_LATE_S = 12.0  # before a UAS has to set off home: then it no longer waits
 
 
 class Waiting(NamedTuple):
-    """Who could wait for what is blocked, and when it is visited at the latest.
+    """Which UAS could wait for what is blocked, and when it is visited at the latest.
 
     Attributes:
         barred: (U, W) UAS that must not be the ones to wait: another one could wait longer.
-        latest: (W,) steps from now; negative where nobody can wait any longer.
+        latest: (W,) steps from now; negative where no UAS can wait any longer.
     """
 
     barred: NDArray[np.bool_]
@@ -46,13 +46,13 @@ class Waiting(NamedTuple):
 def who_waits(fleet: Fleet, way_home: Range, moment: Moment, blocked: NDArray[np.bool_]) -> Waiting:
     """The UAS that can wait longest, and all whose battery outlasts the mission.
 
-    Were these to fly home while another one waits, nobody would be left when its charge runs out.
+    Were these to fly home while another one waits, none would be left when its charge runs out.
 
     Args:
         fleet: The mission.
         way_home: Of its UAS.
         moment: From where.
-        blocked: (W,) for nobody knows how long.
+        blocked: (W,) for an unknown time.
     """
     brief, x = fleet.brief, moment.x
     there = np.flatnonzero(blocked)
