@@ -178,7 +178,7 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         acceleration=task.acceleration_mps2,
         turn=task.turn_s,
         opens=opens_s,
-        opens_late=(opens_s > 0.0).any(axis=0),
+        opens_late=np.any(opens_s > 0.0, axis=0),
         budget=task.budget_s,
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
