@@ -282,6 +282,26 @@ def test_the_end_of_a_watched_flight_is_shown_until_the_flight_was_told_of(monke
     assert pygame.display.get_surface() is None
 
 
+@pytest.mark.parametrize("display", [True, False])
+def test_what_an_event_adds_is_in_the_window_or_on_the_map_of_letters(
+    display, monkeypatch, request
+):
+    if display:
+        pytest.importorskip("pygame")
+        monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    else:
+        request.getfixturevalue("no_display")
+    added: Any = {
+        "kind": "waypoint_added", "at_s": 1.0, "position_m": (30.0, 30.0, -20.0), "radius_m": 6.0,
+    }  # fmt: skip
+    scenario = load_scenario("open_field").model_copy(update={"events": (added,)})
+    planner = load_planner("hover")
+    with shown(terminal(), scenario, watch=planner) as on_step:
+        flight = rollout(scenario, planner, max_steps=3, on_step=on_step)
+    assert flight.steps == 3
+    assert flight.open_waypoints == len(scenario.waypoints) + 1
+
+
 def test_a_flight_goes_on_where_a_person_closes_the_window(monkeypatch):
     pygame = pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")

@@ -2,8 +2,10 @@
 
 import csv
 import dataclasses
+import itertools
 import subprocess
 import time
+from typing import Any
 
 import imageio_ffmpeg
 import numpy as np
@@ -23,8 +25,9 @@ from PIL import Image
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
+from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight import SceneHistory, load_planner, rollout
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.scenario import generate_scenario
@@ -90,14 +93,15 @@ def test_the_uas_with_least_to_spare_is_one_click_away(browser, swarm_page):
     assert card.text.split()[0] == "17"
 
 
-def test_the_area_in_reach_is_drawn_for_who_is_followed_and_shrinks(browser, flight, tmp_path):
+def test_the_area_in_reach_of_the_uas_that_is_followed_shrinks(browser, flight, tmp_path):
     pictures = []
-    spare = way_home(flight).least_spare[0][1]
+    spare = way_home(flight, SceneHistory.of(flight)).least_spare[0][1]
     for left in (-0.01, 0.007, 0.011):
         x = flight.x.copy()
         x[:, 0, DOD] += spare - left
         page = write_replay([dataclasses.replace(flight, x=x)], tmp_path / "replay.html")
-        k = way_home(dataclasses.replace(flight, x=x)).least_spare[0][0]
+        discharged = dataclasses.replace(flight, x=x)
+        k = way_home(discharged, SceneHistory.of(discharged)).least_spare[0][0]
         opened(browser, page, DESKTOP, moment=f"#view=map&t={k}&follow=1")
         pictures.append(pixels(browser, ".stage"))
     nothing, small, large = pictures
@@ -203,3 +207,29 @@ def frames(film, width, height):
     decoded = subprocess.run(decoder, capture_output=True, check=True)
     assert f"{width}x{height}" in decoded.stderr.decode()
     return np.frombuffer(decoded.stdout, np.uint8).reshape(-1, height, width, 3)
+
+
+@pytest.mark.parametrize("view", ["map", "3d"])
+def test_what_events_add_and_drop_is_shown_from_its_time_on(browser, view, tmp_path):
+    shed = box("shed", (60.0, 60.0, -30.0), (140.0, 140.0, 0.0))
+    events: Any = (
+        {"kind": "obstacle_added", "at_s": 2.0, **shed},
+        {"kind": "waypoint_dropped", "at_s": 4.0, "waypoint": 0},
+        {"kind": "home_closed", "at_s": 6.0, "uas": "uas_1", "alternative_m": (20.0, 20.0, -1.0)},
+    )
+    starts_m = ((20.0, 180.0, -1.0),)
+    scenario = meadow(starts_m, waypoints=[waypoint((180.0, y, -20.0)) for y in (40.0, 160.0)])
+    flight = rollout(scenario.model_copy(update={"events": events}), "hover", max_steps=8)
+    # nothing moves, so that only what events change makes another picture
+    flight = dataclasses.replace(flight, x=np.repeat(flight.x[:1], len(flight.x), axis=0))
+    page = write_replay([flight], tmp_path / "replay.html")
+    pictures = []
+    for t in (0.0, 1.0, 3.0, 5.0, 7.0):
+        opened(browser, page, moment=f"#view={view}&t={t}")
+        pictures.append(pixels(browser, ".stage"))
+    changed = [(a != b).any(axis=2).mean() for a, b in itertools.pairwise(pictures)]
+    still, shed_stands, dropped, home_moved = changed
+    assert still == 0.0
+    assert shed_stands > 0.02 > dropped > 1e-4
+    assert home_moved > 1e-4
+    assert "0 of 1 waypoints" in browser.find_element(By.TAG_NAME, "header").text

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import SceneHistory, load_planner, rollout
 from uas_coverage_env.flight.record import PLAN_DTYPE
 from uas_coverage_env.replay import replay_page, write_replay
 from uas_coverage_env.replay.flight_data import flight_data
@@ -158,7 +159,8 @@ def test_one_or_two_flights_make_a_page(flight, plain):
     "scenario", [load_scenario("village"), generate_scenario(4)], ids=lambda s: s.name
 )
 def test_bodies_are_closed_and_seen_from_outside(scenario):
-    scene = scene_data(scenario)
+    flight = rollout(scenario, load_planner("hover"), max_steps=1)
+    scene = scene_data(SceneHistory.of(flight))
     for body in (scene["fence"], *scene["obstacles"]):
         corners = np.array(body["corners"])
         triangles = corners[np.array(body["triangles"])]

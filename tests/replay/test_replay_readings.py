@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow
 
-from uas_coverage_env.flight import DecisionRecord, load_planner, rollout
+from uas_coverage_env.flight import DecisionRecord, SceneHistory, load_planner, rollout
 from uas_coverage_env.flight.record import EventRecord
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay.flight_data import flight_data
@@ -39,7 +39,7 @@ def test_the_point_of_no_return_is_where_nothing_is_left_beyond_the_way_home(dis
     spare = [range_.spare_dod(1, x) for x in discharged.x[:, 1]]
     first = next(k for k, left in enumerate(spare) if left <= 0.0)
     assert 5 < first < discharged.steps, "of a flight that shows something"
-    home = way_home(discharged)
+    home = way_home(discharged, SceneHistory.of(discharged))
     assert home.no_return == (None, first)
     sample, least = home.least_spare[1]
     assert least == pytest.approx(min(spare[:-1]))
@@ -50,13 +50,13 @@ def test_the_point_of_no_return_is_where_nothing_is_left_beyond_the_way_home(dis
 
 
 def test_a_flight_that_keeps_its_reserve_has_no_point_of_no_return(plain):
-    assert way_home(plain).no_return == (None, None)
+    assert way_home(plain, SceneHistory.of(plain)).no_return == (None, None)
     assert marks(plain, "no return") == []
 
 
 def test_room_and_the_recorded_clearance_are_of_the_same_obstacles(plain):
     scenario = plain.scenario
-    found = rooms(plain)
+    found = rooms(plain, SceneHistory.of(plain))
     nearest = min(
         found[kind][0][:, i].min() + scenario.uas[i].radius_m + obstacle.safe_distance_m
         for kind, obstacle in (
@@ -84,7 +84,7 @@ def test_a_breach_is_a_mark_with_what_was_too_near(plain):
     radius_m = plain.scenario.uas[1].radius_m
     beside[0] = corners[:, 0].min() - radius_m - tower.safe_distance_m + short_m
     near = moved(plain, beside, slice(20, 24))
-    room_m, _ = rooms(near)["obstacles"]
+    room_m, _ = rooms(near, SceneHistory.of(near))["obstacles"]
     assert room_m[20:24, 1] == pytest.approx(-short_m)
     (mark,) = marks(near, "breach")
     assert (mark["t_s"], mark["until_s"]) == (20.0, 23.0)
@@ -104,7 +104,7 @@ def test_two_uas_that_meet_and_one_at_the_fence_are_marked(plain):
 
 
 def test_what_is_far_or_ended_is_shown_as_far(plain):
-    for room_m, which in rooms(plain).values():
+    for room_m, which in rooms(plain, SceneHistory.of(plain)).values():
         assert room_m.max() <= FAR_M
         assert (room_m[which < 0] == FAR_M).all()
 
@@ -123,7 +123,7 @@ def over_a_house():
 def test_a_roof_is_told_from_the_ground(over_a_house):
     over, beside = (70.0, 70.0, -12.0), (90.0, 70.0, -12.0)
     flight = moved(moved(over_a_house, over, [2], uas=0), beside, [2], uas=1)
-    assert floors_m(flight)[2].tolist() == [8.0, 0.0]
+    assert floors_m(flight, SceneHistory.of(flight))[2].tolist() == [8.0, 0.0]
 
 
 def test_too_low_over_a_roof_is_a_breach_of_the_least_height(over_a_house):

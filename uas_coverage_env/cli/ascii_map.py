@@ -29,6 +29,11 @@ class AsciiMap:
         self._low_m = corners_m.min(axis=0)
         self._span_m = np.ptp(corners_m, axis=0)
         self._shape = _shape(self._span_m[0] / self._span_m[1], columns, rows)
+        self.change(scenario)
+
+    def change(self, scenario: Scenario) -> None:
+        """Draw this scenario from now on, which has the same fence."""
+        self._scenario = scenario
         self._waypoints_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
         self._ground = np.full(self._shape, " ")
         centres_m = self._centres_m()
@@ -37,6 +42,11 @@ class AsciiMap:
                 [centres_m, np.full((*self._shape, 1), hull.vertices_m[:, 2].mean())], axis=2
             )
             self._ground[hull.signed_distance(points_m) <= 0.0] = "#"
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is drawn."""
+        return self._scenario
 
     def drawn(self, swarm: SwarmState) -> Text:
         """The map at one sample."""

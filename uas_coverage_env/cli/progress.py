@@ -94,7 +94,12 @@ def _lines(out: Console, ascii_map: AsciiMap | None) -> Iterator[Callable[[Progr
                 compiling.close()
                 live.start()
             line = Spinner("dots", progress_line(progress))
-            live.update(line if ascii_map is None else Group(ascii_map.drawn(progress.swarm), line))
+            if ascii_map is None:
+                live.update(line)
+                return
+            if ascii_map.scenario is not progress.scenario:  # an event has changed it
+                ascii_map.change(progress.scenario)
+            live.update(Group(ascii_map.drawn(progress.swarm), line))
 
         yield update
 

@@ -30,7 +30,7 @@ class FlightWindow:
         self._path_m: list[NDArray[np.float64]] = []
         self._window = Window(scenario.name, _FPS)
         self._window.open((_SIZE_PX, _SIZE_PX))
-        self._picture = Picture(scenario, size_px=_SIZE_PX)
+        self._scenario, self._picture = scenario, Picture(scenario, size_px=_SIZE_PX)
 
     def __call__(self, progress: Progress) -> None:
         """Show where the flight stands; waits while a person has paused it."""
@@ -38,6 +38,9 @@ class FlightWindow:
         self._path_m.append(swarm.x[:, :3].copy())
         if self._window.dismissed:
             return
+        if progress.scenario is not self._scenario:  # an event has changed it
+            self._scenario = progress.scenario
+            self._picture = Picture(progress.scenario, size_px=_SIZE_PX)
         # before the first decision it is that of another flight
         decided = progress.decision_time_s is not None
         decision = getattr(self._planner, "last_decision", None) if decided else None

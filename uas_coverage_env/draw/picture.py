@@ -70,7 +70,7 @@ class Picture:
             )
         self._scenario = scenario
         self._frame = frame = Frame.around(scenario.fence.vertices_m, int(size_px))
-        positions_m = np.array([point.position_m for point in scenario.waypoints])
+        positions_m = np.array([point.position_m for point in scenario.waypoints]).reshape(-1, 3)
         self._waypoints = frame.pixels(positions_m).tolist()
         weights = [point.weight for point in scenario.waypoints]
         self._heavy = [weight > min(weights) for weight in weights]

@@ -38,6 +38,7 @@ from uas_coverage_env.flight.registry import (
 )
 from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.flight.rollout import Progress, rollout
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.flight.seen import (
     SeenGround,
     SeenPictures,
@@ -65,6 +66,7 @@ __all__ = [
     "PlannerOptions",
     "Policy",
     "Progress",
+    "SceneHistory",
     "SeenGround",
     "SeenPictures",
     "Swap",

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LANDED, LIMIT, LOST, EventRecord, FlightRecord, Violation
+from uas_coverage_env.flight.record import LANDED, LIMIT, EventRecord, FlightRecord, Violation
+from uas_coverage_env.flight.scene_history import covered_since
 from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH
 from uas_coverage_env.vehicle.vertical_flight import VerticalFlight
-from uas_coverage_env.world.coverage import covering_samples
 
 _J_PER_WH = 3600.0
 
@@ -35,14 +35,12 @@ def open_waypoints(flight: FlightRecord) -> int:
 
 
 def covered_at(flight: FlightRecord) -> NDArray[np.int64]:
-    """(W,) the sample in which each waypoint was covered; T (one past the last) where never."""
-    alive = flight.mode < LOST
-    result = np.full(len(flight.scenario.waypoints), len(flight.x))
-    for w in range(len(result)):
-        within = (covering_samples(flight.scenario, w, flight.x) & alive).any(axis=1)
-        if within.any():
-            result[w] = within.argmax()
-    return result
+    """(W,) the sample in which each waypoint was covered; T (one past the last) where never.
+
+    Of the waypoints that the flight began with; `SceneHistory` has those that events added, too.
+    """
+    since = np.zeros(len(flight.scenario.waypoints), np.int64)
+    return covered_since(flight, flight.scenario, since)
 
 
 def energy_Wh(flight: FlightRecord) -> NDArray[np.float64]:

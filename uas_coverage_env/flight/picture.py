@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import Picture, legend
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.metrics import covered_at
 from uas_coverage_env.flight.record import LANDED, LOST
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.world import FLYING, SwarmState
 from uas_coverage_env.world import LANDED as HAS_LANDED
 from uas_coverage_env.world import LOST as IS_LOST
@@ -55,14 +55,19 @@ def flight_pictures(
     Yields:
         (size_px, size_px, 3) red, green, blue.
     """
-    pictures = Picture(flight.scenario, size_px=size_px)
-    covered = covered_at(flight)
+    history = SceneHistory.of(flight)
+    scenario, _ = history.scene_at(0)
+    pictures = Picture(scenario, size_px=size_px)
     for now in steps:
+        present, there = history.scene_at(now)
+        if present is not scenario:
+            scenario, pictures = present, Picture(present, size_px=size_px)
+        moving_m = history.moving_m(now)
         yield pictures.draw(
-            _swarm(flight, now, uncovered=covered > now),
+            _swarm(flight, now, history.covered_at[there] > now, history.home_m[now], moving_m[-1]),
             paths_m=flight.x[: now + 1, :, 0:3],
             planned_m=_planned(flight, now),
-            moving_paths_m=flight.moving_position_m[: now + 1],
+            moving_paths_m=moving_m,
         )
 
 
@@ -71,19 +76,20 @@ def draw_flight(flight: Flight, path: str | Path, step: int | None = None) -> No
     from PIL import Image
 
     now = flight.steps if step is None else step
-    pixels = np.vstack(
-        [flight_picture(flight, step), legend(flight.scenario, _signs(flight, now), _SIZE_PX)]
-    )
+    history = SceneHistory.of(flight)
+    scenario, there = history.scene_at(now)
+    signs = _signs(flight, now, history.covered_at[there] <= now, history.moving_m(now))
+    pixels = np.vstack([flight_picture(flight, step), legend(scenario, signs, _SIZE_PX)])
     content = BytesIO()
     Image.fromarray(pixels).save(content, format="png")
     write_atomically(Path(path), content.getvalue())
 
 
-def _signs(flight: Flight, now: int) -> set[str]:
+def _signs(
+    flight: Flight, now: int, covered: NDArray[np.bool_], moving_m: NDArray[np.float64]
+) -> set[str]:
     """Which signs of the legend are on the picture of a sample."""
-    covered = covered_at(flight) <= now
     weights = {point.weight for point in flight.scenario.waypoints}
-    moving_m = flight.moving_position_m[: now + 1]
     mode = flight.mode[now]
     there = {
         "open": not covered.all(),
@@ -102,7 +108,13 @@ def _signs(flight: Flight, now: int) -> set[str]:
     return {sign for sign, is_there in there.items() if is_there}
 
 
-def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState:
+def _swarm(
+    flight: Flight,
+    now: int,
+    uncovered: NDArray[np.bool_],
+    home_m: NDArray[np.float64],
+    moving_m: NDArray[np.float64],
+) -> SwarmState:
     status = np.full(len(flight.names), FLYING)
     status[flight.mode[now] == LANDED] = HAS_LANDED
     status[flight.mode[now] == LOST] = IS_LOST
@@ -116,9 +128,9 @@ def _swarm(flight: Flight, now: int, uncovered: NDArray[np.bool_]) -> SwarmState
         departed=np.zeros(len(status), dtype=np.bool_),
         returning=np.zeros(len(status), dtype=np.bool_),
         uncovered=uncovered,
-        home_m=flight.x[0, :, 0:3],
-        moving_position_m=flight.moving_position_m[now],
-        moving_velocity_mps=np.zeros_like(flight.moving_position_m[now]),
+        home_m=home_m,
+        moving_position_m=moving_m,
+        moving_velocity_mps=np.zeros_like(moving_m),
         responds=np.ones(len(status), dtype=np.bool_),
     )
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord
-from uas_coverage_env.scenario import MovingObstacle, NoFlyZone, Scenario
-from uas_coverage_env.world.coverage import covering_samples
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.scenario import MovingObstacle, Scenario
 
 _LONGEST_NAME = 64
 
@@ -31,7 +31,8 @@ def rest_of(flight: FlightRecord, *, from_here: bool = False, name: str | None =
         InputError: Nothing is left to cover, no UAS is left, or the rest cannot be flown.
     """
     began = flight.scenario
-    known, open_ = _scene(flight)
+    history = SceneHistory.of(flight)
+    known, open_ = history.scenario, history.open_at_end
     if not open_.any():
         raise InputError(f"the flight of {began.name!r} has covered everything; nothing is left")
     alive = np.flatnonzero(flight.mode[-1] != LOST)
@@ -90,37 +91,3 @@ def _from_then(
         ),
     ]
     return data
-
-
-def _scene(flight: FlightRecord) -> tuple[Scenario, NDArray[np.bool_]]:
-    """The scenario as events have left it, and (W,) which of its waypoints are open."""
-    known = flight.scenario
-    since = [0] * len(known.waypoints)
-    dropped: set[int] = set()
-    names = flight.names
-    for record in flight.events:
-        event = flight.scenario.events[record.event]
-        effect = event.effect()
-        if effect.name == "drop":
-            dropped.add(int(effect.values[0]))
-        if event.changes_scene:
-            uas = names.index(record.uas) if record.uas in names else 0
-            known = known.after(event, record.time_s, uas)
-            sample = round(record.time_s / known.dt_s)
-            since += [sample] * (len(known.waypoints) - len(since))
-    centres_m = np.array([waypoint.position_m for waypoint in known.waypoints])
-    open_ = np.array(
-        [
-            w not in dropped and not _covered(flight, known, w, since[w])
-            for w in range(len(known.waypoints))
-        ]
-    )
-    for obstacle, hull in zip(known.obstacles, known.hulls, strict=True):
-        if isinstance(obstacle, NoFlyZone):  # what lies in it is not asked for any more
-            open_ &= hull.signed_distance(centres_m) >= 0.0
-    return known, open_
-
-
-def _covered(flight: FlightRecord, known: Scenario, w: int, since: int) -> bool:
-    covers = covering_samples(known, w, flight.x[since:])
-    return bool((covers & (flight.mode[since:] < LOST)).any())

@@ -40,6 +40,7 @@ class Progress:
         covered: Waypoints so far.
         decision_time_s: Of the last decision [s]; None before the first.
         flown: Makes a `Flight` of what has been flown so far.
+        scenario: As events have left it.
     """
 
     swarm: SwarmState
@@ -47,6 +48,7 @@ class Progress:
     covered: int
     decision_time_s: float | None
     flown: Callable[[], Flight]
+    scenario: Scenario
 
 
 def rollout(
@@ -142,7 +144,7 @@ def rollout(
 
     def tell(swarm: SwarmState, decision_time_s: float | None) -> None:
         if on_step is not None:
-            on_step(Progress(swarm, limit, log.covered, decision_time_s, flown))
+            on_step(Progress(swarm, limit, log.covered, decision_time_s, flown, world.known))
 
     ended = "stopped"
     with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid

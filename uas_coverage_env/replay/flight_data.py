@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, covered_at, seen_pictures, summary
+from uas_coverage_env.flight import MODES, Flight, SceneHistory, seen_pictures, summary
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.mark_data import marks
 from uas_coverage_env.replay.reach_data import reach
@@ -42,7 +42,7 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
     Raises:
         InputError: A value of the flight is not finite, so that it has no place in a picture.
     """
-    outcome = summary(flight)
+    outcome, history = summary(flight), SceneHistory.of(flight)
     durations_s = np.array([decision.duration_s for decision in flight.decisions])
     series = {
         "position": (flight.x[..., 0:3], POSITION_M),
@@ -50,41 +50,53 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "soc": (1.0 - flight.x[..., DOD], SOC),
         "voltage": (flight.voltage_V, VOLTAGE_V),
         "current": (flight.current_A, CURRENT_A),
-        "moving": (flight.moving_position_m, POSITION_M),
+        "moving": (history.moving_position_m, POSITION_M),
         "duration": (durations_s, DURATION_S),
     }
     flown = {name: _series(values, unit, name, source) for name, (values, unit) in series.items()}
     # of values that are finite, as is known now
-    home, room = way_home(flight), rooms(flight)
+    home, room = way_home(flight, history), rooms(flight, history)
     return {
         "planner": flight.planner,
         "seed": flight.seed,
         "dynamics": flight.dynamics,
         "dt_s": flight.scenario.dt_s,
         "samples": len(flight.x),
-        "scene": scene_data(flight.scenario),
+        "scene": scene_data(history),
         **flown,
         "needed": _series(home.needed_soc, SOC, "charge for the way home", source),
-        "floor": _series(floors_m(flight), FLOOR_M, "roofs", source),
+        "floor": _series(floors_m(flight, history), FLOOR_M, "roofs", source),
         "modes": list(MODES),
         "mode": flight.mode.ravel().tolist(),
         "last": flight.last_sample.tolist(),
         "covered": flight.covered.tolist(),
-        "covered_at": covered_at(flight).tolist(),
+        "covered_at": history.covered_at.tolist(),
         "fallbacks": [k for k, decision in enumerate(flight.decisions) if decision.fallback],
         "plan": {"unit": PLAN_M, "steps": _plan(flight, source)},
-        "reach": _reach(flight.scenario, source),
+        "reach": _reaches(history, source),
         "seen": _seen(flight, source),
         "room": {kind: _series(room_m, ROOM_M, kind, source) for kind, (room_m, _) in room.items()},
         "min_height_m": flight.scenario.min_height_m,
         "no_return": list(home.no_return),
         "least_spare": [[sample, round(spare, 4)] for sample, spare in home.least_spare],
-        "marks": marks(flight, room, home),
+        "marks": marks(flight, history, room, home),
         "violations": outcome["violations"],
         "summary": {
             key: outcome[key] for key in ("coverage", "steps", "energy_Wh", "all_home", "breaches")
         },
     }
+
+
+def _reaches(history: SceneHistory, source: str) -> list[dict[str, Any]]:
+    """One for each scene with other obstacles or homes, with the sample from which it holds."""
+    found: list[dict[str, Any]] = []
+    before = None
+    for since, scenario in history.changes:
+        what_matters = (scenario.obstacles, scenario.uas)
+        if what_matters != before:
+            before = what_matters
+            found.append({"from": since, **_reach(scenario, source)})
+    return found
 
 
 def _reach(scenario: Scenario, source: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight import Flight, SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.vehicle import DOD
 
@@ -31,15 +31,18 @@ class WayHome:
     no_return: tuple[int | None, ...]
 
 
-def way_home(flight: Flight) -> WayHome:
-    """The way home at every sample of a flight."""
-    range_ = Range(MissionBrief.of(flight.scenario))
+def way_home(flight: Flight, history: SceneHistory) -> WayHome:
+    """The way home at every sample of a flight, among the obstacles that there are, to its home."""
+    began = [since for since, _ in history.changes]
+    ranges = [Range(MissionBrief.of(scenario)) for _, scenario in history.changes]
+    present = np.searchsorted(began, np.arange(len(flight.x)), side="right") - 1
     lowest_soc = np.array([1.0 - uas.dod_max for uas in flight.scenario.uas])
     needed = np.tile(lowest_soc, (len(flight.x), 1))
     least: list[tuple[int, float]] = []
     no_return: list[int | None] = []
     for i, last in enumerate(flight.last_sample):
-        spare = np.array([range_.spare_dod(i, x) for x in flight.x[: last + 1, i]])
+        states = zip(present.tolist(), flight.x[: last + 1, i], strict=False)
+        spare = np.array([ranges[scene].spare_dod(i, x) for scene, x in states])
         # on the ground nothing is needed
         rests = flight.resting[: last + 1, i]
         spare[rests] = 1.0 - flight.x[: last + 1, i, DOD][rests] - lowest_soc[i]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight import Flight, SceneHistory
 from uas_coverage_env.replay.home_data import WayHome
 from uas_coverage_env.replay.safety_data import (
     FENCE,
@@ -16,6 +16,7 @@ from uas_coverage_env.replay.safety_data import (
     OTHERS,
     Nearest,
 )
+from uas_coverage_env.scenario import Scenario
 
 LARGE_GAP = 0.05
 """A decision that was solved to a larger gap than this is marked."""
@@ -24,14 +25,16 @@ _TOLERANCE_M = 1e-6
 _Reason = tuple[str, str]  # what is said, and of whom
 
 
-def marks(flight: Flight, rooms: dict[str, Nearest], home: WayHome) -> list[dict[str, Any]]:
+def marks(
+    flight: Flight, history: SceneHistory, rooms: dict[str, Nearest], home: WayHome
+) -> list[dict[str, Any]]:
     """Breaches, points of no return, fallbacks, large gaps and events and swaps, in order of time.
 
     What lasts is one mark: `t_s`, `until_s`, `kind`, `uas` (None: of no one in particular) and
     `text`. Contacts and limits are not among them: the page has them as violations.
     """
     found = [
-        *_breaches(flight, rooms),
+        *_breaches(flight, history.scenario, rooms),
         *_no_returns(flight, home),
         *_fallbacks(flight),
         *_gaps(flight),
@@ -54,14 +57,16 @@ def _mark(
     }
 
 
-def _breaches(flight: Flight, rooms: dict[str, Nearest]) -> Iterator[dict[str, Any]]:
+def _breaches(
+    flight: Flight, scenario: Scenario, rooms: dict[str, Nearest]
+) -> Iterator[dict[str, Any]]:
     for kind, (room_m, which) in rooms.items():
         for i, name in enumerate(flight.names):
             near = room_m[:, i] < -_TOLERANCE_M
             near[0] = False  # where a mission begins is given
             for first, last in _runs(np.where(near, which[:, i], -1).tolist()):
                 worst_m = -float(room_m[first : last + 1, i].min())
-                partner = _partner(flight, kind, int(which[first, i]))
+                partner = _partner(scenario, kind, int(which[first, i]))
                 if kind == HEIGHT:
                     text = f"{name}: {worst_m:.2f} m below the least height"
                 else:
@@ -69,8 +74,7 @@ def _breaches(flight: Flight, rooms: dict[str, Nearest]) -> Iterator[dict[str, A
                 yield _mark(flight, first, last, "breach", text, name)
 
 
-def _partner(flight: Flight, kind: str, index: int) -> str:
-    scenario = flight.scenario
+def _partner(scenario: Scenario, kind: str, index: int) -> str:
     if kind == FENCE:
         return "the fence"
     if kind == HEIGHT:

@@ -6,7 +6,7 @@ Distances are those by which flights are judged (docs/rules.md), at the samples.
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight import MODES, Flight, SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 
 FAR_M = 50.0
@@ -24,17 +24,21 @@ FloatArray = NDArray[np.float64]
 Nearest = tuple[FloatArray, NDArray[np.int64]]
 
 
-def rooms(flight: Flight) -> dict[str, Nearest]:
+def rooms(flight: Flight, history: SceneHistory) -> dict[str, Nearest]:
     """Room beyond the safe distance of what is nearest, by kind; of kinds that there are.
+
+    Args:
+        flight: The flight.
+        history: Its scenes: only what is there at a sample counts.
 
     Returns:
         Kind -> ((T, U) [m], negative where it is a breach, at most `FAR_M`, which is also where a
         UAS does not fly; (T, U) index of what is nearest, -1: of nothing).
     """
-    scenario = flight.scenario
-    at_m = flight.x[..., :3]
+    scenario = history.scenario
+    at_m, samples = flight.x[..., :3], np.arange(len(flight.x))[:, None]
     radii_m = np.array([uas.radius_m for uas in scenario.uas])
-    flies = np.arange(len(at_m))[:, None] <= flight.last_sample
+    flies = samples <= flight.last_sample
     flies &= (flight.mode < MODES.index("landed")) & ~flight.resting
     found: dict[str, Nearest] = {}
 
@@ -45,20 +49,30 @@ def rooms(flight: Flight) -> dict[str, Nearest]:
     add(
         OBSTACLES,
         [
-            hull.signed_distance(at_m) - radii_m - obstacle.safe_distance_m
-            for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+            np.where(
+                samples >= since,
+                hull.signed_distance(at_m) - radii_m - obstacle.safe_distance_m,
+                np.inf,
+            )
+            for obstacle, hull, since in zip(
+                scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
+            )
         ],
     )
     add(
         MOVING,
         [
-            _outside(
-                at_m - flight.moving_position_m[:, None, m],
-                obstacle.radius_m,
-                obstacle.height_m / 2.0,
+            np.where(
+                samples >= history.moving_from[m],
+                _outside(
+                    at_m - history.moving_position_m[:, None, m],
+                    obstacle.radius_m,
+                    obstacle.height_m / 2.0,
+                )
+                - radii_m
+                - obstacle.safe_distance_m,
+                np.inf,
             )
-            - radii_m
-            - obstacle.safe_distance_m
             for m, obstacle in enumerate(scenario.moving_obstacles)
         ],
     )
@@ -79,20 +93,19 @@ def rooms(flight: Flight) -> dict[str, Nearest]:
         )
     add(FENCE, [-scenario.fence.signed_distance(at_m) - scenario.geofence.margin_m])
     if scenario.min_height_m > 0.0:
-        starts_m = np.array([uas.start_m[:2] for uas in scenario.uas])
-        away_m = np.linalg.norm(at_m[..., :2] - starts_m, axis=-1)
-        low = np.where(away_m <= scenario.landing_zone_m, np.inf, _height_room(flight))
+        away_m = np.linalg.norm(at_m[..., :2] - history.home_m[..., :2], axis=-1)
+        low = np.where(away_m <= scenario.landing_zone_m, np.inf, _height_room(flight, history))
         add(HEIGHT, [low])
     return found
 
 
-def floors_m(flight: Flight) -> FloatArray:
+def floors_m(flight: Flight, history: SceneHistory) -> FloatArray:
     """(T, U) [m] altitude of the highest roof under each UAS, or around it; 0: the ground."""
-    at_m = flight.x[..., :3]
+    at_m, samples = flight.x[..., :3], np.arange(len(flight.x))[:, None]
     floor = np.zeros(at_m.shape[:2])
-    for hull in flight.scenario.hulls:
+    for hull, since in zip(history.scenario.hulls, history.obstacle_from, strict=True):
         bottom, top = _column(hull, at_m[..., :2])
-        over = (bottom <= top) & (bottom <= -at_m[..., 2])
+        over = (samples >= since) & (bottom <= top) & (bottom <= -at_m[..., 2])
         floor = np.where(over, np.maximum(floor, top), floor)
     return floor
 
@@ -107,13 +120,14 @@ def _column(hull: ConvexPolytope, at_m: FloatArray) -> tuple[FloatArray, FloatAr
     return np.where(outside, np.inf, bottom), np.where(outside, -np.inf, top)
 
 
-def _height_room(flight: Flight) -> FloatArray:
+def _height_room(flight: Flight, history: SceneHistory) -> FloatArray:
     """(T, U) [m] height above ground or roof, beyond the least height."""
     least_m, at_m = flight.scenario.min_height_m, flight.x[..., :3]
     room = -at_m[..., 2] - least_m
-    for hull in flight.scenario.hulls:
+    for hull, since in zip(history.scenario.hulls, history.obstacle_from, strict=True):
         raised_m = least_m * np.maximum(0.0, -hull.normals[:, 2])
-        room = np.minimum(room, (hull.face_distances(at_m) - raised_m).max(axis=-1))
+        above_m = (hull.face_distances(at_m[since:]) - raised_m).max(axis=-1)
+        room[since:] = np.minimum(room[since:], above_m)
     return room
 
 

@@ -7,17 +7,20 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.flight import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.replay.outline import outline_of
-from uas_coverage_env.scenario import Scenario
 
 
-def scene_data(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data: lengths in metres, NED, rounded to centimetres.
+def scene_data(history: SceneHistory) -> dict[str, Any]:
+    """The scenes of a flight as plain data: lengths in metres, NED, rounded to centimetres.
 
     Bodies come as `corners` (V, 3), `triangles` (K, 3 corners each, seen from outside in the order
     of the clock's reverse in a right-handed frame) and `outline` (C, 2), the hull seen from above.
+    What events add has the sample `from` which it is there; what they drop, `until` when.
     """
+    scenario = history.scenario
+    never = len(history.moving_position_m)
     lightest = min(waypoint.weight for waypoint in scenario.waypoints)
     return {
         "name": scenario.name,
@@ -27,9 +30,12 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
                 "name": obstacle.name,
                 "kind": obstacle.kind or "",
                 "colour": hex_colour(colours.of_obstacle(obstacle.kind)),
+                "from": int(since),
                 **_body(hull),
             }
-            for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+            for obstacle, hull, since in zip(
+                scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
+            )
         ],
         "decorations": [
             {
@@ -44,8 +50,12 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
                 "at": _metres(np.array(waypoint.position_m)),
                 "radius": waypoint.radius_m,
                 "heavy": waypoint.weight > lightest,
+                "from": int(since),
+                "until": int(until) if until < never else None,
             }
-            for waypoint in scenario.waypoints
+            for waypoint, since, until in zip(
+                scenario.waypoints, history.waypoint_from, history.waypoint_until, strict=True
+            )
         ],
         "moving": [
             {
@@ -54,19 +64,27 @@ def scene_data(scenario: Scenario) -> dict[str, Any]:
                 "radius": obstacle.radius_m,
                 "height": obstacle.height_m,
                 "safe": obstacle.safe_distance_m,
+                "from": int(since),
             }
-            for obstacle in scenario.moving_obstacles
+            for obstacle, since in zip(scenario.moving_obstacles, history.moving_from, strict=True)
         ],
         "uas": [
             {
                 "name": uas.name,
                 "colour": hex_colour(colours.UAS[i % len(colours.UAS)]),
-                "start": _metres(np.array(uas.start_m)),
+                "homes": _homes(history, i),
                 "lowest_soc": round(1.0 - uas.dod_max, 4),
             }
             for i, uas in enumerate(scenario.uas)
         ],
     }
+
+
+def _homes(history: SceneHistory, i: int) -> list[dict[str, Any]]:
+    """Where a UAS is to land, and from which sample on."""
+    homes_m = [(since, scenario.uas[i].start_m) for since, scenario in history.changes]
+    moved = [k for k in range(len(homes_m)) if k == 0 or homes_m[k][1] != homes_m[k - 1][1]]
+    return [{"from": homes_m[k][0], "at": _metres(np.array(homes_m[k][1]))} for k in moved]
 
 
 def _body(hull: ConvexPolytope) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """The fields of a scenario together; see `Scenario`."""
 
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Self
 
@@ -118,8 +119,19 @@ class UncheckedScenario(StrictModel):
             time_s: When it happens [s].
             uas: Index of the UAS that it concerns.
         """
+        return self._with(event.revised(self, time_s, uas))
+
+    def with_waypoints(self, kept: Iterable[int]) -> Self:
+        """The scenario with these of its waypoints only.
+
+        Args:
+            kept: Their numbers, in order; there may be none.
+        """
+        return self._with({"waypoints": tuple(self.waypoints[w] for w in kept)})
+
+    def _with(self, changes: Mapping[str, Any]) -> Self:
         known = {name: getattr(self, name) for name in type(self).model_fields}
-        known |= event.revised(self, time_s, uas)
+        known |= changes
         known["schema"] = known.pop("schema_version")
         # checked when the scenario was read; and a vehicle file may be elsewhere by now
         revised = type(self).model_construct(**known)

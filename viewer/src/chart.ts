@@ -118,7 +118,7 @@ export abstract class TimeCanvas {
     this.drawAt(time);
   }
 
-  /** Say what is to be seen at a time, for those who do not see it. */
+  /** Say what is to be seen at a time, for readers that cannot see it. */
   describe(time: number): void {
     this.canvas.setAttribute("aria-label", `${this.title} at ${time.toFixed(1)} s: ${this.words(time)}`);
   }

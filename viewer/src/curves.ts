@@ -123,7 +123,7 @@ function current(flight: Flight): ChartContent {
 }
 
 function coverage(flight: Flight): ChartContent {
-  const count = flight.scene.waypoints.length;
+  const count = flight.askedFor(flight.data.samples - 1);
   return {
     title: "Waypoints covered",
     lines: [{ label: "", colour: "#009e73", values: flight.data.covered, dash: [] }],

@@ -21,6 +21,14 @@ export interface Obstacle extends Body {
   name: string;
   kind: string;
   colour: string;
+  /** Sample from which it stands: events add some. */
+  from: number;
+}
+
+/** Where a UAS is to land, from a sample on. */
+export interface Home {
+  from: number;
+  at: Point3;
 }
 
 export interface Scene {
@@ -28,9 +36,10 @@ export interface Scene {
   fence: Body;
   obstacles: Obstacle[];
   decorations: { kind: string; colour: string; outline: Point2[] }[];
-  waypoints: { at: Point3; radius: number; heavy: boolean }[];
-  moving: { name: string; kind: string; radius: number; height: number; safe: number }[];
-  uas: { name: string; colour: string; start: Point3; lowest_soc: number }[];
+  /** To be covered from a sample on; `until` when it was dropped, if it was. */
+  waypoints: { at: Point3; radius: number; heavy: boolean; from: number; until: number | null }[];
+  moving: { name: string; kind: string; radius: number; height: number; safe: number; from: number }[];
+  uas: { name: string; colour: string; homes: Home[]; lowest_soc: number }[];
 }
 
 export interface Violation {
@@ -53,6 +62,8 @@ export interface Mark {
 
 /** What reaching a place and coming home from it takes (reach_data.py), on a grid. */
 export interface ReachData {
+  /** Sample from which it holds: until obstacles or homes are others. */
+  from: number;
   /** Low end [m], step [m], count. */
   north: [number, number, number];
   east: [number, number, number];
@@ -90,7 +101,7 @@ export interface FlightData {
   needed: Series;
   /** Altitude of the roof, or the ground, under each UAS. */
   floor: Series;
-  reach: ReachData;
+  reach: ReachData[];
   seen: SeenData[];
   /** Room beyond the safe distances by kind of what is near. */
   room: Record<string, Series>;
@@ -191,7 +202,8 @@ export class Flight {
 
   /** Whether another flight is of the same mission, so that both can be shown in one scene. */
   sameMission(other: Flight): boolean {
-    const told = ({ scene }: Flight) => JSON.stringify([scene.fence, scene.obstacles, scene.waypoints]);
+    const told = ({ scene }: Flight) =>
+      JSON.stringify([scene.fence, scene.obstacles, scene.waypoints.map(({ at, radius }) => [at, radius])]);
     return told(this) === told(other);
   }
 
@@ -241,7 +253,19 @@ export class Flight {
   reach(moment: Moment, i: number): Point3[] {
     const { position, soc, spare, mode } = moment.vehicles[i];
     if (spare <= 0 || mode === "landed" || mode === "lost") return [];
-    return reachable(this.data.reach, i, position, soc);
+    const reach = this.data.reach.filter(({ from }) => from <= moment.sample).at(-1)!;
+    return reachable(reach, i, position, soc);
+  }
+
+  /** How many waypoints are to be covered at a sample, or have been. */
+  askedFor(sample: number): number {
+    return this.scene.waypoints.filter((_, w) => this.asked(w, sample)).length;
+  }
+
+  /** Whether a waypoint is to be covered at a sample, or has been. */
+  asked(w: number, sample: number): boolean {
+    const { from, until } = this.scene.waypoints[w];
+    return from <= sample && (until === null || sample < until);
   }
 
   /** Whether it matters where a UAS had least charge beyond the way home: is it looked at? */
@@ -298,6 +322,11 @@ export class Flight {
     const next = Math.min(sample + 1, this.data.samples - 1);
     return mix(point(series, sample * width + i), point(series, next * width + i), part);
   }
+}
+
+/** Where a UAS is to land at a sample. */
+export function homeAt(homes: Home[], sample: number): Point3 {
+  return homes.filter(({ from }) => from <= sample).at(-1)!.at;
 }
 
 /** A violation in words, without its time. */

@@ -1,7 +1,7 @@
 // The map of one flight on a plain canvas: north up. It is drawn where there is no WebGL, and on
 // request.
 
-import type { Flight, Moment, Point2, Point3 } from "./flight";
+import { type Flight, homeAt, type Moment, type Point2, type Point3 } from "./flight";
 import * as marks from "./marks";
 import { Overlay } from "./overlay";
 import { bright, colour, darker, dim } from "./palette";
@@ -70,6 +70,7 @@ export class MapView implements View {
     pen.fillRect(0, 0, this.canvas.clientWidth, this.canvas.clientHeight);
     this.terrain(moment.sample);
     flight.scene.waypoints.forEach(({ at, radius, heavy }, i) => {
+      if (!flight.asked(i, moment.sample)) return;
       const covered = flight.data.covered_at[i] <= moment.sample;
       const [x, y] = this.pixel(at);
       marks.waypoint(pen, x, y, radius * this.scale, 1, heavy, covered);
@@ -143,11 +144,12 @@ export class MapView implements View {
     }
     pen.globalAlpha = 1;
     for (const obstacle of scene.obstacles) {
+      if (obstacle.from > sample) continue;
       this.polygon(obstacle.outline, dim(obstacle.colour), darker(obstacle.colour, 0.45), 1.2);
     }
     this.polygon(scene.fence.outline, null, colour("--fence"), 1.8);
-    for (const { start, colour: hex } of scene.uas) {
-      const [x, y] = this.pixel(start);
+    for (const { homes, colour: hex } of scene.uas) {
+      const [x, y] = this.pixel(homeAt(homes, sample));
       this.circle(x, y, 5 * this.unit, bright(hex), 1.5);
     }
     this.scaleBar();
@@ -231,7 +233,8 @@ export class MapView implements View {
   private movingObstacles(moment: Moment): void {
     const { pen } = this;
     const red = colour("--discharged");
-    this.flight.scene.moving.forEach(({ name, kind, radius, safe }, i) => {
+    this.flight.scene.moving.forEach(({ name, kind, radius, safe, from }, i) => {
+      if (from > moment.sample) return;
       const [x, y] = this.pixel(moment.moving[i]);
       pen.globalAlpha = 0.75;
       pen.fillStyle = red;

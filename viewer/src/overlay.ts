@@ -70,7 +70,8 @@ export class Overlay {
   }
 
   moving(moment: Moment, unit: number): void {
-    this.flight.scene.moving.forEach(({ name, kind, height }, i) => {
+    this.flight.scene.moving.forEach(({ name, kind, height, from }, i) => {
+      if (from > moment.sample) return;
       const [north, east, down] = moment.moving[i];
       const at = this.project([north, east, down - height / 2]);
       const text = (kind || name).replaceAll("_", " ");

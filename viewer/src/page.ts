@@ -73,7 +73,7 @@ export class Page {
     requestAnimationFrame((now) => this.loop(now));
   }
 
-  /** The flight that is still flown has gone on: who looked at its end goes on with it. */
+  /** The flight that is still flown has gone on: a view of its end moves on with it. */
   renew(renewed: FlightData): void {
     const { clock } = this;
     const atEnd = !clock.playing && clock.time >= clock.duration - 1e-6;

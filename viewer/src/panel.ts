@@ -144,7 +144,7 @@ export class Panel {
     this.say(this.flight.at(time));
   }
 
-  /** For those who do not see the curves. */
+  /** For readers that cannot see the curves. */
   describe(time: number): void {
     for (const chart of this.charts) chart.describe(Math.min(time, this.flight.duration));
   }
@@ -276,7 +276,7 @@ function outcome(flight: Flight): string {
   const count = violations.length;
   const { seed, dynamics } = flight.data;
   return [
-    `${covered.at(-1)} of ${flight.scene.waypoints.length} waypoints`,
+    `${covered.at(-1)} of ${flight.askedFor(flight.data.samples - 1)} waypoints`,
     `${summary.steps} steps`,
     summary.all_home ? "all home" : "not all home",
     `${summary.energy_Wh.toFixed(2)} Wh`,

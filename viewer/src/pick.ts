@@ -30,7 +30,9 @@ export class Picker {
     const [uas, near] = nearest(moment.vehicles.map(({ position }) => away(position)));
     if (near <= NEAR_PX) return { words: "", at: moment.vehicles[uas].position, sample: null, uas };
     const { waypoints } = flight.scene;
-    const [w, far] = nearest(waypoints.map(({ at }) => away(at)));
+    const [w, far] = nearest(
+      waypoints.map(({ at }, w) => (flight.asked(w, moment.sample) ? away(at) : Infinity)),
+    );
     const waypoint = (): Picked => {
       const sample = by[w] === null ? null : flight.data.covered_at[w];
       return { words: waypointWords(flight, w, by), at: waypoints[w].at, sample, uas: by[w] };

@@ -10,7 +10,7 @@ import { MovingObstacles } from "./scene_moving";
 import { Paths } from "./scene_paths";
 import { SeenGround } from "./scene_seen";
 import { place } from "./scene_space";
-import { extentOf, terrain, type Extent } from "./scene_terrain";
+import { extentOf, terrain, type Extent, type Terrain } from "./scene_terrain";
 import { Vehicles } from "./scene_vehicles";
 import { Waypoints } from "./scene_waypoints";
 import { Trail } from "./trail";
@@ -50,6 +50,7 @@ export class SceneView implements View {
   private readonly extent: Extent;
   readonly camera: Camera;
   private scene!: Scene;
+  private terrain!: Terrain;
   private vehicles!: Vehicles;
   private paths!: Paths;
   private waypoints!: Waypoints;
@@ -95,6 +96,7 @@ export class SceneView implements View {
     const size = Math.min(1, Math.max(0.6, Math.min(width, 1.3 * height) / 800));
     const pixel = (size * 2 * Math.tan((lens.fov * Math.PI) / 360)) / height;
     const { zoom } = this.camera;
+    if (this.terrain.at(moment.sample)) this.renderer.shadowMap.needsUpdate = true;
     this.vehicles.draw(moment, pixel, lens.position, focus, zoom);
     this.paths.focus(focus);
     this.paths.draw(moment);
@@ -151,6 +153,7 @@ export class SceneView implements View {
     const { ground, half, centre } = this.extent;
     this.scene = new Scene();
     this.scene.background = new Color(colour("--outside"));
+    this.terrain = terrain(this.flight.scene, this.extent);
     this.vehicles = new Vehicles(this.flight, ground);
     this.paths = new Paths(this.flight, false);
     this.waypoints = new Waypoints(this.flight, ground);
@@ -160,7 +163,7 @@ export class SceneView implements View {
     if (this.ghostPaths) this.scene.add(this.ghostPaths.group);
     this.setTrail(this.trail);
     this.scene.add(
-      terrain(this.flight.scene, this.extent),
+      this.terrain.group,
       this.seen.group,
       this.waypoints.group,
       this.moving.group,

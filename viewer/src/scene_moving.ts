@@ -18,7 +18,7 @@ export class MovingObstacles {
   readonly group = new Group();
   private readonly parts: Group[];
 
-  constructor(flight: Flight) {
+  constructor(private readonly flight: Flight) {
     this.parts = flight.scene.moving.map(({ radius, height, safe }) => {
       const part = new Group();
       const red = colour("--discharged");
@@ -36,7 +36,10 @@ export class MovingObstacles {
   }
 
   draw(moment: Moment): void {
-    this.parts.forEach((part, i) => part.position.copy(place(moment.moving[i])));
+    this.parts.forEach((part, i) => {
+      part.visible = this.flight.scene.moving[i].from <= moment.sample;
+      part.position.copy(place(moment.moving[i]));
+    });
   }
 }
 

@@ -13,6 +13,7 @@ import {
   Matrix4,
   Mesh,
   MeshLambertMaterial,
+  type Object3D,
   PlaneGeometry,
   RingGeometry,
   Shape,
@@ -49,7 +50,14 @@ export function extentOf(scene: Scene): Extent {
   return { centre, half, ground: low.y, corners };
 }
 
-export function terrain(scene: Scene, extent: Extent): Group {
+/** What stands still, and what of it is there at a sample: events add obstacles and move homes. */
+export interface Terrain {
+  group: Group;
+  /** Show what is there; whether that is something else than before. */
+  at(sample: number): boolean;
+}
+
+export function terrain(scene: Scene, extent: Extent): Terrain {
   const group = new Group();
   const { centre, half, ground } = extent;
   // layers on the ground, so far apart that no depth buffer mixes them up
@@ -65,8 +73,19 @@ export function terrain(scene: Scene, extent: Extent): Group {
   for (const item of scene.decorations) {
     group.add(area(item.outline, dim(item.colour), ground + (item.kind === "water" ? 1 : 2) * layer));
   }
-  for (const obstacle of scene.obstacles) group.add(...obstacleParts(obstacle));
-  for (const { start, colour: hex } of scene.uas) group.add(pad(start, hex, ground + 3 * layer, half));
+  const changing: { part: Object3D; from: number; until: number }[] = [];
+  for (const obstacle of scene.obstacles) {
+    const parts = obstacleParts(obstacle);
+    group.add(...parts);
+    for (const part of parts) changing.push({ part, from: obstacle.from, until: Infinity });
+  }
+  for (const { homes, colour: hex } of scene.uas) {
+    homes.forEach(({ from, at }, n) => {
+      const part = pad(at, hex, ground + 3 * layer, half);
+      group.add(part);
+      changing.push({ part, from, until: homes[n + 1]?.from ?? Infinity });
+    });
+  }
   const [south, north] = [Math.min, Math.max].map((pick) => pick(...extent.corners.map((c) => -c.z)));
   const west = Math.min(...extent.corners.map((corner) => corner.x));
   group.add(sign("N", new Vector3(centre.x, ground, -north - 0.09 * half), 0.16 * half));
@@ -74,7 +93,12 @@ export function terrain(scene: Scene, extent: Extent): Group {
   group.add(sign(step, new Vector3(west + 0.5 * roundStep(half / 2), ground, -south + 0.08 * half), 0.26 * half));
   const fence = new EdgesGeometry(bodyGeometry(scene.fence), 1);
   group.add(new LineSegments(fence, new LineBasicMaterial({ color: colour("--fence") })));
-  return group;
+  const at = (sample: number): boolean => {
+    const wrong = changing.filter(({ part, from, until }) => part.visible !== (from <= sample && sample < until));
+    for (const { part } of wrong) part.visible = !part.visible;
+    return wrong.length > 0;
+  };
+  return { group, at };
 }
 
 /** Where a UAS starts and lands. */

@@ -20,14 +20,14 @@ import { place } from "./scene_space";
 
 const VERTEX = `
 attribute vec4 spot; // place, radius
-attribute vec2 kind; // heavy, covered
+attribute vec3 kind; // heavy, covered, shown
 varying vec2 at;
 varying vec2 what;
 void main() {
   at = 2.2 * position.xy;
-  what = kind;
+  what = kind.xy;
   vec4 seen = modelViewMatrix * vec4(spot.xyz, 1.0);
-  seen.xy += at * spot.w;
+  seen.xy += at * spot.w * kind.z;
   gl_Position = projectionMatrix * seen;
 }`;
 
@@ -67,9 +67,10 @@ void main() {
 export class Waypoints {
   readonly group = new Group();
   private readonly kinds: InstancedBufferAttribute;
+  private readonly stalks: Float32BufferAttribute;
   private shownSample = -1;
 
-  constructor(private readonly flight: Flight, ground: number) {
+  constructor(private readonly flight: Flight, private readonly ground: number) {
     const { waypoints } = flight.scene;
     const spots: number[] = [];
     const stalks: number[] = [];
@@ -77,7 +78,7 @@ export class Waypoints {
     for (const { at, radius, heavy } of waypoints) {
       const { x, y, z } = place(at);
       spots.push(x, y, z, radius);
-      kinds.push(Number(heavy), 0);
+      kinds.push(Number(heavy), 0, 1);
       stalks.push(x, y, z, x, ground, z);
     }
     const square = new PlaneGeometry(1, 1);
@@ -85,7 +86,7 @@ export class Waypoints {
     geometry.index = square.index;
     geometry.setAttribute("position", square.getAttribute("position"));
     geometry.setAttribute("spot", new InstancedBufferAttribute(new Float32Array(spots), 4));
-    this.kinds = new InstancedBufferAttribute(new Float32Array(kinds), 2);
+    this.kinds = new InstancedBufferAttribute(new Float32Array(kinds), 3);
     geometry.setAttribute("kind", this.kinds);
     geometry.instanceCount = waypoints.length;
     const ink = (name: string) => ({ value: new Color(colour(name)) });
@@ -101,7 +102,8 @@ export class Waypoints {
     );
     rings.frustumCulled = false;
     const down = new BufferGeometry();
-    down.setAttribute("position", new Float32BufferAttribute(stalks, 3));
+    this.stalks = new Float32BufferAttribute(stalks, 3);
+    down.setAttribute("position", this.stalks);
     const faint = new LineBasicMaterial({ color: colour("--open"), transparent: true, opacity: 0.25 });
     this.group.add(new LineSegments(down, faint), rings);
   }
@@ -110,8 +112,11 @@ export class Waypoints {
     if (moment.sample === this.shownSample) return;
     this.shownSample = moment.sample;
     this.flight.data.covered_at.forEach((sample, w) => {
-      this.kinds.array[2 * w + 1] = Number(sample <= moment.sample);
+      this.kinds.array[3 * w + 1] = Number(sample <= moment.sample);
+      const asked = this.flight.asked(w, moment.sample);
+      this.kinds.array[3 * w + 2] = Number(asked);
+      this.stalks.setY(2 * w, asked ? -this.flight.scene.waypoints[w].at[2] : this.ground);
     });
-    this.kinds.needsUpdate = true;
+    this.kinds.needsUpdate = this.stalks.needsUpdate = true;
   }
 }

@@ -33,6 +33,6 @@ test("flights of other missions are not shown in one scene", () => {
   const flight = new Flight(someFlight());
   const other = someFlight();
   assert.ok(flight.sameMission(new Flight(other)));
-  other.scene.waypoints = [{ at: [1, 2, 3], radius: 4, heavy: false }];
+  other.scene.waypoints = [{ at: [1, 2, 3], radius: 4, heavy: false, from: 0, until: null }];
   assert.ok(!flight.sameMission(new Flight(other)));
 });

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { Flight } from "../src/flight";
+import { Flight, homeAt, type Point3 } from "../src/flight";
 import { someFlight } from "./some_flight";
 
 const near = (found: number[], expected: number[], by = 1e-9) => {
@@ -90,4 +90,24 @@ test("least charge to spare matters where it was little, passed, or is looked at
   assert.equal(flight.nearNoReturn(0, null), true);
   assert.equal(flight.nearNoReturn(1, null), false);
   assert.equal(flight.nearNoReturn(1, 1), true);
+});
+
+test("a waypoint is asked for from when it is added until it is dropped", () => {
+  const data = someFlight();
+  data.scene.waypoints = [
+    { at: [1, 2, -3], radius: 4, heavy: false, from: 0, until: 2 },
+    { at: [9, 2, -3], radius: 4, heavy: false, from: 1, until: null },
+  ];
+  const flight = new Flight(data);
+  assert.deepEqual([0, 1, 2].map((k) => flight.asked(0, k)), [true, true, false]);
+  assert.deepEqual([0, 1, 2].map((k) => flight.asked(1, k)), [false, true, true]);
+  assert.deepEqual([0, 1, 2].map((k) => flight.askedFor(k)), [1, 2, 1]);
+});
+
+test("home is where it was last moved to", () => {
+  const homes = [
+    { from: 0, at: [0, 0, 0] as Point3 },
+    { from: 2, at: [5, 0, 0] as Point3 },
+  ];
+  assert.deepEqual([0, 1, 2, 7].map((k) => homeAt(homes, k)[0]), [0, 0, 5, 5]);
 });

@@ -10,8 +10,8 @@ import { someFlight } from "./some_flight";
 function flown(): Flight {
   const data = someFlight();
   data.scene.waypoints = [
-    { at: [1, 2, -3.2], radius: 4, heavy: false },
-    { at: [40, 40, -3], radius: 4, heavy: false },
+    { at: [1, 2, -3.2], radius: 4, heavy: false, from: 0, until: null },
+    { at: [40, 40, -3], radius: 4, heavy: false, from: 0, until: null },
   ];
   data.covered_at = [1, 3];
   return new Flight(data);

@@ -14,6 +14,7 @@ function around(): ReachData {
     }
   }
   return {
+    from: 0,
     north: [-200, 10, 41],
     east: [-200, 10, 41],
     height: 15,

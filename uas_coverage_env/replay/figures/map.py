@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.labels import free_place
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, SeenGround, covered_at, seen_ground
+from uas_coverage_env.flight import MODES, Flight, SceneHistory, SeenGround, seen_ground
 from uas_coverage_env.replay.figures.map_legend import LANDED, LOST, SEEN_ALPHA, legend_of
 from uas_coverage_env.replay.figures.style import (
     columns_of,
@@ -23,11 +23,15 @@ from uas_coverage_env.replay.figures.style import (
     width_in,
 )
 from uas_coverage_env.replay.outline import outline_of
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import PSI
 
 _LEGEND_IN = 0.2
 _LEGEND_ROW_IN = 0.175
 _LABEL_PT = 6.5
+_NAME_PT = 8.0
+_LETTER = 0.62  # width of a letter for its height
+_NAME_ROWS = (0, -1, 1, -2, 2, -3, 3)
 _TITLE_PER_IN = 13  # letters that fit
 _PT_PER_IN = 72.0
 
@@ -45,11 +49,15 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
     now = flight.steps if step is None else step
     if not 0 <= now <= flight.steps:
         raise InputError(f"--step is {step}; the flight has samples 0 to {flight.steps}")
-    fence = flight.scenario.fence.vertices_m
+    history = SceneHistory.of(flight)
+    scenario, there = history.scene_at(now)
+    covered = history.covered_at[there] <= now
+    moving_m = history.moving_m(now)
+    fence = scenario.fence.vertices_m
     low, high = fence.min(axis=0), fence.max(axis=0)
     with printed():
         seen = seen_ground(flight, now)
-        legend = legend_of(flight, seen, now)
+        legend = legend_of(flight, scenario, moving_m, seen, now)
         columns = columns_of(max(len(str(entry.get_label())) for entry in legend), 6)
         legend_in = _LEGEND_IN + _LEGEND_ROW_IN * -(-len(legend) // columns)
         height_in = width_in() * float((high[0] - low[0]) / (high[1] - low[1]))
@@ -64,19 +72,21 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         axes.grid(visible=False)
         # the fence is the frame
         axes.spines[["left", "bottom"]].set_visible(False)
-        _terrain(axes, flight)
+        _terrain(axes, scenario)
         _seen_ground(axes, seen)
-        _waypoints(axes, flight, now)
-        _heights(axes, flight, float((high - low)[1]) / (width_in() * _PT_PER_IN))
+        _waypoints(axes, scenario, covered)
+        _heights(axes, scenario, float((high - low)[1]) / (width_in() * _PT_PER_IN))
         _north(figure, axes)
-        _moving_obstacles(axes, flight, now)
-        for i in range(len(flight.names)):
-            _uas(axes, flight, now, i)
+        _moving_obstacles(axes, scenario, moving_m)
+        pt_per_m = width_in() * _PT_PER_IN / float((high - low)[1])
+        sides = _sides_of_names(axes, flight, now, pt_per_m)
+        for i, side in enumerate(sides):
+            _uas(axes, flight, now, i, side)
         _violations(axes, flight, now)
         title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s:"
-        covered = f"{flight.covered[now]} of {len(flight.scenario.waypoints)} waypoints"
-        wide = len(title) + len(covered) < _TITLE_PER_IN * width_in()
-        title += f"{' ' if wide else chr(10)}{covered}"
+        count = f"{flight.covered[now]} of {len(scenario.waypoints)} waypoints"
+        wide = len(title) + len(count) < _TITLE_PER_IN * width_in()
+        title += f"{' ' if wide else chr(10)}{count}"
         axes.set_title(title, fontsize=9, parse_math=False)
         figure.legend(handles=legend, loc="outside lower center", ncols=columns, columnspacing=1.2)
     return figure
@@ -87,8 +97,7 @@ def _flat(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
     return points_m[..., [1, 0]]
 
 
-def _terrain(axes: Axes, flight: Flight) -> None:
-    scenario = flight.scenario
+def _terrain(axes: Axes, scenario: Scenario) -> None:
     fence = _flat(outline_of(scenario.fence))
     axes.add_patch(Polygon(fence, facecolor=shade(colours.GROUND), edgecolor="none"))
     for item in scenario.decorations:
@@ -116,10 +125,9 @@ def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
             )
 
 
-def _waypoints(axes: Axes, flight: Flight, now: int) -> None:
-    covered = covered_at(flight) <= now
-    lightest = min(waypoint.weight for waypoint in flight.scenario.waypoints)
-    for waypoint, done in zip(flight.scenario.waypoints, covered, strict=True):
+def _waypoints(axes: Axes, scenario: Scenario, covered: NDArray[np.bool_]) -> None:
+    lightest = min((waypoint.weight for waypoint in scenario.waypoints), default=1.0)
+    for waypoint, done in zip(scenario.waypoints, covered, strict=True):
         x, y = waypoint.position_m[1], waypoint.position_m[0]
         edge = shade(colours.COVERED_EDGE if done else colours.INK)
         # a ring in a ring counts more
@@ -132,14 +140,14 @@ def _waypoints(axes: Axes, flight: Flight, now: int) -> None:
             axes.plot(x, y, marker="$✓$", color=edge, markersize=6, markeredgewidth=0)
 
 
-def _heights(axes: Axes, flight: Flight, m_per_pt: float) -> None:
+def _heights(axes: Axes, scenario: Scenario, m_per_pt: float) -> None:
     """How high the obstacles are, where no waypoint lies over the words."""
     discs_m = np.array(
-        [(*_flat(np.array(w.position_m[:2])), w.radius_m) for w in flight.scenario.waypoints]
-    )
-    for obstacle, hull in zip(flight.scenario.obstacles, flight.scenario.hulls, strict=True):
+        [(*_flat(np.array(w.position_m[:2])), w.radius_m) for w in scenario.waypoints]
+    ).reshape(-1, 3)
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
         words = f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
-        box_m = m_per_pt * _LABEL_PT * np.array([0.62 * len(words), 1.1])
+        box_m = m_per_pt * _LABEL_PT * np.array([_LETTER * len(words), 1.1])
         place = free_place(_flat(outline_of(hull)), box_m, discs_m)
         if place is not None:
             tint = colours.of_obstacle(obstacle.kind)
@@ -162,10 +170,10 @@ def _north(figure: Figure, axes: Axes) -> None:
     axes.plot(1.0, 1.0, marker="^", ms=5, color=shade(colours.INK), transform=corner, clip_on=False)
 
 
-def _moving_obstacles(axes: Axes, flight: Flight, now: int) -> None:
+def _moving_obstacles(axes: Axes, scenario: Scenario, moving_m: NDArray[np.float64]) -> None:
     """Where they are, and a thin line where they have been."""
-    for m, obstacle in enumerate(flight.scenario.moving_obstacles):
-        been = _flat(flight.moving_position_m[: now + 1, m])
+    for m, obstacle in enumerate(scenario.moving_obstacles):
+        been = _flat(moving_m[:, m])
         axes.plot(been[:, 0], been[:, 1], color=shade(colours.RED), linewidth=0.7)
         x, y = been[-1].tolist()
         red = shade(colours.RED)
@@ -174,7 +182,39 @@ def _moving_obstacles(axes: Axes, flight: Flight, now: int) -> None:
         axes.add_patch(Circle((x, y), kept_m, fill=False, edgecolor=red, linestyle="--", lw=0.8))
 
 
-def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
+def _sides_of_names(
+    axes: Axes, flight: Flight, now: int, pt_per_m: float
+) -> list[tuple[float, float]]:
+    """Where the name of each UAS stands, from its mark [pt]: no name lies on another."""
+    taken: list[tuple[float, float, float, float]] = []
+    sides: list[tuple[float, float]] = []
+    for i, name in enumerate(flight.names):
+        east, north = _flat(flight.x[min(now, int(flight.last_sample[i])), i, :3]).tolist()
+        # where there is no room to the right, the name stands to the left
+        crowded = east > np.dot(axes.get_xlim(), (0.12, 0.88))
+        width = _LETTER * _NAME_PT * len(name)
+        beside = -9.0 if crowded else 9.0
+        left = pt_per_m * east + beside - (width if crowded else 0.0)
+        rows = [6.0 + 1.2 * _NAME_PT * row for row in _NAME_ROWS]
+        boxes = [(left, pt_per_m * north + up, width, _NAME_PT) for up in rows]
+        free = (k for k, box in enumerate(boxes) if not any(_overlap(box, it) for it in taken))
+        chosen = next(free, 0)
+        taken.append(boxes[chosen])
+        sides.append((beside, rows[chosen]))
+    return sides
+
+
+def _overlap(
+    box: tuple[float, float, float, float], other: tuple[float, float, float, float]
+) -> bool:
+    """Whether two boxes, each left, bottom, width, height, have a place in common."""
+    return all(
+        box[axis] < other[axis] + other[axis + 2] and other[axis] < box[axis] + box[axis + 2]
+        for axis in (0, 1)
+    )
+
+
+def _uas(axes: Axes, flight: Flight, now: int, i: int, side: tuple[float, float]) -> None:
     colour = uas_colour(i)
     until = min(now, int(flight.last_sample[i]))
     path = _flat(flight.x[: until + 1, i, :3])
@@ -194,16 +234,14 @@ def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
         _charge_ring(axes, (x, y), float(flight.soc[now, i]))
         heading = float(np.degrees(flight.x[now, i, PSI]))
         axes.plot(x, y, marker=(4, 2, 45 - heading), color=shade(colours.INK), markersize=7)
-    # where there is no room to the right, the name stands to the left
-    crowded = x > np.dot(axes.get_xlim(), (0.12, 0.88))
     axes.annotate(
         flight.names[i],
         (x, y),
-        xytext=(-9 if crowded else 9, 6),
+        xytext=side,
         textcoords="offset points",
-        ha="right" if crowded else "left",
+        ha="right" if side[0] < 0.0 else "left",
         color=colour,
-        fontsize=8,
+        fontsize=_NAME_PT,
         fontweight="bold",
         path_effects=[withStroke(linewidth=2, foreground="white")],
     )

@@ -7,11 +7,13 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.legend import decoration_kinds, in_words, obstacle_kinds
 from uas_coverage_env.flight import MODES, Flight, SeenGround
 from uas_coverage_env.replay.figures.style import shade, uas_colour
+from uas_coverage_env.scenario import Scenario
 
 SEEN_ALPHA = 0.4
 LOST: Mapping[str, Any] = {
@@ -25,15 +27,23 @@ LANDED: Mapping[str, Any] = {"marker": "o", "ls": "", "mec": "white", "ms": 6}
 _RING = {"marker": "o", "linestyle": "", "mfc": "none", "markersize": 8}
 
 
-def legend_of(flight: Flight, seen: Sequence[SeenGround], now: int) -> list[Artist]:
+def legend_of(
+    flight: Flight,
+    scenario: Scenario,
+    moving_m: NDArray[np.float64],
+    seen: Sequence[SeenGround],
+    now: int,
+) -> list[Artist]:
     """The entries of the legend of a map.
 
     Args:
         flight: Whose map it is.
+        scenario: As it is at that sample.
+        moving_m: (now + 1, M, 3) [m] where its moving obstacles have been.
         seen: What its cameras have seen, as far as it is drawn.
         now: Number of the sample that is drawn.
     """
-    weights = {waypoint.weight for waypoint in flight.scenario.waypoints}
+    weights = {waypoint.weight for waypoint in scenario.waypoints}
     ink = shade(colours.INK)
     marks: list[Artist] = [Line2D([], [], **_RING, mec=ink, label="waypoint")]
     if len(weights) > 1:
@@ -50,7 +60,7 @@ def legend_of(flight: Flight, seen: Sequence[SeenGround], now: int) -> list[Arti
         )
     start = {"mfc": "white", "mec": uas_colour(0), "markersize": 4}
     marks.append(Line2D([], [], marker="o", ls="", **start, label="start, home"))
-    return [*marks, *_uas(flight, now), *_seen(seen), *_places(flight, now)]
+    return [*marks, *_uas(flight, now), *_seen(seen), *_places(scenario, moving_m)]
 
 
 def _uas(flight: Flight, now: int) -> list[Artist]:
@@ -80,10 +90,9 @@ def _seen(seen: Sequence[SeenGround]) -> list[Artist]:
     ]
 
 
-def _places(flight: Flight, now: int) -> list[Artist]:
+def _places(scenario: Scenario, moving_m: NDArray[np.float64]) -> list[Artist]:
     """Fence, kinds of obstacles and of other things on the ground, and what moves."""
-    scenario, ink = flight.scenario, shade(colours.INK)
-    ground = shade(colours.GROUND)
+    ink, ground = shade(colours.INK), shade(colours.GROUND)
     patches: list[Artist] = [Patch(facecolor=ground, edgecolor=ink, lw=1.2, label="geofence")]
     patches += [
         Patch(facecolor=shade(tint), edgecolor=ink, lw=0.5, label=words)
@@ -105,7 +114,6 @@ def _places(flight: Flight, now: int) -> list[Artist]:
             Line2D([], [], marker="o", ls="", color=red, mec="black", ms=6, label=name),
             Line2D([], [], color=red, ls="--", lw=0.8, label="safe distance of it"),
         ]
-        moved_m = np.ptp(flight.moving_position_m[: now + 1, :, :2], axis=0)
-        if moved_m.any():
+        if np.ptp(moving_m[..., :2], axis=0).any():
             patches.append(Line2D([], [], color=red, lw=0.7, label="path of it"))
     return patches
