@@ -1,11 +1,14 @@
 """Pictures and pages of a flight show a scene as it was at the time, whatever events changed."""
 
+import json
+
 import numpy as np
 import pytest
 from eventful import STARTS_M, WAYPOINTS, corners_m, event, field
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import SceneHistory, covered_at, flight_pictures
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Flight, SceneHistory, covered_at, flight_pictures
 from uas_coverage_env.replay.figures import map_figure
 from uas_coverage_env.replay.flight_data import flight_data
 
@@ -133,3 +136,23 @@ def test_room_to_an_obstacle_counts_from_when_it_stands(flight):
     far = round(50.0 / data["room"]["obstacles"]["unit"])
     assert (room[:6] == far).all()
     assert (room[6:] < far).any()
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"event": 17}, "events[0]: event is 17; the scenario has 6, from 0 on"),
+        ({"kind": "uas_lost"}, "events[0]: kind is 'uas_lost'; event 0 is 'waypoint_added'"),
+        ({"time_s": 1e300}, "events[0]: time_s is 1e+300; the flight ends at"),
+    ],
+)
+def test_an_event_that_cannot_have_been_is_refused_by_name(flight, changed, words, tmp_path):
+    flight.save(tmp_path / "it")
+    assert Flight.load(tmp_path / "it").events == flight.events
+    file = tmp_path / "it" / "run.json"
+    data = json.loads(file.read_text())
+    data["events"][0] |= changed
+    file.write_text(json.dumps(data))
+    with pytest.raises(InputError) as refusal:
+        Flight.load(tmp_path / "it")
+    assert words in str(refusal.value)

@@ -1,6 +1,7 @@
 """What the replay page reads out of a flight: the way home, room, roofs, and marks."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -154,11 +155,16 @@ def test_fallbacks_and_gaps_in_a_row_are_one_mark_with_their_reason(plain):
 
 
 def test_events_are_marks_in_order_of_time(plain):
-    events = (EventRecord(7.0, "uas_late", "uas_2", 0), EventRecord(9.0, "no_fly_zone", None, 1))
-    found = marks(dataclasses.replace(plain, events=events), "event")
+    tables: Any = (
+        {"kind": "uas_lost", "at_s": 7.0, "uas": "uas_2"},
+        {"kind": "obstacle_added", "at_s": 9.0, **box("shed", (0, 0, -5), (9, 9, 0))},
+    )
+    events = (EventRecord(7.0, "uas_lost", "uas_2", 0), EventRecord(9.0, "obstacle_added", None, 1))
+    scenario = plain.scenario.model_copy(update={"events": tables})
+    found = marks(dataclasses.replace(plain, scenario=scenario, events=events), "event")
     assert [(m["t_s"], m["text"]) for m in found] == [
-        (7.0, "uas_2: uas late"),
-        (9.0, "no fly zone"),
+        (7.0, "uas_2: uas lost"),
+        (9.0, "obstacle added"),
     ]
 
 

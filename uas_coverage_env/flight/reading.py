@@ -248,9 +248,22 @@ def _run_fields(path: Path, scenario: Scenario, steps: int) -> dict[str, Any]:
             f"{path}: was damaged: it holds {len(run.decisions)} decisions for {steps} steps"
         )
     decisions = tuple(DecisionRecord(**decision.model_dump()) for decision in run.decisions)
-    events = tuple(EventRecord(**event.model_dump()) for event in run.events)
+    events = tuple(_event(path, n, event, scenario, steps) for n, event in enumerate(run.events))
     swaps = tuple(_swap(path, n, swap, scenario) for n, swap in enumerate(run.swaps))
     return {**dict(run), "decisions": decisions, "events": events, "swaps": swaps}
+
+
+def _event(path: Path, number: int, event: _Event, scenario: Scenario, steps: int) -> EventRecord:
+    kinds = [table.kind for table in scenario.events]
+    if event.event >= len(kinds):
+        mistake = f"event is {event.event}; the scenario has {len(kinds)}, from 0 on"
+    elif event.kind != kinds[event.event]:
+        mistake = f"kind is {_short(event.kind)}; event {event.event} is {kinds[event.event]!r}"
+    elif event.time_s > steps * scenario.dt_s + 1e-6:
+        mistake = f"time_s is {event.time_s:g}; the flight ends at {steps * scenario.dt_s:g}"
+    else:
+        return EventRecord(**event.model_dump())
+    raise InputError(f"{path}: was damaged: events[{number}]: {mistake}")
 
 
 def _swap(path: Path, number: int, swap: _Swap, scenario: Scenario) -> Swap:

@@ -52,7 +52,7 @@ class SceneHistory:
         since = {key: [0] * len(getattr(known, key)) for key in _GROWING}
         dropped: dict[int, int] = {}
         changes = [(0, known)]
-        for record in flight.events:
+        for record in sorted(flight.events, key=lambda record: record.time_s):
             event = flight.scenario.events[record.event]
             sample = round(record.time_s / known.dt_s)
             effect = event.effect()

@@ -42,7 +42,7 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
     Raises:
         InputError: A value of the flight is not finite, so that it has no place in a picture.
     """
-    outcome, history = summary(flight), SceneHistory.of(flight)
+    outcome = summary(flight)
     durations_s = np.array([decision.duration_s for decision in flight.decisions])
     series = {
         "position": (flight.x[..., 0:3], POSITION_M),
@@ -50,11 +50,12 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "soc": (1.0 - flight.x[..., DOD], SOC),
         "voltage": (flight.voltage_V, VOLTAGE_V),
         "current": (flight.current_A, CURRENT_A),
-        "moving": (history.moving_position_m, POSITION_M),
         "duration": (durations_s, DURATION_S),
     }
     flown = {name: _series(values, unit, name, source) for name, (values, unit) in series.items()}
     # of values that are finite, as is known now
+    history = SceneHistory.of(flight)
+    flown["moving"] = _series(history.moving_position_m, POSITION_M, "moving", source)
     home, room = way_home(flight, history), rooms(flight, history)
     return {
         "planner": flight.planner,
