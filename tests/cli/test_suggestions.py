@@ -24,6 +24,11 @@ def elsewhere(tmp_path, monkeypatch):
         (["run", "vilage"], "unknown scenario 'vilage'; did you mean village?"),
         (["scenarios", "check", "Village"], "did you mean village?"),
         (["run", "generatd:5"], "did you mean generated:5?"),
+        (["run", "twon:5"], "did you mean town:5?"),
+        (
+            ["figure", ".", "--kind", "maps"],
+            "Invalid value for '--kind': 'maps' is not one of 'map'",
+        ),
         (["run", "generated"], "did you mean generated:SEED?"),
         (["run", "village", "--planner", "nearst-waypoint"], "did you mean nearest-waypoint?"),
         (["run", "village", "--planner", "polisy:mine"], "did you mean policy:mine?"),

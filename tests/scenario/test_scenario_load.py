@@ -54,6 +54,12 @@ def test_a_generated_scenario_has_a_name_and_a_seed():
         assert load_scenario(f"{series}:5") == of_seed(5)
 
 
+def test_a_generated_scenario_is_a_town_too_and_its_seed_may_be_called_one():
+    assert (
+        load_scenario("town:5") == load_scenario("generated:seed=5") == load_scenario("town:seed=5")
+    )
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"mission\.toml: no such file; check the path"):
         load_scenario(tmp_path / "mission.toml")

@@ -175,7 +175,7 @@ def _of_the_command_line(error: typer.TyperException) -> str:
     close = getattr(error, "possibilities", None)  # of an option that there is not, closest first
     if close:
         return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"
-    return error.format_message()
+    return error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
 
 
 def _of_a_file(error: OSError) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.hashing import content_hash
-from uas_coverage_env.scenario import SERIES, Scenario, load_scenario
+from uas_coverage_env.scenario import ALIASES, SERIES, Scenario, load_scenario
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
@@ -79,6 +79,7 @@ def _is_file(text: str) -> bool:
 
 def _scenarios(item: str) -> Iterator[Scenario]:
     kind, _, rest = item.partition(":")
+    kind = ALIASES.get(kind, kind)
     if item in SETS:
         yield from map(SERIES["generated"], SETS[item])
     elif ":" in rest and kind in SERIES:

@@ -7,6 +7,7 @@ from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.families import Family, Size, installed_families
 from uas_coverage_env.scenario.family import (
+    ALIASES,
     FAMILIES,
     SERIES,
     GeneratedScenarios,
@@ -41,6 +42,7 @@ from uas_coverage_env.scenario.source import (
 from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 __all__ = [
+    "ALIASES",
     "FAMILIES",
     "LEVELS",
     "SERIES",

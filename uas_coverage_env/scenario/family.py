@@ -105,6 +105,9 @@ FAMILIES: Mapping[str, GeneratedScenarios] = {
 }
 """The families that are known by name."""
 
+ALIASES: Mapping[str, str] = {"town": "generated"}
+"""Other names of series: generated scenarios are towns, and named so."""
+
 SERIES: Mapping[str, Callable[[int], Scenario]] = {
     "generated": sample_scenario,
     **{f"generated-{level}": partial(sample_scenario, disturbances=level) for level in LEVELS},

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError, read_toml
 from uas_coverage_env.files.suggestions import did_you_mean
-from uas_coverage_env.scenario.family import SERIES
+from uas_coverage_env.scenario.family import ALIASES, SERIES
 from uas_coverage_env.scenario.model import Scenario
 
 _SHIPPED = Path(__file__).parent
@@ -24,8 +24,8 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
     Args:
         name_or_path: The name of a shipped scenario, the name and the seed of a generated one as
-            in `generated:7` (see `SERIES`), or the path of a TOML file in the same format; a
-            string is a path where it ends in `.toml` or contains a folder.
+            in `town:7` or `streets:seed=7` (see `SERIES`, `ALIASES`), or the path of a TOML file in
+            the same format; a string is a path where it ends in `.toml` or contains a folder.
 
     Raises:
         InputError: There is no such scenario, or something in it is wrong: one line that names
@@ -49,10 +49,13 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 def _generated(text: str) -> Scenario:
     """SERIES:SEED."""
     series, colon, seed = text.partition(":")
+    series, seed = ALIASES.get(series, series), seed.removeprefix("seed=")
     if not colon or series not in SERIES:
-        known = (*scenario_names(), *(f"{name}:{seed[:18] or 'SEED'}" for name in SERIES))
+        end = seed[:18] or "SEED"
+        known = (*scenario_names(), *(f"{name}:{end}" for name in SERIES))
         otherwise = f"take {', '.join(known)} or the path of a .toml file"
-        raise InputError(f"unknown scenario {text[:80]!r}; {did_you_mean(text, known, otherwise)}")
+        meant = (*known, *(f"{name}:{end}" for name in ALIASES))
+        raise InputError(f"unknown scenario {text[:80]!r}; {did_you_mean(text, meant, otherwise)}")
     if not (seed.isdecimal() and len(seed) <= _LONGEST_SEED):
         raise InputError(
             f"scenario {text[:80]!r}: should be {series}:SEED with one whole number of at most "
