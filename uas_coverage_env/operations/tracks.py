@@ -33,6 +33,7 @@ SPENT_M = 1.0
 """Of a safe distance, what a leg may use: the rest is the autopilot's."""
 
 STOP_S = 1.0
+_GROUND_M = 0.3
 _PATIENCE = 6
 _CUTS = (0.25, 0.5, 1.0)
 _CUT_SEEN = 5.0
@@ -151,6 +152,13 @@ def make_track(flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances)
     if not len(high):
         return None
     first, last = int(high[0]), int(high[-1])
+    touches = first + np.flatnonzero(-path[first:last, 2] < _GROUND_M)
+    if len(touches):  # in a flight made of a log, which does not say that it has landed
+        at_s = (sortie.first + int(touches[0])) * scenario.dt_s
+        raise InputError(
+            f"{scenario.uas[uas].name} is on the ground {at_s:g} s after the start and flies on; "
+            f"export the flight that was planned instead"
+        )
     home_m = np.array(scenario.uas[uas].start_m) * (1.0, 1.0, 0.0)
     builder = _Builder(flight, uas, sortie, tolerances)
     take_off_m = np.array([*home_m[:2], path[first, 2]])
