@@ -25,7 +25,13 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import fly_sorties
 from uas_coverage_env.mission.lateness import Timed, pairs_of
 from uas_coverage_env.mission.separation import ready_s
-from uas_coverage_env.operations import ExportOptions, make_export
+from uas_coverage_env.operations import (
+    ExportOptions,
+    LocalFrame,
+    flown_flight,
+    make_export,
+    read_log,
+)
 from uas_coverage_env.operations.sorties import sorties_of
 from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
 from uas_coverage_env.scenario import Place
@@ -253,6 +259,16 @@ def test_tracks_are_one_file_for_each_uas_with_a_line_for_each_sortie(flight, ch
 def test_a_table_of_one_flight_leaves_no_second_out(flight):
     rows = list(csv.DictReader(io.StringIO(made_of(flight, "csv").files["uas_1.csv"])))
     assert [float(row["t_s"]) for row in rows] == list(range(flight.last_sample[0]))
+
+
+def test_a_log_of_several_sorties_says_that_only_the_first_is_judged(flight, tmp_path):
+    (tmp_path / "uas_1.csv").write_text(made_of(flight, "csv").files["uas_1.csv"])
+    (log,) = read_log(tmp_path / "uas_1.csv")
+    flown_again = flown_flight(flight, {"uas_1": log}, LocalFrame(HERE))
+    landed_s = next(swap.landed_s for swap in flight.swaps if swap.uas == "uas_1")
+    said = [note for note in flown_again.notes if "its log flies on after the landing" in note]
+    assert len(said) == 1
+    assert f"at {landed_s:g} s" in said[0]
 
 
 def test_the_command_exports_both_forms_and_says_what_to_swap_when(flight, chain, tmp_path, capsys):
