@@ -30,7 +30,7 @@ from pymavlink import mavwp
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.operations import ExportOptions, make_export
-from uas_coverage_env.operations.tracks import Tolerances, make_track
+from uas_coverage_env.operations.tracks import Tolerances, make_tracks
 from uas_coverage_env.scenario import Place
 
 WITH_PLACE = (16, 21, 22)
@@ -94,9 +94,10 @@ def check(
         files |= make_export(flight, options).files
     corners, worst_plan, worst_text = 0, 0.0, 0.0
     for i, uas in enumerate(scenario.uas):
-        track = make_track(flight, i, tolerances)
-        if track is None:
+        tracks = make_tracks(flight, i, tolerances)
+        if not tracks:
             continue
+        (track,) = tracks
         wanted = [*track.corners_m, np.array(track.home_m)]
         items = bench.read_plan(files[f"{uas.name}.plan"]).mission_items
         of_plan = [

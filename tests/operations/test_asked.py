@@ -16,7 +16,7 @@ from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
 from uas_coverage_env.operations.asked import not_as_asked
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.tracks import make_track
+from uas_coverage_env.operations.tracks import make_tracks
 from uas_coverage_env.scenario import Execution, Place, load_scenario
 
 PLACE = Place(latitude_deg=60.5, longitude_deg=26.9)
@@ -88,7 +88,7 @@ def test_a_file_read_back_and_flown_passes_every_waypoint_as_it_asks(flight, kin
         followed = flown(items, flight.scenario.vehicles[i])
         start_s = uas["start_delay_s"]
         assert followed.duration_s + start_s == pytest.approx(uas["duration_s"], abs=1.0)
-        track = make_track(flight, i, Tolerances())
+        track = make_tracks(flight, i, Tolerances())[0]
         for w in track.waypoints:
             assert passes(flight.scenario.waypoints[w], followed)
             asking += flight.scenario.waypoints[w].max_speed_mps is not None
@@ -135,7 +135,7 @@ def test_a_picture_is_taken_in_the_sphere_of_every_waypoint_that_asks_for_a_came
         cameras = {one.name for one in scenario.uas[i].sensors if one.field_of_view_deg}
         wanted = [
             scenario.waypoints[w]
-            for w in make_track(flight, i, Tolerances()).waypoints
+            for w in make_tracks(flight, i, Tolerances())[0].waypoints
             if scenario.waypoints[w].sensor in cameras
         ]
         taken = pictures(items, flown(items, scenario.vehicles[i]))
@@ -168,7 +168,7 @@ def test_a_speed_that_is_not_asked_for_is_not_limited(flight):
 def test_what_is_passed_too_fast_or_too_high_is_named(flight):
     scenario = flight.scenario
     (slow, *_) = (w for w, one in enumerate(scenario.waypoints) if one.max_speed_mps)
-    tracks = [make_track(flight, i, Tolerances()) for i in range(2)]
+    tracks = [make_tracks(flight, i, Tolerances())[0] for i in range(2)]
     (track,) = (one for one in tracks if slow in one.waypoints)
     by = Autopilot.of(scenario.vehicles[track.uas], CORNER_M)
     stops = [1.0] * len(track.legs)

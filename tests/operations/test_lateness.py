@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.mission.lateness import pairs_of
+from uas_coverage_env.mission.lateness import Timed, pairs_of
 from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
-from uas_coverage_env.operations.export import _check_slack
+from uas_coverage_env.operations.apart import check_slack
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.scenario import Place, load_scenario
 
@@ -26,7 +26,7 @@ def flown(home, corners):
 
 
 def pair_of(a, b):
-    (pair,) = pairs_of(FIELD, [(0, a), (1, b)])
+    (pair,) = pairs_of(FIELD, [Timed(0, "uas_1", a), Timed(1, "uas_2", b)])
     return pair
 
 
@@ -81,5 +81,5 @@ def test_too_little_slack_is_refused_with_the_pair_and_the_place():
     assert pair.slack_s < 20.0
     frame = LocalFrame(Place(latitude_deg=47.0, longitude_deg=8.0))
     with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer than 5.7 m at 47\.000\d+"):
-        _check_slack([pair], frame, 20.0)
-    _check_slack([pair], frame, 0.0)
+        check_slack([pair], frame, 20.0)
+    check_slack([pair], frame, 0.0)

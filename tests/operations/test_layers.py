@@ -12,7 +12,7 @@ from uas_coverage_env import rollout
 from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
 from uas_coverage_env.operations.layers import LONG_WAITS_S, above, shifted
 from uas_coverage_env.operations.room import Surroundings
-from uas_coverage_env.operations.tracks import make_track
+from uas_coverage_env.operations.tracks import make_tracks
 from uas_coverage_env.scenario import Execution, Place
 
 HERE = Place(latitude_deg=47.0, longitude_deg=8.0)
@@ -66,14 +66,14 @@ def test_short_waits_stay_waits(flight):
 
 
 def test_a_layer_that_would_miss_a_waypoint_is_not_taken(flight):
-    track = make_track(flight, 0, Tolerances())
+    track = make_tracks(flight, 0, Tolerances())[0]
     assert shifted(flight, track, 7.0, Tolerances()) is not None
     assert shifted(flight, track, 12.0, Tolerances()) is None
 
 
 def test_the_way_above_the_others_is_level_and_within_the_fence(flight):
     tolerances = Tolerances()
-    track = make_track(flight, 0, tolerances)
+    track = make_tracks(flight, 0, tolerances)[0]
     new = above(flight, track, 30.0, tolerances)
     corners = new.corners_m
     assert np.isclose(corners[:, 2], -30.0).sum() >= 4

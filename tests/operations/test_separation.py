@@ -153,6 +153,6 @@ def test_files_that_need_no_waits_hold_none(flight):
 
 
 def test_an_export_that_no_wait_helps_is_refused_with_pair_and_place(flight, monkeypatch):
-    monkeypatch.setattr("uas_coverage_env.operations.export.separate", lambda *_: None)
+    monkeypatch.setattr("uas_coverage_env.operations.apart.separate", lambda *_: None)
     with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer .* no wait on the ground"):
         export_of(flight, min_slack_s=SLACK_S)

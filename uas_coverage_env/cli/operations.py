@@ -11,10 +11,10 @@ import typer
 from rich.table import Table
 
 from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.cli.sorties import load_flights
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.plain_files import write_atomically
-from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import Place, warnings
 
 _HEIGHT_M = 40.0
@@ -147,12 +147,15 @@ def import_area(
 
 
 def export(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+    directory: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="Flight directory, or that of `run --sorties`."),
+    ],
     kind: Annotated[
         str,
         typer.Option("--format", help="qgc (.plan), ardupilot (.waypoints), kml, geojson or csv."),
     ],
-    out: Annotated[Path, typer.Option(help="Directory for one file per UAS and the report.")],
+    out: Annotated[Path, typer.Option(help="Directory for the files and the report.")],
     min_slack: Annotated[
         float | None,
         typer.Option(
@@ -190,7 +193,7 @@ def export(
         bool, typer.Option("--overwrite", help="Write into a directory that is not empty.")
     ] = False,
 ) -> None:
-    """Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`)."""
+    """Write a file for each sortie, few straight checked legs, and a report (extra `ops`)."""
     with extra():
         from uas_coverage_env.operations import ENDINGS, ExportOptions, make_export
     if out.is_dir() and any(out.iterdir()) and not overwrite:
@@ -203,16 +206,19 @@ def export(
         autopilot=autopilot,
         place=asked_place(place),
     )
-    made = make_export(Flight.load(directory), options)
+    made = make_export(load_flights(directory), options)
     left = {name for name in prepare_folder(out) if Path(name).suffix in ENDINGS} - set(made.files)
     if left:
         raise InputError(f"--out {out}: holds {min(left)} of another export; give another --out")
     write_files(out, {name: text.encode() for name, text in made.files.items()})
     screen = console()
-    table = Table("UAS", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None)
+    table = Table(
+        "UAS", "starts, s", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None
+    )
     for uas in made.data["uas"]:
         table.add_row(
             uas["name"],
+            f"{uas['begins_s']:.0f}",
             str(len(uas["legs"])),
             f"{uas['duration_s']:.0f}",
             f"{uas['planned_s']:.0f}",
@@ -222,6 +228,13 @@ def export(
     screen.print(table)
     for name in made.grounded:
         screen.print(f"{name} stays on the ground and has no file", markup=False)
+    for one in made.data["turnarounds"]:
+        what = "swap its pack" if one["fresh_pack"] else "same pack"
+        screen.print(
+            f"{one['uas']} lands at {one['lands_s']:.0f} s: {what}, start {one['next']} at "
+            f"{one['starts_s']:.0f} s",
+            markup=False,
+        )
     screen.print(f"{len(made.files)} files in {out}, see report.html", markup=False)
     for note in made.notes:
         sys.stderr.write(f"warning: {one_line(note)}\n")

@@ -11,10 +11,13 @@ from rich.table import Table
 
 from uas_coverage_env.cli.flights import keep_flight
 from uas_coverage_env.cli.output import DONE, FAILED
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.output_dir import write_files
+from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.flight import Flight, sorties_summary
 
 SUMMARY = "sorties.json"
+_MOST_BYTES = 10_000_000
 
 
 def keep_sorties(
@@ -40,6 +43,24 @@ def keep_sorties(
             sys.stderr.write(f"warning: {path}: is of an earlier run\n")
     done = result["left"] == 0 and result["all_home"] and not result["violations"]
     return DONE if done else FAILED
+
+
+def load_flights(directory: Path) -> list[Flight]:
+    """The flight of a directory, or all sorties of one that `keep_sorties` has written.
+
+    Raises:
+        InputError: It is neither, or was damaged.
+    """
+    path = directory / SUMMARY
+    if not path.is_file():
+        return [Flight.load(directory)]
+    try:
+        count = len(json.loads(read_text(path, _MOST_BYTES))["sorties"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: holds no list of sorties; fly the mission again") from error
+    if not count:
+        raise InputError(f"{path}: holds no list of sorties; fly the mission again")
+    return [Flight.load(directory / f"sortie_{number}") for number in range(1, count + 1)]
 
 
 def _report(screen: Console, result: dict[str, Any], directory: Path) -> None:

@@ -5,25 +5,59 @@ so for every pair the delay is computed at which they would come closer than the
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.mission.leg_model import Followed
+from uas_coverage_env.mission.leg_model import DT_S, Followed
 from uas_coverage_env.scenario import Scenario
 
 _FLYING_M = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """Two UAS.
+class Timed(NamedTuple):
+    """A file on the clock that all UAS share.
 
     Attributes:
-        names: Of the two.
+        uas: Index of the UAS.
+        name: Of the file.
+        followed: How it is flown.
+        begins_s: When it is started [s].
+        since_s: Since when the UAS has been on the ground where it takes off [s].
+        until_s: Until when it stays on the ground where it lands [s].
+    """
+
+    uas: int
+    name: str
+    followed: Followed
+    begins_s: float = 0.0
+    since_s: float = 0.0
+    until_s: float = math.inf
+
+    @property
+    def lands_s(self) -> float:
+        """When it has landed [s]."""
+        return self.begins_s + self.followed.duration_s
+
+    def at_s(self, samples: NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """From when and until when it is where it is at samples [s]."""
+        last = len(self.followed.times_s) - 1
+        times_s = self.begins_s + self.followed.times_s[samples]
+        from_s = np.where(samples == 0, self.since_s, times_s)
+        return from_s, np.where(samples == last, self.until_s, times_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two UAS, each with one of its files.
+
+    Attributes:
+        names: Of the two files.
         kept_m: Distance that they have to keep, horizontally or vertically [m].
         least_m: The smallest if both are in time [m].
         slack_s: The least delay of one of them that brings them closer; None: none does [s].
@@ -37,33 +71,34 @@ class Pair:
     place_m: NDArray[np.float64] | None
 
 
-def pairs_of(scenario: Scenario, flown: Sequence[tuple[int, Followed]]) -> list[Pair]:
-    """Every pair of UAS that fly.
+def pairs_of(scenario: Scenario, flown: Sequence[Timed]) -> list[Pair]:
+    """Every pair of files of different UAS.
 
     Args:
         scenario: The mission.
-        flown: Index of a UAS, and how its file is flown; all are started at the same time.
+        flown: The files.
     """
-    return [_pair(scenario, one, other) for one, other in itertools.combinations(flown, 2)]
+    pairs = itertools.combinations(flown, 2)
+    return [_pair(scenario, one, other) for one, other in pairs if one.uas != other.uas]
 
 
-def _pair(scenario: Scenario, one: tuple[int, Followed], other: tuple[int, Followed]) -> Pair:
-    (i, a), (j, b) = one, other
-    distance_m = kept_m(scenario, i, j)
+def _pair(scenario: Scenario, one: Timed, other: Timed) -> Pair:
+    a, b = one.followed, other.followed
+    distance_m = kept_m(scenario, one.uas, other.uas)
     found = encounters(a, b, distance_m)
     slack_s, place_m = None, None
     if len(found):
-        t, s = a.times_s[found[:, 0]], b.times_s[found[:, 1]]
-        late_s = np.abs(t - s)
-        # one that has landed stays where it is: no delay of the other one leads past it
-        late_s[(found[:, 1] == len(b.times_s) - 1) & (t > s)] = 0.0
-        late_s[(found[:, 0] == len(a.times_s) - 1) & (s > t)] = 0.0
+        (a_from_s, a_until_s), (b_from_s, b_until_s) = (
+            one.at_s(found[:, 0]),
+            other.at_s(found[:, 1]),
+        )
+        # who stands on the ground is there all the time: then no delay is needed to be close
+        late_s = np.maximum(np.maximum(b_from_s - a_until_s, a_from_s - b_until_s), 0.0)
         worst = int(late_s.argmin())
         slack_s = float(late_s[worst])
         ends = a.places_m[found[worst, 0]], b.places_m[found[worst, 1]]
         place_m = 0.5 * (ends[0] + ends[1])
-    names = scenario.uas[i].name, scenario.uas[j].name
-    return Pair(names, distance_m, _least_m(a, b), slack_s, place_m)
+    return Pair((one.name, other.name), distance_m, _least_m(one, other), slack_s, place_m)
 
 
 def kept_m(scenario: Scenario, i: int, j: int) -> float:
@@ -101,11 +136,17 @@ def _half_steps(flown: Followed) -> NDArray[np.float64]:
     return 0.5 * np.maximum(np.append(steps, 0.0), np.append(0.0, steps))
 
 
-def _least_m(a: Followed, b: Followed) -> float:
-    n = max(len(a.times_s), len(b.times_s))
-    padded = [
-        np.concatenate([f.places_m, np.repeat(f.places_m[-1:], n - len(f.places_m), axis=0)])
-        for f in (a, b)
-    ]
-    away = padded[0] - padded[1]
+def _least_m(one: Timed, other: Timed) -> float:
+    """The smallest distance while either flies, and neither is on its way in another file."""
+    from_s = max(min(one.begins_s, other.begins_s), one.since_s, other.since_s)
+    to_s = min(max(one.lands_s, other.lands_s), one.until_s, other.until_s)
+    clock_s = np.arange(from_s, to_s + 0.5 * DT_S, DT_S)
+    if not len(clock_s):
+        return math.inf
+    places = []
+    for timed in (one, other):
+        samples = np.rint((clock_s - timed.begins_s) / DT_S).astype(np.intp)
+        last = len(timed.followed.places_m) - 1
+        places.append(timed.followed.places_m[np.clip(samples, 0, last)])
+    away = places[0] - places[1]
     return float(np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2])).min())

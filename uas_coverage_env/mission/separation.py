@@ -2,13 +2,17 @@
 
 Files of legs carry no time, but they can wait. A UAS after the other gets the shortest wait with
 which any of those placed before it may be late by what is asked; of several orders the one counts
-that has all of them home first.
+that has all of them home first. A UAS may fly several files, each after it has landed from the one
+before and has been on the ground for a while.
 """
+
+from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +36,8 @@ class Waits:
     """Where a UAS waits for others.
 
     Attributes:
-        start_s: On the ground, before it takes off [s].
+        start_s: On the ground, before it takes off; where it has flown before, beyond the time that
+            it is there anyhow [s].
         leg: Index of the leg at whose end it waits in the air; None: it does not.
         hold_s: How long it waits there, a stop that it makes anyhow not counted [s].
     """
@@ -48,8 +53,9 @@ Fly = Callable[[Waits], Followed]
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """A UAS whose waits are settled: when it reaches each of its places, and when it leaves it."""
+    """A file whose waits are settled: when its UAS reaches each of its places, and leaves it."""
 
+    k: int
     uas: int
     waits: Waits
     followed: Followed
@@ -61,76 +67,127 @@ class _Placed:
         return float(self.arrive_s[-1])
 
 
+class _Slot(NamedTuple):
+    """When a file may begin at the earliest.
+
+    Attributes:
+        since_s: The UAS has been on the ground since then [s].
+        ready_s: From then on it may be started [s].
+        again: Whether the UAS flies another file afterwards.
+    """
+
+    since_s: float
+    ready_s: float
+    again: bool
+
+
+def ready_s(landed_s: float, pause_s: float) -> float:
+    """When a UAS can be started again: a whole second, for whoever starts it by the clock [s].
+
+    Args:
+        landed_s: When it has landed [s].
+        pause_s: How long it is on the ground at least [s].
+    """
+    return float(math.ceil(landed_s + pause_s - _TOLERANCE_S))
+
+
 def separate(
-    scenario: Scenario, fleet: Sequence[tuple[int, Fly]], slack_s: float
+    scenario: Scenario,
+    fleet: Sequence[tuple[int, Fly]],
+    slack_s: float,
+    pauses_s: Sequence[float] = (),
 ) -> list[Waits] | None:
     """Waits with which every UAS may be late by as much as is asked.
 
     Args:
         scenario: The mission.
-        fleet: Index of each UAS, and how its file is flown with waits.
+        fleet: Index of each UAS, and how its file is flown with waits. A UAS that is named again
+            flies again.
         slack_s: How late any of them has to be able to be [s].
+        pauses_s: How long each is on the ground before, where it has flown before; without it,
+            every UAS flies once [s].
 
     Returns:
         One entry for each of the fleet; None where no waits are found.
     """
-    search = _Search(scenario, fleet, slack_s)
-    found = [placed for order in _orders(search.base) if (placed := search.place(order, False))]
+    search = _Search(scenario, fleet, slack_s, pauses_s)
+    found = [placed for order in _orders(search) if (placed := search.place(order, False))]
     if not found:
-        found = [p for o in _few_orders(search.base) if (p := search.place(o, True))]
+        found = [p for o in _few_orders(search) if (p := search.place(o, True))]
     if not found:
         return None
     best = min(found, key=lambda all_: (max(p.home_s for p in all_), _waited_s(all_)))
-    by_uas = {placed.uas: placed.waits for placed in best}
-    return [by_uas[uas] for uas, _ in fleet]
+    return [placed.waits for placed in sorted(best, key=lambda placed: placed.k)]
 
 
 def _waited_s(fleet: Sequence[_Placed]) -> int:
     return sum(placed.waits.start_s + placed.waits.hold_s for placed in fleet)
 
 
-def _orders(base: Sequence[Followed]) -> Iterator[tuple[int, ...]]:
-    if len(base) <= _MOST_ORDERED:
-        return itertools.permutations(range(len(base)))
-    return _few_orders(base)
+def _orders(search: _Search) -> Iterator[tuple[int, ...]]:
+    """Orders of the UAS."""
+    if len(search.files) <= _MOST_ORDERED:
+        return itertools.permutations(search.files)
+    return _few_orders(search)
 
 
-def _few_orders(base: Sequence[Followed]) -> Iterator[tuple[int, ...]]:
+def _few_orders(search: _Search) -> Iterator[tuple[int, ...]]:
     """As they come, backwards, and by the length of their flights."""
-    given = range(len(base))
-    by_length = sorted(given, key=lambda k: base[k].duration_s)
-    orders = (tuple(given), tuple(given)[::-1], tuple(by_length), tuple(by_length)[::-1])
+    given = tuple(search.files)
+    lengths_s = {u: sum(search.base[k].duration_s for k in ks) for u, ks in search.files.items()}
+    by_length = tuple(sorted(given, key=lambda u: lengths_s[u]))
+    orders = (given, given[::-1], by_length, by_length[::-1])
     return iter(dict.fromkeys(orders))
 
 
 class _Search:
     def __init__(
-        self, scenario: Scenario, fleet: Sequence[tuple[int, Fly]], slack_s: float
+        self,
+        scenario: Scenario,
+        fleet: Sequence[tuple[int, Fly]],
+        slack_s: float,
+        pauses_s: Sequence[float],
     ) -> None:
         self._scenario, self._fleet, self._slack_s = scenario, fleet, slack_s
+        self._pauses_s = pauses_s
         self.base = [fly(Waits()) for _, fly in fleet]
+        self.files: dict[int, list[int]] = {}
+        for k, (uas, _) in enumerate(fleet):
+            self.files.setdefault(uas, []).append(k)
         self._found: dict[tuple[int, int], NDArray[np.intp]] = {}
 
     def place(self, order: Sequence[int], in_the_air: bool) -> list[_Placed] | None:
-        """The fleet in an order, each with the shortest wait; None where one finds none."""
+        """The fleet in an order, each with the shortest wait; None where one finds none.
+
+        A file is placed when it is the next that may begin; the order settles which of several.
+        """
         placed: list[_Placed] = []
-        for k in order:
-            one = self._on_the_ground(k, placed)
+        left = {uas: list(self.files[uas]) for uas in order}
+        slots = {uas: _Slot(-math.inf, 0.0, len(left[uas]) > 1) for uas in order}
+        while left:
+            uas = min(left, key=lambda u: slots[u].ready_s)
+            k = left[uas].pop(0)
+            one = self._on_the_ground(k, slots[uas], placed)
             if one is None and in_the_air:
-                one = self._in_the_air(k, placed)
+                one = self._in_the_air(k, slots[uas], placed)
             if one is None:
                 return None
             placed.append(one)
+            if left[uas]:
+                ready = ready_s(one.home_s, self._pauses_s[left[uas][0]])
+                slots[uas] = _Slot(one.home_s, ready, len(left[uas]) > 1)
+            else:
+                del left[uas]
         return placed
 
-    def _on_the_ground(self, k: int, placed: Sequence[_Placed]) -> _Placed | None:
+    def _on_the_ground(self, k: int, slot: _Slot, placed: Sequence[_Placed]) -> _Placed | None:
         followed = self.base[k]
-        start_s = self._shortest(k, followed, 0, placed)
+        start_s = self._shortest(k, followed, 0, slot, placed)
         if start_s is None:
             return None
-        return _placed(self._fleet[k][0], Waits(start_s), followed, 0, start_s)
+        return _placed(k, self._fleet[k][0], Waits(start_s), followed, 0, start_s, slot)
 
-    def _in_the_air(self, k: int, placed: Sequence[_Placed]) -> _Placed | None:
+    def _in_the_air(self, k: int, slot: _Slot, placed: Sequence[_Placed]) -> _Placed | None:
         uas, fly = self._fleet[k]
         n_legs = len(self.base[k].corner_s) - 1
         legs = range(0, n_legs - 1, math.ceil(max(n_legs - 1, 1) / _MOST_CORNERS))
@@ -138,19 +195,23 @@ class _Search:
         for leg in legs:
             stopping = fly(Waits(leg=leg))
             sample = round(float(stopping.corner_s[leg + 1]) / DT_S)
-            hold_s = self._shortest(k, stopping, sample, placed)
+            hold_s = self._shortest(k, stopping, sample, slot, placed)
             if hold_s is not None:
-                found.append(_placed(uas, Waits(0, leg, hold_s), stopping, sample, hold_s))
+                waits = Waits(0, leg, hold_s)
+                found.append(_placed(k, uas, waits, stopping, sample, hold_s, slot))
         return min(found, key=lambda one: one.home_s) if found else None
 
     def _shortest(
-        self, k: int, followed: Followed, sample: int, placed: Sequence[_Placed]
+        self, k: int, followed: Followed, sample: int, slot: _Slot, placed: Sequence[_Placed]
     ) -> int | None:
         """The shortest wait at a sample that keeps a UAS apart from those placed before it."""
         low, high = [np.empty(0)], [np.empty(0)]
         for other in placed:
+            if other.uas == self._fleet[k][0]:
+                continue
             found = self._encounters(other, k, followed)
-            excluded = _excluded(found, other, followed, sample, self._slack_s + _TOLERANCE_S)
+            slack_s = self._slack_s + _TOLERANCE_S
+            excluded = _excluded(found, other, followed, sample, slot, slack_s)
             low.append(excluded[0])
             high.append(excluded[1])
         return _least_outside(np.concatenate(low), np.concatenate(high))
@@ -168,16 +229,25 @@ class _Search:
         return found
 
 
-def _placed(uas: int, waits: Waits, followed: Followed, sample: int, wait_s: int) -> _Placed:
-    arrive_s, leave_s = followed.times_s.copy(), followed.times_s.copy()
+def _placed(
+    k: int, uas: int, waits: Waits, followed: Followed, sample: int, wait_s: int, slot: _Slot
+) -> _Placed:
+    arrive_s, leave_s = slot.ready_s + followed.times_s, slot.ready_s + followed.times_s
     arrive_s[sample + 1 :] += wait_s
     leave_s[sample:] += wait_s
-    arrive_s[0], leave_s[-1] = -math.inf, math.inf  # on the ground before and after
-    return _Placed(uas, waits, followed, arrive_s, leave_s)
+    arrive_s[0] = slot.since_s  # on the ground before and after
+    if not slot.again:
+        leave_s[-1] = math.inf
+    return _Placed(k, uas, waits, followed, arrive_s, leave_s)
 
 
 def _excluded(
-    found: NDArray[np.intp], other: _Placed, followed: Followed, sample: int, slack_s: float
+    found: NDArray[np.intp],
+    other: _Placed,
+    followed: Followed,
+    sample: int,
+    slot: _Slot,
+    slack_s: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Open intervals of waits at a sample that bring a UAS too close to another one.
 
@@ -185,9 +255,10 @@ def _excluded(
     """
     n, m = found[:, 0], found[:, 1]
     arrive_s, leave_s = other.arrive_s[n], other.leave_s[n]
-    mine_s = followed.times_s[m]
-    from_s = np.where(m == 0, -math.inf, mine_s)
-    until_s = np.where(m == len(followed.times_s) - 1, math.inf, mine_s)
+    mine_s = slot.ready_s + followed.times_s[m]
+    from_s = np.where(m == 0, slot.since_s, mine_s)
+    stays = (m == len(followed.times_s) - 1) & (not slot.again)
+    until_s = np.where(stays, math.inf, mine_s)
     # what comes after the wait moves with it
     low, high = arrive_s - until_s - slack_s, leave_s - from_s + slack_s
     before = (from_s - leave_s >= slack_s) | (arrive_s - until_s >= slack_s)

@@ -2,34 +2,33 @@
 
 import json
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, NamedTuple
-
-import numpy as np
+from dataclasses import dataclass, replace
+from typing import Any
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight import MODES, Flight, sorties_summary
 from uas_coverage_env.flight.record import LANDED, LIMIT
-from uas_coverage_env.mission.lateness import Pair, pairs_of
 from uas_coverage_env.mission.leg_model import Followed
-from uas_coverage_env.mission.separation import Waits, separate
+from uas_coverage_env.mission.separation import Waits, ready_s
+from uas_coverage_env.operations.apart import Begins, Part, Settled, kept_apart
 from uas_coverage_env.operations.asked import stopping
-from uas_coverage_env.operations.exported import Exported, exported, followed, waiting
+from uas_coverage_env.operations.exported import Exported, followed, waiting
 from uas_coverage_env.operations.formats import FORMATS
 from uas_coverage_env.operations.formats.qgc import FIRMWARE
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.layers import Apart, in_layers
 from uas_coverage_env.operations.report import report
 from uas_coverage_env.operations.report_page import report_page
-from uas_coverage_env.operations.tracks import LIFT_M, Tolerances, Track, make_track
+from uas_coverage_env.operations.tracks import Tolerances, Track, make_tracks
 from uas_coverage_env.scenario import Place
 
 MOST_TOLERANCE_M = 50.0
 MIN_SLACK_S = 20.0
 PROMISE = 0.15
 """So far a file's time may be from that of a flight that was planned for it."""
+
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -71,52 +70,83 @@ class Export:
     notes: tuple[str, ...]
 
 
-def make_export(flight: Flight, options: ExportOptions) -> Export:
-    """The files of a flight.
+def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> Export:
+    """The files of a flight, or of sorties that were flown one after the other.
 
     Args:
-        flight: In which all UAS have landed, without a contact.
+        flights: In which all UAS have landed, without a contact. A UAS that takes off again has a
+            file for each of its sorties. Several flights are of one mission, in their order: each
+            begins when all have landed from the one before and have been given fresh packs.
         options: How.
 
     Raises:
-        InputError: The flight cannot be exported, or two UAS would come too close if one of them
+        InputError: A flight cannot be exported, or two UAS would come too close if one of them
             were late by less than asked, wherever they wait for each other.
     """
-    settled = _settled(flight, options)
+    flights = [flights] if isinstance(flights, Flight) else list(flights)
+    settled = _settled(flights[0], options)
     _check(options, settled)
-    frame = LocalFrame(place_of_flight(flight, options.place))
-    check_flight(flight)
-    tracks, grounded = [], []
-    for i, uas in enumerate(flight.scenario.uas):
-        track = make_track(flight, i, settled.tolerances)
-        if track is None:
-            grounded.append(uas.name)
-        else:
-            tracks.append(_as_asked(flight, track, settled.tolerances))
-    if not tracks:
+    frame = LocalFrame(place_of_flight(flights[0], options.place))
+    for flight in flights:
+        check_flight(flight)
+    laid = [_tracks(flight, settled) for flight in flights]
+    if not any(laid):
         raise InputError("no UAS flies in this flight; there is nothing to export")
-    exports, pairs = _kept_apart(flight, tracks, frame, settled)
-    data = report(flight, exports, pairs, frame, settled.tolerances)
-    files = {
-        f"{one.track.name}{ending}": text
-        for one in exports
-        for ending, text in FORMATS[options.kind](
-            flight.scenario, one, settled.tolerances, options.autopilot
-        ).items()
-    }
+    parts: list[Part] = []
+    flown = sorties_summary(flights)
+    for flight, tracks, entry in zip(flights, _named(laid), flown["sorties"], strict=True):
+        if tracks:
+            at_s = ready_s(parts[-1].lands_s, flown["swap_s"]) if parts else 0.0
+            begins = Begins(at_s, entry["begins_s"])
+            parts.append(kept_apart(flight, tracks, frame, settled, begins))
+    data = report(parts, frame, settled.tolerances)
+    files = _files(parts, options, settled.tolerances)
     files["report.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
-    files["report.html"] = report_page(flight.scenario, exports, data)
-    return Export(files, data, tuple(grounded), tuple(_notes(flight, exports)))
+    files["report.html"] = report_page(parts, data)
+    flying = {uas["uas"] for uas in data["uas"]}
+    grounded = tuple(name for name in flights[0].names if name not in flying)
+    notes = dict.fromkeys(note for part in parts for note in _notes(part))
+    return Export(files, data, grounded, tuple(notes))
 
 
-class _Settled(NamedTuple):
-    """What options and scenario say together."""
+def _tracks(flight: Flight, settled: Settled) -> list[Track]:
+    """All sorties of a flight, those of a UAS one after the other."""
+    return [
+        _as_asked(flight, track, settled.tolerances)
+        for i in range(len(flight.names))
+        for track in make_tracks(flight, i, settled.tolerances)
+    ]
 
-    tolerances: Tolerances
-    min_slack_s: float
+
+def _named(laid: Sequence[list[Track]]) -> list[list[Track]]:
+    """Tracks that say which of its sorties each UAS flies, where any flies several."""
+    counts = Counter(track.name for tracks in laid for track in tracks)
+    most = max(counts.values())
+    if most == 1:
+        return list(laid)
+    flown: Counter[str] = Counter()
+    result = []
+    for tracks in laid:
+        named = []
+        for track in tracks:
+            flown[track.name] += 1
+            number = f"{flown[track.name]:0{len(str(most))}d}"  # names sort
+            name = f"{track.name}-sortie-{number}"
+            named.append(replace(track, name=name, number=flown[track.name]))
+        result.append(named)
+    return result
 
 
-def _settled(flight: Flight, options: ExportOptions) -> _Settled:
+def _files(parts: Sequence[Part], options: ExportOptions, tolerances: Tolerances) -> dict[str, str]:
+    files: dict[str, str] = {}
+    for name in parts[0].flight.names:
+        flown = [(part, one) for part in parts for one in part.of(name)]
+        if flown:
+            files |= FORMATS[options.kind](name, flown, tolerances, options.autopilot)
+    return files
+
+
+def _settled(flight: Flight, options: ExportOptions) -> Settled:
     said = flight.scenario.execution
     usual = Tolerances.path_m, Tolerances.corner_m, MIN_SLACK_S
     if said is not None:
@@ -125,10 +155,10 @@ def _settled(flight: Flight, options: ExportOptions) -> _Settled:
     path_m, corner_m, slack_s = (
         value if one is None else one for one, value in zip(given, usual, strict=True)
     )
-    return _Settled(Tolerances(path_m, corner_m), slack_s)
+    return Settled(Tolerances(path_m, corner_m), slack_s)
 
 
-def _check(options: ExportOptions, settled: _Settled) -> None:
+def _check(options: ExportOptions, settled: Settled) -> None:
     for name, value, known in (
         ("--format", options.kind, FORMATS),
         ("--autopilot", options.autopilot, FIRMWARE),
@@ -182,96 +212,22 @@ def check_flight(flight: Flight) -> None:
             state = MODES[mode]
             state = "lost" if state == "lost" else "still in the air"
             raise InputError(f"{name} is {state} at the end of the flight; export one that is home")
-    for i, name in enumerate(flight.names):
-        drawn = np.flatnonzero(flight.current_A[:, i] > 0.0)
-        if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
+    for i, uas in enumerate(flight.scenario.uas):
+        away_m = math.dist(flight.x[-1, i, :2], uas.start_m[:2])
+        if away_m > flight.scenario.landing_distance_m + _ROUNDING:
             raise InputError(
-                f"{name} lands and takes off again; export a flight without that, each sortie of "
-                f"`run --sorties` for one ([sorties] with together = true)"
+                f"{uas.name} lands {away_m:.0f} m from its start (an event home_closed); files "
+                f"land where they take off: export a flight that ends at home"
             )
     contacts = [violation for violation in flight.violations if violation.kind != LIMIT]
     if contacts:
         raise InputError(f"the flight has a contact ({contacts[0]}); export one without")
 
 
-def _kept_apart(
-    flight: Flight, tracks: Sequence[Track], frame: LocalFrame, settled: _Settled
-) -> tuple[list[Exported], list[Pair]]:
-    """The UAS with the waits that they need, and how late they may be then."""
-    scenario, tolerances = flight.scenario, settled.tolerances
-    exports = [exported(flight, track, frame, tolerances) for track in tracks]
-    if scenario.execution is not None:  # waits are part of the plan then
-        waits = [_flown_wait(flight, one) for one in exports]
-        flown = [
-            exported(flight, t, frame, tolerances, w) for t, w in zip(tracks, waits, strict=True)
-        ]
-        pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in flown])
-        if not _short(pairs, settled.min_slack_s):
-            return flown, pairs
-    pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
-    if not _short(pairs, settled.min_slack_s):
-        return exports, pairs
-    settle = partial(_apart, flight, settled)
-    apart = in_layers(flight, settle(tracks), tolerances, settle)
-    if apart.waits is not None:
-        exports = [
-            exported(flight, track, frame, tolerances, one)
-            for track, one in zip(apart.tracks, apart.waits, strict=True)
-        ]
-        pairs = pairs_of(scenario, [(one.track.uas, one.followed) for one in exports])
-    _check_slack(pairs, frame, settled.min_slack_s)
-    return exports, pairs
-
-
-def _flown_wait(flight: Flight, one: Exported) -> Waits:
-    """How long a UAS waited in the flight before it took off."""
-    first = int(np.flatnonzero(-one.track.flown_m[:, 2] >= LIFT_M)[0])
-    began_s = float(one.followed.corner_s[0])
-    return Waits(max(math.floor(first * flight.scenario.dt_s - began_s), 0))
-
-
-def _apart(flight: Flight, settled: _Settled, tracks: Sequence[Track]) -> Apart:
-    """Tracks with waits."""
-    scenario = flight.scenario
-    fleet = [
-        (
-            track.uas,
-            partial(followed, track, scenario, settled.tolerances),
-        )
-        for track in tracks
-    ]
-    waits = separate(scenario, fleet, settled.min_slack_s)
-    home_s = math.inf
-    if waits is not None:
-        home_s = max(fly(one).duration_s for (_, fly), one in zip(fleet, waits, strict=True))
-    return Apart(list(tracks), waits, home_s)
-
-
-def _short(pairs: Sequence[Pair], min_slack_s: float) -> list[Pair]:
-    """The pairs in which one may be late by less than is asked."""
-    return [p for p in pairs if p.slack_s is not None and p.slack_s < min_slack_s]
-
-
-def _check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) -> None:
-    short = _short(pairs, min_slack_s)
-    if not short:
-        return
-    worst = min(short, key=lambda pair: pair.slack_s or 0.0)
-    assert worst.place_m is not None
-    latitude, longitude, height = frame.to_geodetic(worst.place_m).tolist()
-    more = f" (+{len(short) - 1} more pairs)" if len(short) > 1 else ""
-    raise InputError(
-        f"{worst.names[0]} and {worst.names[1]} come closer than {worst.kept_m:.1f} m at "
-        f"{latitude:.6f}, {longitude:.6f}, {height:.0f} m high, if one is {worst.slack_s:.1f} s "
-        f"late, less than --min-slack {min_slack_s:g}{more}, and no wait on the ground or at a "
-        f"corner, and no height layer, changes that; plan them further apart, or accept it with a "
-        f"smaller --min-slack"
-    )
-
-
 def _unkept(flight: Flight, one: Exported) -> list[str]:
     """A time that was not planned as the scenario's `[execution]` asks."""
-    planned_s = float(flight.last_sample[one.track.uas]) * flight.scenario.dt_s
+    sortie = one.track.sortie
+    planned_s = (sortie.landed - sortie.first) * flight.scenario.dt_s
     file_s = one.followed.duration_s
     if abs(file_s - planned_s) <= PROMISE * planned_s:
         return []
@@ -281,7 +237,8 @@ def _unkept(flight: Flight, one: Exported) -> list[str]:
     ]
 
 
-def _notes(flight: Flight, exports: Sequence[Exported]) -> list[str]:
+def _notes(part: Part) -> list[str]:
+    flight, exports = part.flight, part.exports
     scenario = flight.scenario
     notes = []
     if scenario.moving_obstacles:

@@ -1,9 +1,9 @@
-"""One UAS of an export: its legs, how they are flown, and what that takes of its battery."""
+"""One file of an export: its legs, how they are flown, and what that takes of the battery."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class LegCharge:
 
     Attributes:
         time_s: Since the command to start [s].
-        planned_s: The same in the flight that was planned [s].
+        planned_s: The same in the sortie that was planned [s].
         soc: State of charge [-].
         planned_soc: The same in the planned flight [-].
         home: What flying home from there and landing takes, with margin (`mission.Range`) [-].
@@ -52,12 +52,29 @@ class LegCharge:
     spare_s: float
 
 
+class Start(NamedTuple):
+    """How a file begins.
+
+    Attributes:
+        at_s: When it is started, on the clock of the mission [s].
+        delay_s: How much later that is than the UAS could be started [s].
+        soc: State of charge [-].
+    """
+
+    at_s: float
+    delay_s: float
+    soc: float
+
+
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """One UAS of an export.
+    """One file of an export: a UAS from a take-off to the landing after it.
 
     Attributes:
         track: Its legs.
+        begins_s: When it is started, on the clock of the mission [s].
+        delay_s: How much later that is than the UAS could be started, for others [s].
+        soc_0: State of charge at the start [-].
         speeds_mps: (legs,) as the file sets them [m/s].
         holds_s: (legs,) how long it stops at the end of each; 0: it flies on [s].
         waits: Where it waits for others.
@@ -74,6 +91,9 @@ class Exported:
     """
 
     track: Track
+    begins_s: float
+    delay_s: float
+    soc_0: float
     speeds_mps: tuple[float, ...]
     holds_s: tuple[float, ...]
     waits: Waits
@@ -86,6 +106,11 @@ class Exported:
     looks_ahead: bool
     not_as_asked: tuple[int, ...]
     triggers_m: tuple[float, ...]
+
+    @property
+    def lands_s(self) -> float:
+        """When it has landed, on the clock of the mission [s]."""
+        return self.begins_s + self.followed.duration_s
 
     @property
     def point_of_no_return(self) -> int | None:
@@ -121,13 +146,27 @@ def exported(
     frame: LocalFrame,
     tolerances: Tolerances,
     waits: Waits = Waits(),  # noqa: B008 (immutable)
+    start: Start | None = None,
 ) -> Exported:
-    """What there is to say about a track."""
+    """What there is to say about a track.
+
+    Args:
+        flight: What was flown.
+        track: A sortie of it.
+        frame: Where on the Earth.
+        tolerances: Those of the export.
+        waits: Where it waits for others.
+        start: When it is started, and how much is in its battery; None: first of all, as planned.
+    """
     scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
+    begins = start or Start(0.0, 0.0, scenario.uas[track.uas].soc_0)
     flown = followed(track, scenario, tolerances, waits)
-    charges, soc_landed = _charges(flight, track, flown, waits)
+    charges, soc_landed = _charges(flight, track, flown, waits, begins.soc)
     return Exported(
         track=track,
+        begins_s=begins.at_s,
+        delay_s=begins.delay_s,
+        soc_0=begins.soc,
         speeds_mps=file_speeds(track, scenario),
         holds_s=file_holds(track, waits),
         waits=waits,
@@ -199,7 +238,7 @@ def _returns(
 
 
 def _charges(
-    flight: Flight, track: Track, followed: Followed, waits: Waits
+    flight: Flight, track: Track, followed: Followed, waits: Waits, soc_0: float
 ) -> tuple[tuple[LegCharge, ...], float]:
     """Charge after each leg, of level flight at full speed all the time: a careful estimate."""
     scenario, i = flight.scenario, track.uas
@@ -207,7 +246,7 @@ def _charges(
     ways_home = Range(MissionBrief.of(scenario))
     ends = followed.corner_s
     began_s = ends[0] - (1.0 - _IDLE_SHARE) * waits.start_s
-    dod, charges = 1.0 - uas.soc_0 + dod_per_s(vehicle, 1.0 - uas.soc_0) * began_s, []
+    dod, charges = 1.0 - soc_0 + dod_per_s(vehicle, 1.0 - soc_0) * began_s, []
     for leg, start_s, end_s in zip(track.legs, ends, ends[1:], strict=False):
         # a hold at the end of a leg is counted with the next one
         dod += dod_per_s(vehicle, min(dod, 1.0)) * (end_s - start_s)
@@ -220,7 +259,7 @@ def _charges(
         charges.append(
             LegCharge(
                 time_s=float(end_s),
-                planned_s=leg.sample * scenario.dt_s,
+                planned_s=(leg.sample - track.sortie.first) * scenario.dt_s,
                 soc=1.0 - dod,
                 planned_soc=float(flight.soc[leg.sample, i]),
                 home=needed,
@@ -239,6 +278,8 @@ def waiting(one: Exported) -> list[str]:
         lines.append(one.track.layer)
     if waits.start_s:
         lines.append(f"takes off {waits.start_s} s after the start of its mission")
+    if one.delay_s:
+        lines.append(f"is started {one.delay_s:.0f} s later than it could be")
     if waits.leg is not None:
         lines.append(f"waits {waits.hold_s} s longer at the end of leg {waits.leg + 1}")
     return lines

@@ -106,6 +106,14 @@ def flown_flight(plan: Flight, logs: Mapping[str, Logged], frame: LocalFrame) ->
             notes += [f"{uas.name}: {note}" for note in said]
             tracks.append(track)
     flight = _judged(scenario, tracks)
+    for i, (uas, track) in enumerate(zip(scenario.uas, tracks, strict=True)):
+        landed = int(flight.last_sample[i])
+        away_m = np.linalg.norm(track.x[landed:, :2] - uas.start_m[:2], axis=1)
+        if (away_m > AT_HOME_M).any():
+            notes.append(
+                f"{uas.name}: its log flies on after the landing at {landed * scenario.dt_s:g} s; "
+                f"only the sortie until then is judged"
+            )
     off_path_m = {
         uas.name: _off_path_m(plan, flight, i)
         for i, uas in enumerate(scenario.uas)

@@ -84,7 +84,7 @@ def _others(
 ) -> Iterator[Track]:
     """A track at other heights."""
     scenario = flight.scenario
-    others = [other.uas for other in tracks if other is not track]
+    others = [other.uas for other in tracks if other.uas != track.uas]
     gap_m = max((kept_m(scenario, track.uas, u) for u in others), default=0.0) + _APART_M
     if not any(scenario.waypoints[w].heights_m for w in track.waypoints):
         for up_m in (gap_m, -gap_m):

@@ -1,57 +1,90 @@
 """What an export promises: charge per leg, point of no return, room, and how late a UAS may be."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission.lateness import Pair
+from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.exported import Exported, waiting, waypoint_margins
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.tracks import Tolerances
 
 
-def report(
-    flight: Flight,
-    exports: Sequence[Exported],
-    pairs: Sequence[Pair],
-    frame: LocalFrame,
-    tolerances: Tolerances,
-) -> dict[str, Any]:
+def report(parts: Sequence[Part], frame: LocalFrame, tolerances: Tolerances) -> dict[str, Any]:
     """The report as plain data; times, charges and delays are those of the leg model.
 
     Args:
-        flight: What was exported.
-        exports: The UAS that fly.
-        pairs: How late they may be.
+        parts: The flights of the mission, with their files.
         frame: Where on the Earth.
         tolerances: Those of the export.
     """
-    scenario = flight.scenario
-    passed = {w for one in exports for w in one.track.waypoints}
+    flight = parts[0].flight
+    passed = [{w for one in part.exports for w in one.track.waypoints} for part in parts]
     return {
-        "scenario": scenario.name,
+        "scenario": flight.scenario.name,
         "planner": flight.planner,
         "place": frame.place.model_dump(),
         "path_tolerance_m": tolerances.path_m,
         "corner_tolerance_m": tolerances.corner_m,
-        "waypoints": len(scenario.waypoints),
-        "waypoints_passed": len(passed),
-        "uas": [_uas(flight, one) for one in exports],
-        "pairs": [_pair(pair, frame) for pair in pairs],
+        "waypoints": len(flight.scenario.waypoints),
+        "waypoints_passed": sum(map(len, passed)),
+        "duration_s": round(max(part.lands_s for part in parts), 1),
+        "uas": [_file(part, one) for part, one in _in_order(parts)],
+        "turnarounds": _turnarounds(parts),
+        "pairs": [_pair(pair, frame) for part in parts for pair in part.pairs],
     }
 
 
-def _uas(flight: Flight, one: Exported) -> dict[str, Any]:
+def _in_order(parts: Sequence[Part]) -> list[tuple[Part, Exported]]:
+    """The files, those of a UAS one after the other."""
+    names = parts[0].flight.names
+    return [(part, one) for name in names for part in parts for one in part.of(name)]
+
+
+def _turnarounds(parts: Sequence[Part]) -> list[dict[str, Any]]:
+    """What is to be done between the sorties of each UAS, in order of time."""
+    found = []
+    for (part, one), (next_part, after) in pairwise(_in_order(parts)):
+        name = part.flight.names[one.track.uas]
+        if next_part.flight.names[after.track.uas] == name:
+            fresh = after.track.sortie.fresh
+            found.append(
+                {
+                    "uas": name,
+                    "landed": one.track.name,
+                    "lands_s": round(one.lands_s, 1),
+                    "soc_landed": round(one.soc_landed, 4),
+                    "fresh_pack": fresh,
+                    "next": after.track.name,
+                    "soc_next": round(after.soc_0, 4),
+                    "starts_s": after.begins_s,
+                    "on_ground_s": round(after.begins_s - one.lands_s, 1),
+                }
+            )
+    return sorted(found, key=lambda entry: entry["lands_s"])
+
+
+def _file(part: Part, one: Exported) -> dict[str, Any]:
+    flight: Flight = part.flight
     track, room = one.track, one.track.room
+    sortie, dt_s = track.sortie, flight.scenario.dt_s
     lost = one.point_of_no_return
     tightest = min(range(len(one.charges)), key=lambda n: one.charges[n].spare)
     margins = waypoint_margins(flight.scenario, one)
     return {
         "name": track.name,
+        "uas": flight.names[track.uas],
+        "sortie": track.number,
+        "begins_s": one.begins_s,
+        "lands_s": round(one.lands_s, 1),
+        "planned_begins_s": part.flown_from_s + sortie.first * dt_s,
         "duration_s": round(one.followed.duration_s, 1),
-        "planned_s": float(flight.last_sample[track.uas]) * flight.scenario.dt_s,
+        "planned_s": (sortie.landed - sortie.first) * dt_s,
+        "soc_start": round(one.soc_0, 4),
         "soc_landed": round(one.soc_landed, 4),
-        "planned_soc_landed": round(float(flight.soc[-1, track.uas]), 4),
+        "planned_soc_landed": round(float(flight.soc[sortie.landed, track.uas]), 4),
         "soc_reserve": round(1.0 - flight.scenario.uas[track.uas].dod_max, 4),
         "off_path_m": round(track.off_m, 3),
         "spare_room_m": round(room.spare_m, 3),

@@ -6,9 +6,8 @@ from typing import Any
 
 import shapely
 
+from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.convex import hull_of
-from uas_coverage_env.operations.exported import Exported
-from uas_coverage_env.scenario import Scenario
 
 _COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
 _STYLE = """
@@ -26,33 +25,72 @@ _NOTE = (
 )
 
 
-def report_page(scenario: Scenario, exports: Sequence[Exported], data: dict[str, Any]) -> str:
+def report_page(parts: Sequence[Part], data: dict[str, Any]) -> str:
     """The page.
 
     Args:
-        scenario: The mission.
-        exports: The UAS that fly.
+        parts: The flights of the mission, with their files.
         data: What `report` says of them.
     """
-    title = f"{escape(scenario.name)}, flown by {escape(data['planner'])}"
-    parts = [
+    title = f"{escape(data['scenario'])}, flown by {escape(data['planner'])}"
+    blocks = [
         f"<h1>{title}</h1>",
         f"<p>{data['waypoints_passed']} of {data['waypoints']} waypoints are passed; files are "
         f"within {data['path_tolerance_m']:g} m of the flight. {_NOTE}</p>",
-        _map(scenario, exports),
+        _map(parts),
+        _order(data),
         _fleet(data["uas"]),
         _waits(data["uas"]),
-        _pairs(data["pairs"]),
+        _pairs(data),
         *(_legs(uas) for uas in data["uas"]),
     ]
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
-    return f"{head}<style>{_STYLE}</style><body>{''.join(parts)}</body></html>\n"
+    return f"{head}<style>{_STYLE}</style><body>{''.join(blocks)}</body></html>\n"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     cells = "".join(f"<th>{name}</th>" for name in head)
     body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table><tr>{cells}</tr>{body}</table>"
+
+
+def _order(data: dict[str, Any]) -> str:
+    """When each file is started, and what is to be done after its landing."""
+    if not data["turnarounds"]:
+        return ""
+    then = {entry["landed"]: entry for entry in data["turnarounds"]}
+    rows = [
+        [
+            escape(uas["name"]),
+            _clock(uas["begins_s"]),
+            f"{uas['soc_start']:.0%}",
+            _clock(uas["lands_s"]),
+            f"{uas['soc_landed']:.0%}",
+            _then(then.get(uas["name"])),
+        ]
+        for uas in sorted(data["uas"], key=lambda one: (one["begins_s"], one["name"]))
+    ]
+    head = ["file", "start at", "charge", "lands at", "charge", "then"]
+    text = (
+        "<p>Minutes and seconds from the start of the first files. Start each file by this clock, "
+        "also where its UAS has landed or been swapped early.</p>"
+    )
+    return f"<h2>Order</h2>{text}" + _table(head, rows)
+
+
+def _then(turnaround: dict[str, Any] | None) -> str:
+    if turnaround is None:
+        return "stays on the ground"
+    what = "swap its pack" if turnaround["fresh_pack"] else "it flies on with the same pack"
+    return (
+        f"{what}; load {escape(turnaround['next'])} within {turnaround['on_ground_s']:.0f} s, "
+        f"start it at {_clock(turnaround['starts_s'])}"
+    )
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d}"
 
 
 def _fleet(fleet: Sequence[dict[str, Any]]) -> str:
@@ -93,7 +131,8 @@ def _waits(fleet: Sequence[dict[str, Any]]) -> str:
     return f"<p>To keep apart:</p><ul>{''.join(lines)}</ul>" if lines else ""
 
 
-def _pairs(pairs: Sequence[dict[str, Any]]) -> str:
+def _pairs(data: dict[str, Any]) -> str:
+    pairs = data["pairs"]
     if not pairs:
         return ""
     rows = [
@@ -108,6 +147,8 @@ def _pairs(pairs: Sequence[dict[str, Any]]) -> str:
     ]
     head = ["pair", "least distance, m", "to be kept, m", "either may be late by", "else close at"]
     text = "<p>All missions are started at the same time.</p>"
+    if data["turnarounds"]:
+        text = "<p>Files that are in the air at the same time, each started as the order says.</p>"
     return f"<h2>Delays</h2>{text}" + _table(head, rows)
 
 
@@ -139,8 +180,9 @@ def _degrees(place: dict[str, float]) -> str:
     return f"{place['latitude_deg']:.6f}, {place['longitude_deg']:.6f}"
 
 
-def _map(scenario: Scenario, exports: Sequence[Exported]) -> str:
+def _map(parts: Sequence[Part]) -> str:
     """The mission from above, north up: x is east, y is minus north."""
+    scenario = parts[0].flight.scenario
     corners_m = scenario.fence.vertices_m[:, :2]
     low, high = corners_m.min(axis=0), corners_m.max(axis=0)
     span_m = float((high - low).max())
@@ -154,11 +196,14 @@ def _map(scenario: Scenario, exports: Sequence[Exported]) -> str:
         f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
         for w in scenario.waypoints
     ]
-    for n, one in enumerate(exports):
+    names = parts[0].flight.names
+    files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
+    for n, one in files:
         colour = _COLOURS[n % len(_COLOURS)]
         line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
         shapes.append(
-            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="{1.5 * pen}"/>'
+            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="{1.5 * pen}">'
+            f"<title>{escape(one.track.name)}</title></polyline>"
         )
         x, y, _ = one.track.home_m
         shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
-from uas_coverage_env.flight.record import LANDED
 from uas_coverage_env.geometry import nearest_on_segment
 from uas_coverage_env.operations.room import Room, Surroundings
+from uas_coverage_env.operations.sorties import Sortie, sorties_of
 from uas_coverage_env.world.coverage import covering_samples
 
 FloatArray = NDArray[np.float64]
@@ -33,6 +33,7 @@ SPENT_M = 1.0
 """Of a safe distance, what a leg may use: the rest is the autopilot's."""
 
 STOP_S = 1.0
+_GROUND_M = 0.3
 _PATIENCE = 6
 _CUTS = (0.25, 0.5, 1.0)
 _CUT_SEEN = 5.0
@@ -65,19 +66,22 @@ class Track:
 
     Attributes:
         uas: Index of the UAS.
-        name: Its name.
+        name: Of its file: that of the UAS, and which of its sorties it is, if there are several.
+        sortie: Which part of the flight it is.
         home_m: (3,) its start on the ground [m].
         take_off_m: (3,) where the first leg begins, above the start [m].
         legs: One or more.
         off_m: Largest distance of a sample from its leg [m].
         waypoints: Which this UAS covers.
         passed_m: (len(waypoints),) how close the legs, corners cut, come to each centre [m].
-        flown_m: (T, 3) the samples that the legs stand for [m].
+        flown_m: (T, 3) the samples that the legs stand for, from the first of the sortie on [m].
         layer: How heights differ from those of the flight, in words; empty: they do not.
+        number: Of the sortie among those of the UAS, from 1 on.
     """
 
     uas: int
     name: str
+    sortie: Sortie
     home_m: FloatArray
     take_off_m: FloatArray
     legs: tuple[Leg, ...]
@@ -86,6 +90,7 @@ class Track:
     passed_m: FloatArray
     flown_m: FloatArray
     layer: str = ""
+    number: int = 1
 
     @property
     def corners_m(self) -> FloatArray:
@@ -114,8 +119,8 @@ class Tolerances:
     corner_m: float = 2.0
 
 
-def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None:
-    """The legs of a UAS; None where it stays on the ground.
+def make_tracks(flight: Flight, uas: int, tolerances: Tolerances) -> list[Track]:
+    """The legs of each sortie of a UAS; of those that leave the ground.
 
     Args:
         flight: In which the UAS has landed.
@@ -125,15 +130,37 @@ def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None
     Raises:
         InputError: No legs could be found that are free of contact.
     """
+    found = (make_track(flight, uas, one, tolerances) for one in sorties_of(flight, uas))
+    return [track for track in found if track is not None]
+
+
+def make_track(flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances) -> Track | None:
+    """The legs of a sortie; None where the UAS stays on the ground.
+
+    Args:
+        flight: In which the UAS has landed.
+        uas: Index of the UAS.
+        sortie: From which take-off to which landing.
+        tolerances: How far legs may be from the flight.
+
+    Raises:
+        InputError: No legs could be found that are free of contact.
+    """
     scenario = flight.scenario
-    flying = np.flatnonzero(flight.mode[:, uas] < LANDED)
-    path = flight.x[: flying[-1] + 1, uas, 0:3] if len(flying) else np.empty((0, 3))
+    path = flight.x[sortie.first : sortie.landed, uas, 0:3]
     high = np.flatnonzero(-path[:, 2] >= LIFT_M)
     if not len(high):
         return None
     first, last = int(high[0]), int(high[-1])
+    touches = first + np.flatnonzero(-path[first:last, 2] < _GROUND_M)
+    if len(touches):  # in a flight made of a log, which does not say that it has landed
+        at_s = (sortie.first + int(touches[0])) * scenario.dt_s
+        raise InputError(
+            f"{scenario.uas[uas].name} is on the ground {at_s:g} s after the start and flies on; "
+            f"export the flight that was planned instead"
+        )
     home_m = np.array(scenario.uas[uas].start_m) * (1.0, 1.0, 0.0)
-    builder = _Builder(flight, uas, path, tolerances)
+    builder = _Builder(flight, uas, sortie, tolerances)
     take_off_m = np.array([*home_m[:2], path[first, 2]])
     above_m = np.array([*home_m[:2], path[last, 2]])
     points = [(take_off_m, first), (path[first], first), *builder.legs(first, last)]
@@ -144,7 +171,7 @@ def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None
     if len(points) == 1 or np.linalg.norm(points[-1][0] - above_m) > 0.1:
         points.append((above_m, last))
     legs = tuple(
-        Leg(end_m, j, builder.speed_mps(i, j), builder.around.room(start_m, end_m))
+        Leg(end_m, sortie.first + j, builder.speed_mps(i, j), builder.around.room(start_m, end_m))
         for (start_m, i), (end_m, j) in pairwise(points)
     )
     corners = np.array([point for point, _ in points])
@@ -156,6 +183,7 @@ def make_track(flight: Flight, uas: int, tolerances: Tolerances) -> Track | None
     track = Track(
         uas=uas,
         name=scenario.uas[uas].name,
+        sortie=sortie,
         home_m=home_m,
         take_off_m=take_off_m,
         legs=legs,
@@ -191,7 +219,7 @@ def relaid(
         tolerances: How far legs may be from the flight.
         layer: What is different, in words.
     """
-    builder = _Builder(flight, track.uas, track.flown_m, tolerances)
+    builder = _Builder(flight, track.uas, track.sortie, tolerances)
     legs = tuple(
         replace(track.legs[n], end_m=end_m, room=builder.around.room(start_m, end_m), stop=False)
         for (start_m, end_m), n in zip(pairwise(corners), leg_of, strict=True)
@@ -247,9 +275,10 @@ def _cut(
 
 
 class _Builder:
-    """Finds the legs of one UAS."""
+    """Finds the legs of one sortie; samples are counted from its first one."""
 
-    def __init__(self, flight: Flight, uas: int, path: FloatArray, tolerances: Tolerances) -> None:
+    def __init__(self, flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances) -> None:
+        path = flight.x[sortie.first : sortie.landed, uas, 0:3]
         self.path, self.tolerances, self.dt_s = path, tolerances, flight.scenario.dt_s
         self.around = Surroundings(flight.scenario, uas)
         self._rests_between = flight.scenario.execution is not None
@@ -261,9 +290,12 @@ class _Builder:
         self._centres = centres
         self._radii = np.array([w.radius_m for w in flight.scenario.waypoints])
         for w, sample in enumerate(first_at):
-            if sample < len(path) and (covering_samples(flight.scenario, w, flight.x[sample])[uas]):
+            if (
+                sortie.first <= sample < sortie.landed
+                and (covering_samples(flight.scenario, w, flight.x[sample])[uas])
+            ):
                 self.waypoints.append(w)
-                self._covered.setdefault(int(sample), []).append(w)
+                self._covered.setdefault(int(sample) - sortie.first, []).append(w)
 
     def legs(self, first: int, last: int) -> list[tuple[FloatArray, int]]:
         """Ends of legs from one sample to another, each with its sample."""

@@ -9,6 +9,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.export import check_flight
 from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.sorties import sorties_of
 from uas_coverage_env.operations.stream.clock import Clock
 from uas_coverage_env.operations.stream.companion import (
     REACTIONS,
@@ -51,6 +52,11 @@ def stream_flight(
     check_flight(flight)
     plans = {}
     for u, name in enumerate(flight.names):
+        if len(sorties_of(flight, u)) > 1:
+            raise InputError(
+                f"{name} lands and takes off again, which stream cannot wait for; stream each "
+                f"sortie of `run --sorties` ([sorties] with together = true), or export files"
+            )
         plan = timeline_of(flight, u)
         if plan is not None:
             plans[name] = plan
