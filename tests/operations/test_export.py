@@ -7,6 +7,7 @@ import warnings
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ pytest.importorskip("pyproj")
 from geographiclib.geodesic import Geodesic
 from pymavlink import mavwp
 from qgc_loader import problems
+from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.cli import main
@@ -336,3 +338,19 @@ def test_a_place_is_given_once(flight, place):
     with pytest.raises(InputError, match=r"has a \[place\] already"):
         exported(placed, place, "csv")
     assert exported(placed, None, "csv").files == exported(flight, place, "csv").files
+
+
+def test_a_file_keeps_clear_of_what_events_added_and_asks_for_what_they_left():
+    pole = box("pole", (70.0, 102.0, -40.0), (72.0, 104.0, 0.0), safe_distance_m=1.0)
+    events: Any = (
+        {"kind": "obstacle_added", "at_s": 2.0, **pole},
+        {"kind": "waypoint_dropped", "at_s": 3.0, "waypoint": 2},
+    )
+    points = [waypoint((north_m, 100.0, -20.0), 5.0) for north_m in (40.0, 120.0, 180.0)]
+    scenario = meadow(((10.0, 100.0, -1.0),), waypoints=points)
+    flight = rollout(scenario.model_copy(update={"events": events}), "nearest-waypoint")
+    there = Place(latitude_deg=0, longitude_deg=0)
+    (with_pole,) = exported(flight, there, "csv").data["uas"]
+    (without,) = exported(dataclasses.replace(flight, events=()), there, "csv").data["uas"]
+    assert 0.5 < with_pole["room_to_contact_m"] < 2.5 < without["room_to_contact_m"]
+    assert exported(flight, there, "csv").data["waypoints"] == 2

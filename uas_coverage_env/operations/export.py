@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import MODES, Flight, sorties_summary
+from uas_coverage_env.flight import MODES, Flight, SceneHistory, sorties_summary
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.mission.separation import Waits, ready_s
@@ -89,6 +89,7 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
     frame = LocalFrame(place_of_flight(flights[0], options.place))
     for flight in flights:
         check_flight(flight)
+    flights = [_as_events_left_it(flight) for flight in flights]
     laid = [_tracks(flight, settled) for flight in flights]
     if not any(laid):
         raise InputError("no UAS flies in this flight; there is nothing to export")
@@ -107,6 +108,16 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
     grounded = tuple(name for name in flights[0].names if name not in flying)
     notes = dict.fromkeys(note for part in parts for note in _notes(part))
     return Export(files, data, grounded, tuple(notes))
+
+
+def _as_events_left_it(flight: Flight) -> Flight:
+    """The flight among all that was there at its end: files cannot say when something appears."""
+    if not flight.events:
+        return flight
+    history = SceneHistory.of(flight)
+    scenario, _ = history.scene_at(flight.steps)
+    moving_m = history.moving_position_m
+    return replace(flight, scenario=scenario, events=(), moving_position_m=moving_m)
 
 
 def _tracks(flight: Flight, settled: Settled) -> list[Track]:
