@@ -45,8 +45,6 @@ def resume(
             screen.print(f"{name} was lost and is left out", markup=False)
         elif from_here and modes[i] != LANDED:
             screen.print(f"{name} goes on with {flight.soc[-1, i]:.1%} of charge", markup=False)
-    screen.print(
-        f"{len(rest.waypoints)} of {len(flight.scenario.waypoints)} waypoints are left; "
-        f"scenario in {out}",
-        markup=False,
-    )
+    left = len(rest.waypoints)
+    asked = left + int(flight.covered[-1])
+    screen.print(f"{left} of {asked} waypoints are left; scenario in {out}", markup=False)
