@@ -209,6 +209,8 @@ class _Search:
         for other in placed:
             if other.uas == self._fleet[k][0]:
                 continue
+            if other.leave_s[-1] + self._slack_s + _TOLERANCE_S <= slot.since_s:
+                continue  # it had landed before, and flies on in a file of its own
             found = self._encounters(other, k, followed)
             slack_s = self._slack_s + _TOLERANCE_S
             excluded = _excluded(found, other, followed, sample, slot, slack_s)

@@ -29,6 +29,9 @@ _APART_M = 1.5
 
 _LAYERS = 3
 
+_MOST_FILES = 6
+"""Of more, each tried with all others, the search would take minutes."""
+
 
 class Apart(NamedTuple):
     """Tracks with the waits that keep them apart.
@@ -63,6 +66,8 @@ def in_layers(
         settle: Waits for tracks.
     """
     best = apart
+    if len(apart.tracks) > _MOST_FILES:
+        return best
     for _ in apart.tracks:
         if best.waited_s <= LONG_WAITS_S:
             break
