@@ -1,6 +1,7 @@
 """Options of the whole test suite, its quick part, and who runs what where several processes do."""
 
 import os
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,19 @@ from distribution import rank_of, scope_of, write_seconds
 from quick_files import QUICK, is_quick
 
 TESTS = Path(__file__).parent
+ROOT = TESTS.parent
+
+
+def pytest_configure():
+    """Programs that tests start run the sources that are tested, and share their kernels.
+
+    `python -m pytest` tests this folder; a program that is started elsewhere would import, and
+    compile, what is installed.
+    """
+    tested = find_spec("uas_coverage_env")
+    if tested is not None and tested.origin and Path(tested.origin).parents[1] == ROOT:
+        folders = [str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+        os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, folders)))
 
 
 def pytest_addoption(parser):

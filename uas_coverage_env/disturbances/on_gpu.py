@@ -3,14 +3,13 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numba import njit
+from uas_coverage_env.compiled.kernels import kernel as compiled
 
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.disturbances.act import check_and_clip, clear
 from uas_coverage_env.disturbances.wind import blow
 from uas_coverage_env.world.state import FLYING
 
-compiled = njit(error_model="numpy")
 
 
 def are_own(kernels: Sequence[Any]) -> bool:
