@@ -121,7 +121,7 @@ class WaypointRunner:
                 observation=np.zeros(OBSERVATION_SIZE, dtype=np.float32),
             ),
             scores=np.zeros(K + 1),
-            flight=flight_code() if self._simulations else 0,
+            flight=0,
         )
         self._plan, self._trial, self._best = (no_plan(n_uas, n_waypoints) for _ in range(3))
         self._rng = np.random.default_rng(seed)
@@ -182,7 +182,8 @@ class WaypointRunner:
         improve(
             self._still, self._legs, self._weights, Moment(state, self._targets, self._blocked),
             return_mode, assistants(return_mode, self._assistants.safety_filter), self._plan,
-            self._simulations, self._workspace, self._rng, self._trial, self._best,
+            self._simulations, self._workspace._replace(flight=flight_code()), self._rng,
+            self._trial, self._best,
         )  # fmt: skip
         self._plan, self._best = self._best, self._plan
         choices.candidates[:], choices.legal[:] = kept

@@ -78,7 +78,7 @@ class Workspace(NamedTuple):
     choices: Choices
     scores: NDArray[np.float64]
     flight: int
-    """The `team.flight_code` that flies it."""
+    """The `team.flight_code` that flies it: of this process, so it is given with each call."""
 
 
 @allocating_kernel
