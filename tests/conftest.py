@@ -10,6 +10,7 @@ from quick_files import QUICK, is_quick
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
+PATH_BEFORE = "PYTHONPATH_BEFORE_TESTS"
 
 
 def pytest_configure():
@@ -19,9 +20,17 @@ def pytest_configure():
     compile, what is installed.
     """
     tested = find_spec("uas_coverage_env")
+    path = os.environ.get("PYTHONPATH", "")
+    os.environ.setdefault(PATH_BEFORE, path)  # by the process that starts the others of `-n`
     if tested is not None and tested.origin and Path(tested.origin).parents[1] == ROOT:
-        folders = [str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
-        os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, folders)))
+        folders = filter(None, [str(ROOT), *path.split(os.pathsep)])
+        os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(folders))
+
+
+@pytest.fixture
+def user_environment():
+    """The environment variables with which a user starts what is installed."""
+    return {**os.environ, "PYTHONPATH": os.environ[PATH_BEFORE]}
 
 
 def pytest_addoption(parser):
