@@ -1,6 +1,7 @@
 """Options of the whole test suite, its quick part, and who runs what where several processes do."""
 
 import os
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,28 @@ from distribution import rank_of, scope_of, write_seconds
 from quick_files import QUICK, is_quick
 
 TESTS = Path(__file__).parent
+ROOT = TESTS.parent
+PATH_BEFORE = "PYTHONPATH_BEFORE_TESTS"
+
+
+def pytest_configure():
+    """Programs that tests start run the sources that are tested, and share their kernels.
+
+    `python -m pytest` tests this folder; a program that is started elsewhere would import, and
+    compile, what is installed.
+    """
+    tested = find_spec("uas_coverage_env")
+    path = os.environ.get("PYTHONPATH", "")
+    os.environ.setdefault(PATH_BEFORE, path)  # by the process that starts the others of `-n`
+    if tested is not None and tested.origin and Path(tested.origin).parents[1] == ROOT:
+        folders = filter(None, [str(ROOT), *path.split(os.pathsep)])
+        os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(folders))
+
+
+@pytest.fixture
+def user_environment():
+    """The environment variables with which a user starts what is installed."""
+    return {**os.environ, "PYTHONPATH": os.environ[PATH_BEFORE]}
 
 
 def pytest_addoption(parser):

@@ -167,12 +167,17 @@ def test_a_name_that_the_terminal_cannot_show_is_shown_as_it_can(elsewhere, monk
     assert b"drawn in d\\xf6rfer.png" in terminal.getvalue()
 
 
-def test_the_installed_command_answers_like_this_process(elsewhere):
+def test_the_installed_command_answers_like_this_process(elsewhere, user_environment):
     program = Path(sys.executable).with_name("uas-coverage")
     (elsewhere / "bad.toml").write_text("schema = 1\nname = ")
     for arguments in (["run", "bad.toml"], ["run", "village", "--wind", "3"]):
         result = subprocess.run(
-            [program, *arguments], cwd=elsewhere, capture_output=True, text=True, timeout=120
+            [program, *arguments],
+            cwd=elsewhere,
+            env=user_environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
         )
         assert result.returncode == 2
         assert result.stderr.startswith("error: ")

@@ -3,14 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numba import njit
-
 from uas_coverage_env.compiled.array_views import slice_view
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.disturbances.act import check_and_clip, clear
 from uas_coverage_env.disturbances.wind import blow
 from uas_coverage_env.world.state import FLYING
-
-compiled = njit(error_model="numpy")
 
 
 def are_own(kernels: Sequence[Any]) -> bool:
@@ -29,7 +26,7 @@ def disturb_with(kernels: Sequence[Any]) -> Callable[..., None]:
     """
     act = _one_of(kernels)
 
-    @compiled
+    @kernel
     def disturb(arena, state, outcome):
         for i in range(state.status.shape[0]):
             clear(outcome[i])
@@ -52,7 +49,7 @@ def _one_of(kernels: Sequence[Any], first: int = 0) -> Any:
     own = kernels[first]
     others = _one_of(kernels, first + 1) if first + 1 < len(kernels) else _none
 
-    @compiled
+    @kernel
     def act(d, arena, state, outcome, i, parameters, memory, random):
         if d == first:
             own(arena, state, outcome, i, parameters, memory, random)
@@ -62,6 +59,6 @@ def _one_of(kernels: Sequence[Any], first: int = 0) -> Any:
     return act
 
 
-@compiled
+@kernel
 def _none(d, arena, state, outcome, i, parameters, memory, random):
     pass

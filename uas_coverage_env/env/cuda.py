@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, cuda, njit
+from numba import config, cuda
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
@@ -162,7 +162,7 @@ def _write_as_usual(pool, acting, missions, lane):
 def _write_with(write: Any) -> Any:
     """A function that writes commands with the kernel of a kind of action of one's own."""
 
-    @njit(error_model="numpy")
+    @kernel
     def write_own(pool, acting, missions, lane):
         # before the step: an action that cannot be flown is refused as one that is not finite
         arena = arena_of(pool.arenas, 0)
@@ -197,7 +197,7 @@ def _fly_with(kernels: tuple[Any, ...]) -> Any:
     """The same with disturbances of one's own, of which these are the kernels."""
     disturb = disturb_with(kernels)
 
-    @njit(error_model="numpy")
+    @kernel
     def fly_disturbed(pool, missions, nonlinear, lane):
         arena = arena_of(pool.arenas, 0)
         state = state_of(missions.worlds, lane, pool.arenas, 0)

@@ -22,7 +22,7 @@ from uas_coverage_agents.waypoint.legs import legs_of
 from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_plan, planned
-from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, next_to_decide
+from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, flight_code, next_to_decide
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import (
@@ -121,6 +121,7 @@ class WaypointRunner:
                 observation=np.zeros(OBSERVATION_SIZE, dtype=np.float32),
             ),
             scores=np.zeros(K + 1),
+            flight=0,
         )
         self._plan, self._trial, self._best = (no_plan(n_uas, n_waypoints) for _ in range(3))
         self._rng = np.random.default_rng(seed)
@@ -181,7 +182,8 @@ class WaypointRunner:
         improve(
             self._still, self._legs, self._weights, Moment(state, self._targets, self._blocked),
             return_mode, assistants(return_mode, self._assistants.safety_filter), self._plan,
-            self._simulations, self._workspace, self._rng, self._trial, self._best,
+            self._simulations, self._workspace._replace(flight=flight_code()), self._rng,
+            self._trial, self._best,
         )  # fmt: skip
         self._plan, self._best = self._best, self._plan
         choices.candidates[:], choices.legal[:] = kept

@@ -24,7 +24,7 @@ from uas_coverage_agents.waypoint.team import (
     TIME,
     Choices,
     choose,
-    fly_on,
+    fly_on_by,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.views import copy_arrays
@@ -77,6 +77,8 @@ class Workspace(NamedTuple):
     outcome: NDArray[np.void]
     choices: Choices
     scores: NDArray[np.float64]
+    flight: int
+    """The `team.flight_code` that flies it: of this process, so it is given with each call."""
 
 
 @allocating_kernel
@@ -160,8 +162,8 @@ def simulate(
     new.following[:] = 0
     n = 0
     while True:
-        i = fly_on(
-            arena, legs, state, return_mode, assistants, blocked, targets,
+        i = fly_on_by(
+            workspace.flight, arena, legs, state, return_mode, assistants, blocked, targets,
             workspace.commands, workspace.outcome, workspace.choices, account,
         )  # fmt: skip
         if i == NO_UAS:

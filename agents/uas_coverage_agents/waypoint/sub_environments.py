@@ -15,7 +15,8 @@ from uas_coverage_agents.waypoint.team import (
     NO_UAS,
     Choices,
     choose,
-    fly_on,
+    flight_code,
+    fly_on_by,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.memory import Memory, Pool, Values
@@ -73,7 +74,7 @@ def make_lanes(n_lanes: int, pool: WorldPool) -> tuple[WaypointSubEnvironments, 
 
 
 @allocating_kernel
-def _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants):
+def _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants, flight):
     s = lanes.scenario[lane]
     arena = arena_of(worlds.arenas, s)
     n_uas = arena.uas.shape[0]
@@ -81,8 +82,8 @@ def _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants):
     state = state_of(states, lane, worlds.arenas, s)
     legs = legs_at(all_legs, s)
     choices = Choices(lanes.candidates[lane], lanes.legal[lane], lanes.observation[lane])
-    lanes.decider[lane] = fly_on(
-        arena, legs, state, return_mode, assistants, lanes.blocked[lane, :n_waypoints],
+    lanes.decider[lane] = fly_on_by(
+        flight, arena, legs, state, return_mode, assistants, lanes.blocked[lane, :n_waypoints],
         lanes.targets[lane, :n_uas], lanes.commands[lane, :n_uas], lanes.outcome[lane, :n_uas],
         choices, lanes.account[lane],
     )  # fmt: skip
@@ -90,7 +91,7 @@ def _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants):
 
 @allocating_kernel
 def begin_lane(
-    worlds, all_legs, lanes, states, lane, s, covered, discharged, return_mode, assistants
+    worlds, all_legs, lanes, states, lane, s, covered, discharged, return_mode, assistants, flight
 ):
     """Begin a mission in a lane and fly to its first decision.
 
@@ -105,6 +106,7 @@ def begin_lane(
         discharged: (most UAS,) depth of discharge in addition to the scenario's.
         return_mode: Whether the world brings UAS home in time.
         assistants: See `world.advance`.
+        flight: The `team.flight_code` that flies it.
     """
     state = state_of(states, lane, worlds.arenas, s)
     copy_arrays(start_of(worlds.starts, s), state)
@@ -116,7 +118,7 @@ def begin_lane(
     lanes.targets[lane] = NO_TARGET
     lanes.blocked[lane] = False
     lanes.account[lane] = 0.0
-    _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants)
+    _fly_lane(worlds, all_legs, lanes, states, lane, return_mode, assistants, flight)
 
 
 class _Given(NamedTuple):
@@ -139,20 +141,42 @@ _keep, _take = _HANDOVER.keep, _HANDOVER.take
 
 
 @allocating_kernel(parallel=True)
-def begin_lanes(
-    worlds, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants
+def _begin_lanes(
+    worlds, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants, flight
 ):
-    """`begin_lane` in some lanes; `which`, `s`, `covered` and `discharged` have a row for each."""
     kept = _keep(_Given(worlds, all_legs, lanes, states))
     for k in prange(which.shape[0]):
         given = _take(kept)
         begin_lane(
             given.worlds, given.legs, given.lanes, given.states, which[k], s[k], covered[k],
-            discharged[k], return_mode, assistants,
+            discharged[k], return_mode, assistants, flight,
         )  # fmt: skip
 
 
+def begin_lanes(
+    worlds, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants
+):
+    """`begin_lane` in some lanes; `which`, `s`, `covered` and `discharged` have a row for each."""
+    _begin_lanes(
+        worlds, all_legs, lanes, states, which, s, covered, discharged, return_mode, assistants,
+        flight_code(),
+    )  # fmt: skip
+
+
 @allocating_kernel(parallel=True)
+def _step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants, flight):
+    kept = _keep(_Given(worlds, all_legs, lanes, states))
+    for lane in prange(choices.shape[0]):
+        given = _take(kept)
+        i = given.lanes.decider[lane]
+        if i != NO_UAS:
+            choose(given.lanes.targets[lane], given.lanes.candidates[lane], i, choices[lane])
+            _fly_lane(
+                given.worlds, given.legs, given.lanes, given.states, lane, return_mode, assistants,
+                flight,
+            )  # fmt: skip
+
+
 def step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants):
     """Let the UAS whose turn it is decide, and fly on to the next decision, in every lane.
 
@@ -167,12 +191,4 @@ def step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants
         return_mode: Whether the world brings UAS home in time.
         assistants: See `world.advance`.
     """
-    kept = _keep(_Given(worlds, all_legs, lanes, states))
-    for lane in prange(choices.shape[0]):
-        given = _take(kept)
-        i = given.lanes.decider[lane]
-        if i != NO_UAS:
-            choose(given.lanes.targets[lane], given.lanes.candidates[lane], i, choices[lane])
-            _fly_lane(
-                given.worlds, given.legs, given.lanes, given.states, lane, return_mode, assistants
-            )
+    _step_lanes(worlds, all_legs, lanes, states, choices, return_mode, assistants, flight_code())

@@ -1,11 +1,14 @@
 """A team between decisions: which UAS needs a target, and the flight until one does."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import typeof, types
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE
+from uas_coverage_agents.waypoint.legs import LEGS
 from uas_coverage_agents.waypoint.observation import (
     NO_TARGET,
     allowed,
@@ -14,11 +17,14 @@ from uas_coverage_agents.waypoint.observation import (
     observe,
 )
 from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import find_blocked
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import FLYING, GO_TO, HOME, VELOCITY
+from uas_coverage_env.world import COMMAND_DTYPE, FLYING, GO_TO, HOME, OUTCOME_DTYPE, VELOCITY
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.state import STATE
 
 NO_UAS = -1
 
@@ -156,3 +162,36 @@ def fly_on(
     account[NOT_HOME] = (state.status == FLYING).sum()
     account[LEFT] = state.uncovered.sum()
     return NO_UAS
+
+
+@cache
+def _types() -> tuple[types.Type, ...]:
+    """Of the arguments of `fly_on`."""
+    whole, flags = np.empty(0, np.int64), np.empty(0, np.bool_)
+    choices = Choices(whole, flags, np.empty(0, np.float32))
+    arrays = (flags, whole, np.empty(0, COMMAND_DTYPE), np.empty(0, OUTCOME_DTYPE), choices)
+    return (
+        ARENA.numba_type(), LEGS.numba_type(), STATE.numba_type(), types.boolean, typeof(whole),
+        *map(typeof, arrays), typeof(np.empty(0)),
+    )  # fmt: skip
+
+
+_SIGNATURE = Signature(
+    "arena legs state return_mode assistants blocked targets commands outcome choices account",
+    _types,
+    types.int64,
+)
+
+fly_on_by = _SIGNATURE.call
+"""In a kernel, (flight_code(), *arguments): `fly_on`, which is more code than all that calls it,
+and so is compiled once, by itself."""
+
+
+@cache
+def flight_code() -> int:
+    """Compile `fly_on`, or load it from the cache.
+
+    Returns:
+        Its address, for one process.
+    """
+    return _SIGNATURE.address_of(fly_on)
