@@ -36,7 +36,7 @@ SMALL_FLEET = 4
 
 _UNFLOWN_S = 1000.0
 _LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
-_HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
+HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _FINISHED = 0.95  # of a draft's steps: no flight of 60 missions was made shorter than 0.952
 _BATTERY = "the battery does not last"
 _BUDGETS = 3
@@ -48,7 +48,8 @@ class Effort:
     """How much to search; nothing of it is a time.
 
     Attributes:
-        orders: Searches for an order, each with flights of its own.
+        orders: Searches for an order.
+        planned: So many orders get flights, the cheapest first.
         moves: Of each search.
         programs: Solved for each flight, about.
         total_weight: Worth of a second of each UAS's flight against one of the mission.
@@ -56,6 +57,7 @@ class Effort:
     """
 
     orders: int
+    planned: int
     moves: int
     programs: int
     total_weight: float
@@ -142,9 +144,9 @@ def plan_mission(
     for _ in range(_BUDGETS):
         task = fleet.task(moment, less_s)
         known: set[tuple[bytes, ...]] = set()
-        orders = _orders(task, effort, seed, kept)
+        orders = _orders(task, effort, seed, kept)[: effort.planned]
         for order in orders:
-            if task.n_uas > SMALL_FLEET and order.cost_s > _HOPELESS * orders[0].cost_s:
+            if task.n_uas > SMALL_FLEET and order.cost_s > HOPELESS * orders[0].cost_s:
                 break
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
