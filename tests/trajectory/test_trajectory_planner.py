@@ -77,7 +77,7 @@ def test_the_same_seed_flies_the_same_mission(small_town, flight):
 
 
 def test_the_whole_mission_is_flown_as_planned_before_take_off(small_town):
-    watched = Watched(TrajectoryOptions(**QUICK))
+    watched = Watched(TrajectoryOptions(**QUICK, idle_work=0))
     flight = rollout(small_town, watched)
     for u, uas in enumerate(small_town.uas):
         planned_m = watched.decisions[0].predicted_m[uas.name]
@@ -96,9 +96,9 @@ def test_without_any_solution_it_stays_where_it_is_and_lands_at_last(small_town,
 
 def test_a_solver_that_dies_in_flight_changes_nothing_of_what_was_verified(small_town, monkeypatch):
     solver = Breakable(monkeypatch, lambda _, found: found)
-    watched = Watched(TrajectoryOptions(**QUICK))
-    whole = rollout(small_town, watched)
+    planner().reset(MissionBrief.of(small_town), 0)
     before_take_off = solver.calls
+    whole = rollout(small_town, planner(idle_work=0))
 
     def dies(calls, found):
         return found._replace(converged=False) if calls > before_take_off else found

@@ -18,7 +18,7 @@ from uas_coverage_baselines.routing.route_time import (
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
 _SAME_TEMPERATURE = 64  # moves
-_OVERTIME = 200.0  # cost of a second beyond the budget, in seconds
+OVERTIME = 200.0  # cost of a second beyond the budget, in seconds
 
 
 class State(NamedTuple):
@@ -43,7 +43,7 @@ def cost_s(task, seconds, left_out, n_left_out, total_weight):
         longest = max(longest, seconds[u])
         cost += total_weight * seconds[u]
         if seconds[u] > max(budget[u], 0.0):  # a UAS that may not fly costs nothing where it stays
-            cost += _OVERTIME * (seconds[u] - budget[u])
+            cost += OVERTIME * (seconds[u] - budget[u])
     for k in range(n_left_out):
         cost += left_out_s[left_out[k]]
     return cost + longest
