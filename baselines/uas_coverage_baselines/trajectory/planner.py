@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
-from uas_coverage_baselines.trajectory.course import Course, hover_inputs
+from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement
 from uas_coverage_baselines.trajectory.mission_plan import (
@@ -51,7 +51,7 @@ _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
-_SOON_S = 22.0  # a visit to what is still blocked so soon is put off,
+_SOON_S = BRAKING_S  # a visit to what is still blocked so soon is put off,
 _AT_LAST_S = 8.0  # given up where it cannot be put off
 
 
