@@ -165,7 +165,7 @@ def test_flights_planned_side_by_side_are_those_planned_one_by_one():
 
     def flights(threads):
         drafts = fleet.drafts(*mission, 20, {}, threads)
-        return fleet.apart(*mission, fleet.flights(*mission, drafts, threads))
+        return done(fleet.apart(*mission, fleet.flights(*mission, drafts, threads)))
 
     one, three = flights(1), flights(3)
     for uas in range(3):
