@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from uas_coverage_baselines.routing import (
+    OrderSearch,
     Routes,
     RouteWindow,
     RoutingTask,
     SearchEffort,
+    annealing,
     empty_routes,
     improve_routes,
 )
@@ -85,12 +87,7 @@ def cost_of(task, seconds, left_out, total_weight):
     """What the search minimises, from everybody's seconds."""
     overtime = sum(max(s - b, 0.0) for s, b in zip(seconds, task.budget_s, strict=True))
     left_s = search_module._left_out_s(task, total_weight)[list(left_out)].sum()
-    return (
-        max(0.0, *seconds)
-        + total_weight * sum(seconds)
-        + search_module._OVERTIME * overtime
-        + left_s
-    )
+    return max(0.0, *seconds) + total_weight * sum(seconds) + annealing.OVERTIME * overtime + left_s
 
 
 def cheapest(task, total_weight):
@@ -207,7 +204,7 @@ def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
     found = improve_routes(problem, empty_routes(2), SOME, seed)
     # so little overtime is cheaper than a waypoint; the guide's reserve is far more
     dearest_s = search_module._left_out_s(problem, SOME.total_weight).max()
-    slight_s = dearest_s / search_module._OVERTIME
+    slight_s = dearest_s / annealing.OVERTIME
     assert (found.seconds <= problem.budget_s + slight_s).all()
     assert len(found.left_out)
 
@@ -237,6 +234,19 @@ def test_a_lost_uass_waypoints_go_to_the_others():
     lost = replace(problem, budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
     after = improve_routes(lost, before, SOME, 0)
     assert sorted(after.routes[0]) == list(range(10))
+
+
+@pytest.mark.parametrize("parts", [(5000,), (1, 63, 900, 10_000)])
+def test_a_search_in_parts_finds_what_it_finds_at_once(parts):
+    problem, effort = task(8, 20), SearchEffort(5000)
+    search = OrderSearch(problem, empty_routes(2), effort, 7)
+    for moves in parts:
+        assert not search.is_over
+        search.go_on(moves)
+    assert search.is_over
+    whole = improve_routes(problem, empty_routes(2), effort, 7)
+    assert search.best.cost_s == whole.cost_s
+    assert [r.tolist() for r in search.best.routes] == [r.tolist() for r in whole.routes]
 
 
 def test_a_waypoint_that_opens_late_is_waited_for():

@@ -13,6 +13,7 @@ from uas_coverage_baselines.trajectory.retiming import (
     worth,
 )
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
+from uas_coverage_baselines.trajectory.work import done
 
 from uas_coverage_env.geometry import segment_clearance
 from uas_coverage_env.scenario import generate_scenario
@@ -21,8 +22,8 @@ from uas_coverage_env.vehicle import VX, VZ
 
 def quickest(fleet, start, route, budget):
     program = fleet.programs[0]
-    begun = draft(program, fleet.terrain, 0, start, route, budget)
-    return finished(program, start, route, begun)
+    begun = done(draft(program, fleet.terrain, 0, start, route, budget))
+    return done(finished(program, start, route, begun))
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,7 @@ def test_the_straight_segments_of_a_flight_clear_the_hulls(flown):
 
 def test_retiming_makes_a_flight_much_shorter_than_its_first_guess(flown):
     fleet, swarm, route, flight = flown
-    first = first_flight(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route)
+    first = done(first_flight(fleet.programs[0], fleet.terrain, 0, start_of(swarm), route))
     assert first.is_clear
     assert flight.steps < 0.85 * first.steps
 
@@ -109,7 +110,7 @@ def test_a_flight_makes_way_for_another_on_its_path(flown):
     body.path_m[: flight.steps // 3] += (60.0, 0.0, 0.0)  # joins later
     program = fleet.program(0, {}, [body], None)
     assert program.spare_from_bodies_m(flight.path_m) < 0.0
-    other = make_way(program, start_of(swarm), route, flight)
+    other = done(make_way(program, start_of(swarm), route, flight))
     assert program.spare_from_bodies_m(other.path_m) >= -0.02
     assert other.is_clear
 
@@ -164,7 +165,7 @@ def test_flights_planned_side_by_side_are_those_planned_one_by_one():
 
     def flights(threads):
         drafts = fleet.drafts(*mission, 20, {}, threads)
-        return fleet.apart(*mission, fleet.flights(*mission, drafts, threads))
+        return done(fleet.apart(*mission, fleet.flights(*mission, drafts, threads)))
 
     one, three = flights(1), flights(3)
     for uas in range(3):

@@ -14,7 +14,7 @@ from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, VX
 
-QUICK = {"orders": 1, "moves": 20_000, "programs": 40}
+QUICK = {"orders": 1, "moves": 20_000, "programs": 40, "idle_work": 0}
 TWO = ((100.0, 100.0, -1.0), (112.0, 100.0, -1.0))
 
 
@@ -96,15 +96,17 @@ def test_without_any_solution_it_stays_where_it_is_and_lands_at_last(small_town,
 
 def test_a_solver_that_dies_in_flight_changes_nothing_of_what_was_verified(small_town, monkeypatch):
     solver = Breakable(monkeypatch, lambda _, found: found)
-    watched = Watched(TrajectoryOptions(**QUICK))
-    whole = rollout(small_town, watched)
+    first, brief = planner(idle_work=450), MissionBrief.of(small_town)
+    first.warm_up(brief)
+    first.reset(brief, 0)
     before_take_off = solver.calls
+    whole = rollout(small_town, planner())
 
     def dies(calls, found):
         return found._replace(converged=False) if calls > before_take_off else found
 
     Breakable(monkeypatch, dies)
-    np.testing.assert_array_equal(rollout(small_town, planner()).x, whole.x)
+    np.testing.assert_array_equal(rollout(small_town, planner(idle_work=450)).x, whole.x)
 
 
 def test_wrong_solutions_are_not_flown(small_town, monkeypatch):

@@ -44,7 +44,7 @@ def blocked_field(until_s, socs, max_steps=300):
 
 
 def flown(scenario):
-    effort = {"orders": 1, "moves": 20_000, "programs": 40, "weight_energy": 0.0}
+    effort = {"orders": 1, "moves": 20_000, "programs": 40, "weight_energy": 0.0, "idle_work": 0}
     return rollout(scenario, Trajectory(TrajectoryOptions(**effort)))
 
 

@@ -95,7 +95,7 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
 
     def _order_of_trajectory(self, brief: MissionBrief, seed: int) -> tuple[Routes, float]:
         """The order of its plan, and the weight that it gives energy."""
-        planner = Trajectory(TrajectoryOptions(threads=self.options.threads))
+        planner = Trajectory(TrajectoryOptions(planned_orders=3, threads=self.options.threads))
         # with whole flights, also where an autopilot is to fly the mission by legs
         planner.reset(brief.model_copy(update={"execution": None}), seed)
         assert planner.mission_plan is not None

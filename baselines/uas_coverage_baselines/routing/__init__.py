@@ -1,7 +1,21 @@
 """A global order of the open waypoints for the whole swarm: which UAS visits which, and when."""
 
-from uas_coverage_baselines.routing.search import Routes, SearchEffort, empty_routes, improve_routes
+from uas_coverage_baselines.routing.search import (
+    OrderSearch,
+    Routes,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
 from uas_coverage_baselines.routing.task import RoutingTask
 from uas_coverage_baselines.routing.window import RouteWindow
 
-__all__ = ["RouteWindow", "Routes", "RoutingTask", "SearchEffort", "empty_routes", "improve_routes"]
+__all__ = [
+    "OrderSearch",
+    "RouteWindow",
+    "Routes",
+    "RoutingTask",
+    "SearchEffort",
+    "empty_routes",
+    "improve_routes",
+]

@@ -11,6 +11,7 @@ from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY
 from uas_coverage_baselines.trajectory.program import Flight, FlightProgram
 from uas_coverage_baselines.trajectory.space import Space
+from uas_coverage_baselines.trajectory.work import Work
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -48,7 +49,7 @@ class Speeds(NamedTuple):
 
 def first_flight(
     program: FlightProgram, terrain: Terrain, uas: int, start: FloatArray, route: IntArray
-) -> Flight:
+) -> Work[Flight]:
     """A flight along a route that violates nothing, however slow; else what violates least."""
     best: Flight | None = None
     limits = program.model
@@ -68,8 +69,9 @@ def first_flight(
         if wait_s:
             guess = _waiting(guess, start, max(round(wait_s / limits.dt_s), 1))
         flight = program.solve(start, route, guess.visits, guess.path_m, rounds=4)
+        yield flight.steps
         if np.isfinite(flight.violation):
-            flight = _mended(program, start, route, flight)
+            flight = yield from _mended(program, start, route, flight)
         if flight.is_clear:
             return flight
         if best is None or flight.violation < best.violation:
@@ -78,7 +80,9 @@ def first_flight(
     return best
 
 
-def _mended(program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight) -> Flight:
+def _mended(
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight
+) -> Work[Flight]:
     """Visits moved where they are missed, until nothing is violated or nothing helps."""
     for _ in range(_MENDS):
         if flight.is_clear:
@@ -88,11 +92,13 @@ def _mended(program: FlightProgram, start: FloatArray, route: IntArray, flight: 
                 visits = flight.visits.copy()
                 visits[k] = min(max(visits[k] + by, 1), flight.steps - 1)
                 new = program.solve(start, route, visits, flight.x, flight.u)
+                yield new.steps
                 if new.violation < flight.violation - 1e-3:
                     flight = new
                     break
         visits = deepest_visits(program, flight, route)
         new = program.solve(start, route, visits, flight.x, flight.u)
+        yield new.steps
         flight = new if new.violation < flight.violation else flight
     return flight
 

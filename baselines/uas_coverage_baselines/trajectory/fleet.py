@@ -22,6 +22,7 @@ from uas_coverage_baselines.trajectory.retiming import (
     stretches,
 )
 from uas_coverage_baselines.trajectory.space import Body, space_of
+from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD
 
@@ -170,17 +171,29 @@ class Fleet:
             known: Flights by UAS and route that need no search where they still may be flown.
             threads: UAS planned side by side; the flights are the same.
         """
-        earliest = moment.earliest if moment.earliest.any() else None
 
         def begun(u: int) -> Draft:
-            route, program = routes[u], self.program(u, {}, movers[u], earliest)
-            same = known.get((u, route.tobytes()))
-            if same is not None and program.allows(route, same):
-                return Draft(same, 0)
-            return draft(program, self.terrain, u, reduced_state(moment.x[u]), route, budget)
+            return done(self.draft(moment, u, routes[u], movers[u], budget, known))
 
         with ThreadPoolExecutor(threads) as side_by_side:  # the solver frees the GIL
             return dict(zip(routes, side_by_side.map(begun, routes), strict=True))
+
+    def draft(
+        self,
+        moment: Moment,
+        uas: int,
+        route: IntArray,
+        movers: Sequence[Body],
+        budget: int,
+        known: Mapping[tuple[int, bytes], Flight],
+    ) -> Work[Draft]:
+        """One of the `drafts`."""
+        program = self.program(uas, {}, movers, _earliest(moment))
+        same = known.get((uas, route.tobytes()))
+        if same is not None and program.allows(route, same):
+            return Draft(same, 0)
+        start = reduced_state(moment.x[uas])
+        return (yield from draft(program, self.terrain, uas, start, route, budget))
 
     def flights(
         self,
@@ -191,14 +204,19 @@ class Fleet:
         threads: int = 1,
     ) -> dict[int, Flight]:
         """Each UAS's quickest flight, whatever the others fly; arguments as for `drafts`."""
-        earliest = moment.earliest if moment.earliest.any() else None
 
         def alone(u: int) -> Flight:
-            program = self.program(u, {}, movers[u], earliest)
-            return finished(program, reduced_state(moment.x[u]), routes[u], drafts[u])
+            return done(self.flight(moment, u, routes[u], movers[u], drafts[u]))
 
         with ThreadPoolExecutor(threads) as side_by_side:
             return dict(zip(routes, side_by_side.map(alone, routes), strict=True))
+
+    def flight(
+        self, moment: Moment, uas: int, route: IntArray, movers: Sequence[Body], begun: Draft
+    ) -> Work[Flight]:
+        """One of the `flights`."""
+        program = self.program(uas, {}, movers, _earliest(moment))
+        return finished(program, reduced_state(moment.x[uas]), route, begun)
 
     def apart(
         self,
@@ -206,15 +224,19 @@ class Fleet:
         routes: Mapping[int, IntArray],
         movers: Mapping[int, Sequence[Body]],
         alone: Mapping[int, Flight],
-    ) -> dict[int, Flight]:
+    ) -> Work[dict[int, Flight]]:
         """The flights, of which a shorter one makes way for those that are longer."""
-        earliest = moment.earliest if moment.earliest.any() else None
         flights: dict[int, Flight] = {}
         for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
             paths_m = {k: flight.path_m for k, flight in flights.items()}
-            program = self.program(u, paths_m, movers[u], earliest)
-            flights[u] = make_way(program, reduced_state(moment.x[u]), routes[u], alone[u])
+            program = self.program(u, paths_m, movers[u], _earliest(moment))
+            start = reduced_state(moment.x[u])
+            flights[u] = yield from make_way(program, start, routes[u], alone[u])
         return flights
+
+
+def _earliest(moment: Moment) -> IntArray | None:
+    return moment.earliest if moment.earliest.any() else None
 
 
 def _asked(brief: MissionBrief) -> Asked | None:
@@ -226,7 +248,9 @@ def _asked(brief: MissionBrief) -> Asked | None:
     return None if nothing else Asked(heights_m, speeds_mps)
 
 
-def make_way(program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight) -> Flight:
+def make_way(
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight
+) -> Work[Flight]:
     """The flight clear of all bodies: as it is, bent, or some steps later; else as it is."""
     if program.spare_from_bodies_m(flight.path_m) >= 0.0 or not flight.is_clear:
         return flight
@@ -237,6 +261,7 @@ def make_way(program: FlightProgram, start: FloatArray, route: IntArray, flight:
             visits = shifted(flight.visits, order, stretch, later)
             steps = flight.steps + later
             new = retimed(program, start, route, flight, visits, steps, rounds=4)
+            yield new.steps
             if new.is_clear:
                 return new
     return flight

@@ -24,7 +24,9 @@ from uas_coverage_baselines.trajectory.course import (
 )
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.program import Flight
+from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_baselines.trajectory.work import Work, done
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -34,7 +36,7 @@ SMALL_FLEET = 4
 
 _UNFLOWN_S = 1000.0
 _LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
-_HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
+HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _FINISHED = 0.95  # of a draft's steps: no flight of 60 missions was made shorter than 0.952
 _BATTERY = "the battery does not last"
 _BUDGETS = 3
@@ -46,7 +48,8 @@ class Effort:
     """How much to search; nothing of it is a time.
 
     Attributes:
-        orders: Searches for an order, each with flights of its own.
+        orders: Searches for an order.
+        planned: So many orders get flights, the cheapest first.
         moves: Of each search.
         programs: Solved for each flight, about.
         total_weight: Worth of a second of each UAS's flight against one of the mission.
@@ -54,6 +57,7 @@ class Effort:
     """
 
     orders: int
+    planned: int
     moves: int
     programs: int
     total_weight: float
@@ -140,9 +144,9 @@ def plan_mission(
     for _ in range(_BUDGETS):
         task = fleet.task(moment, less_s)
         known: set[tuple[bytes, ...]] = set()
-        orders = _orders(task, effort, seed, kept)
+        orders = _orders(task, effort, seed, kept)[: effort.planned]
         for order in orders:
-            if task.n_uas > SMALL_FLEET and order.cost_s > _HOPELESS * orders[0].cost_s:
+            if task.n_uas > SMALL_FLEET and order.cost_s > HOPELESS * orders[0].cost_s:
                 break
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
@@ -199,24 +203,76 @@ def _flown(
 
     Flights found are added to `known`. None is returned where drafts show that `best` is cheaper.
     """
-    at_start, dt_s, weight = step == 0, fleet.brief.dt_s, effort.total_weight
-    routes = {
-        u: route
-        for u, route in enumerate(order.routes)
-        if moment.may_work[u] and (len(route) or not at_start)
-    }
-    each = max(_LEAST_PROGRAMS, SMALL_FLEET * effort.programs // max(len(routes), 1))
-    programs = min(effort.programs, each)
+    routes = _routes(moment, order, step)
+    programs = _programs(effort, len(routes))
     drafts = fleet.drafts(moment, routes, movers, programs, known, effort.threads)
-    if best is not None:
-        shares = np.array([_FINISHED if begun.left else 1.0 for begun in drafts.values()])
-        steps = np.array([begun.flight.steps for begun in drafts.values()])
-        least_s = _cost_s(dt_s * shares * steps, weight) + order.left_out_s
-        if least_s >= best.cost_s:
-            return None
+    if best is not None and _least_s(fleet, effort, order, drafts) >= best.cost_s:
+        return None
     alone = fleet.flights(moment, routes, movers, drafts, effort.threads)
     known.update({(u, routes[u].tobytes()): flight for u, flight in alone.items()})
-    flights = fleet.apart(moment, routes, movers, alone)
+    flights = done(fleet.apart(moment, routes, movers, alone))
+    return _verified(fleet, moment, step, effort, order, flights)
+
+
+def flown_along(
+    fleet: Fleet,
+    moment: Moment,
+    step: int,
+    movers: Mapping[int, Sequence[Body]],
+    effort: Effort,
+    order: Routes,
+    known: Mapping[tuple[int, bytes], Flight],
+    best_s: float,
+) -> Work[MissionPlan | None]:
+    """An order with its flights, planned in parts; None where it does not cost less than `best_s`.
+
+    Arguments as for `plan_mission`; `known` are flights by UAS and route.
+    """
+    routes = _routes(moment, order, step)
+    programs = _programs(effort, len(routes))
+    drafts: dict[int, Draft] = {}
+    for u, route in routes.items():
+        drafts[u] = yield from fleet.draft(moment, u, route, movers[u], programs, known)
+        if _least_s(fleet, effort, order, drafts) >= best_s:
+            return None
+    alone: dict[int, Flight] = {}
+    for u, route in routes.items():
+        alone[u] = yield from fleet.flight(moment, u, route, movers[u], drafts[u])
+    flights = yield from fleet.apart(moment, routes, movers, alone)
+    plan = _verified(fleet, moment, step, effort, order, flights)
+    return plan if plan.cost_s < best_s else None
+
+
+def _routes(moment: Moment, order: Routes, step: int) -> dict[int, IntArray]:
+    """Routes of the UAS that are to fly."""
+    return {
+        u: route
+        for u, route in enumerate(order.routes)
+        if moment.may_work[u] and (len(route) or step > 0)
+    }
+
+
+def _programs(effort: Effort, n_flights: int) -> int:
+    each = max(_LEAST_PROGRAMS, SMALL_FLEET * effort.programs // max(n_flights, 1))
+    return min(effort.programs, each)
+
+
+def _least_s(fleet: Fleet, effort: Effort, order: Routes, drafts: Mapping[int, Draft]) -> float:
+    """What flights made from drafts will cost at least."""
+    shares = np.array([_FINISHED if begun.left else 1.0 for begun in drafts.values()])
+    steps = np.array([begun.flight.steps for begun in drafts.values()])
+    return mission_cost_s(fleet.brief.dt_s * shares * steps, effort.total_weight) + order.left_out_s
+
+
+def _verified(
+    fleet: Fleet,
+    moment: Moment,
+    step: int,
+    effort: Effort,
+    order: Routes,
+    flights: Mapping[int, Flight],
+) -> MissionPlan:
+    """The flights that may be flown, alone and beside each other, as courses."""
     planned: dict[int, Planned] = {}
     troubles: dict[int, str] = {}
     for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):
@@ -227,15 +283,15 @@ def _flown(
         ):
             why = "too near to another UAS"
         if why is None:
-            planned[u] = Planned(routes[u], flights[u], course)
+            planned[u] = Planned(order.routes[u], flights[u], course)
         else:
             troubles[u] = why
-    seconds = dt_s * np.array([p.flight.steps for p in planned.values()])
-    cost_s = _cost_s(seconds, weight) + order.left_out_s
+    seconds = fleet.brief.dt_s * np.array([p.flight.steps for p in planned.values()])
+    cost_s = mission_cost_s(seconds, effort.total_weight) + order.left_out_s
     cost_s += _UNFLOWN_S * len(troubles)
     return MissionPlan(planned, order, cost_s, troubles)
 
 
-def _cost_s(seconds: FloatArray, weight: float) -> float:
+def mission_cost_s(seconds: FloatArray, weight: float) -> float:
     """The longest flight, and the weight times the sum of all."""
     return float(seconds.max(initial=0.0) + weight * seconds.sum())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,10 @@ class Movers:
         expected_m = before.position_m + later_s * before.velocity_mps
         away_m = np.linalg.norm(self.position_m - expected_m, axis=1)[self.n_obstacles :]
         return float(away_m.max(initial=0.0))
+
+    def later(self, steps: int) -> Movers:
+        """Where they will be after some steps."""
+        return replace(self, position_m=self.position_m + steps * self.dt_s * self.velocity_mps)
 
     @property
     def surprise_m(self) -> FloatArray:

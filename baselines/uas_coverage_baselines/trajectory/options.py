@@ -17,6 +17,12 @@ class TrajectoryOptions(PlannerOptions):
         le=100,
         description="orders searched before take-off; one where more than 8 UAS fly",
     )
+    planned_orders: int = Field(
+        default=1,
+        ge=1,
+        le=100,
+        description="of these, so many get flights before take-off, the cheapest first",
+    )
     moves: int = Field(
         default=300_000,
         ge=0,
@@ -24,6 +30,13 @@ class TrajectoryOptions(PlannerOptions):
     )
     programs: int = Field(
         default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
+    )
+    idle_work: int = Field(
+        default=450,
+        ge=0,
+        le=100_000,
+        description="steps of flights looked for in each later decision, to improve the plan "
+        "while flying; 0: none",
     )
     weight_energy: float = Field(
         default=0.6,

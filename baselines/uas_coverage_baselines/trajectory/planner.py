@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
-from uas_coverage_baselines.trajectory.course import Course, hover_inputs
+from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
+from uas_coverage_baselines.trajectory.improving import Ahead, Improvement
 from uas_coverage_baselines.trajectory.mission_plan import (
     SMALL_FLEET,
     Effort,
@@ -50,7 +51,7 @@ _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
-_SOON_S = 22.0  # a visit to what is still blocked so soon is put off,
+_SOON_S = BRAKING_S  # a visit to what is still blocked so soon is put off,
 _AT_LAST_S = 8.0  # given up where it cannot be put off
 
 
@@ -99,6 +100,9 @@ class Trajectory:
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
+        options = self.options
+        effort = Effort(1, 1, options.moves, options.programs, self.total_weight)
+        self._improvement = Improvement(self._fleet, effort, options.idle_work, seed)
         self._is_handed_over = False
         self._without_plan_since = np.full(len(brief.uas), -1)
         self._flown_as_planned = set(range(len(brief.uas)))
@@ -135,6 +139,8 @@ class Trajectory:
         reason = self._why_plan_anew(swarm, movers)
         if reason is not None:
             self._make_plan(swarm, movers)
+        else:
+            self._improve(swarm, movers)
         courses = {u: p.course.rest(swarm.step) for u, p in self._planned.items()}
         idle = [u for u in np.flatnonzero(flying).tolist() if u not in self._planned]
         staying = [u for u in idle if self._stays(u, swarm)]
@@ -328,12 +334,14 @@ class Trajectory:
         bodies = {u: self._bodies(movers, u) for u in range(len(swarm.x))}
         unknown = (opens >= NEVER) & swarm.uncovered
         options, n_uas = self.options, len(flying)
-        orders = min(options.orders, 2)
+        orders, planned = 1, 2  # and the one that is kept
         if first:
             orders = options.orders if n_uas <= _ONE_SEARCH else 1
+            planned = options.planned_orders
         larger = min(max(n_uas * len(unknown) / _SMALL, 1.0), _LARGER)
         effort = Effort(
             orders,
+            planned,
             round(larger * options.moves),
             options.programs,
             self.total_weight,
@@ -358,7 +366,10 @@ class Trajectory:
             now = replace(moment, barred=barred)
             return plan_mission(self._fleet, now, swarm.step, bodies, effort, seed, kept, flown)
 
-        barred = self._waiting.barred if self._is_handed_over and unknown.any() else None
+        # before take-off it costs little to have what is blocked visited by who can wait
+        barred = None
+        if unknown.any() and (first or self._is_handed_over):
+            barred = self._waiting.barred
         plan = found(barred)
         if barred is None and self._waiting.is_left_to_others(
             plan.planned, swarm.step, swarm.uncovered
@@ -375,6 +386,34 @@ class Trajectory:
                 self._may_fly[u] = u in plan.planned or u in plan.troubles
         self._ends = {u: p.course.end for u, p in plan.planned.items()}
         self._had = set(plan.planned)
+
+    def _improve(self, swarm: SwarmState, movers: Movers) -> None:
+        """Look for a better plan, where it is known where the UAS will be."""
+        plan, flying = self.mission_plan, set(np.flatnonzero(swarm.status == FLYING).tolist())
+        assert plan is not None
+        followed = self._planned.keys() & self._flown_as_planned
+        if self._is_disturbed or self._silent.any() or plan.troubles or not flying <= followed:
+            return
+
+        def ahead(then: int, planned: Mapping[int, Planned]) -> Ahead:
+            expected = movers.later(then - swarm.step)
+            opens = self._opens(expected)
+            unknown = (opens >= NEVER) & swarm.uncovered
+            earliest = np.where(opens > 0, opens, 0)
+            earliest[unknown] = 0
+            for p in planned.values():  # what is blocked is visited as late as planned
+                visits = p.flight.visits + p.course.begin - then
+                late = unknown[p.route]
+                earliest[p.route[late]] = np.maximum(visits[late], 0)
+            bodies = {u: self._bodies(expected, u) for u in range(len(swarm.x))}
+            return Ahead(earliest, self._waiting.barred if unknown.any() else None, bodies)
+
+        better = self._improvement.better(swarm, plan, self._planned, ahead)
+        if better is not None:
+            order = replace(better.order, left_out=plan.order.left_out)
+            self.mission_plan = replace(better, order=order)
+            self._planned |= better.planned
+            self._ends |= {u: p.course.end for u, p in better.planned.items()}
 
     def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort) -> int:
         """Steps after which a visit to what is blocked is planned, until more is known."""

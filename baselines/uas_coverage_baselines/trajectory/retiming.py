@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.first_guess import deepest_visits, first_flight
 from uas_coverage_baselines.trajectory.program import Flight, FlightProgram
+from uas_coverage_baselines.trajectory.work import Work
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -109,7 +110,7 @@ def draft(
     start: FloatArray,
     route: IntArray,
     budget: int,
-) -> Draft:
+) -> Work[Draft]:
     """A flight along a route, as short as all its stretches may be made at once.
 
     Args:
@@ -120,23 +121,26 @@ def draft(
         route: (K,) waypoints.
         budget: Programs to solve, about, fewer for long flights; the first flight is not counted.
     """
-    flight = first_flight(program, terrain, uas, start, route)
+    flight = yield from first_flight(program, terrain, uas, start, route)
     if not flight.is_clear:
         return Draft(flight, 0)
     # one program of a long flight takes as long as several of a short one
     until = program.solved + round(budget * min(1.0, _LONG_STEPS / flight.steps))
-    flight = _coarse(program, start, route, flight, until)
+    flight = yield from _coarse(program, start, route, flight, until)
     return Draft(flight, until - program.solved)
 
 
-def finished(program: FlightProgram, start: FloatArray, route: IntArray, begun: Draft) -> Flight:
+def finished(
+    program: FlightProgram, start: FloatArray, route: IntArray, begun: Draft
+) -> Work[Flight]:
     """The quickest flight found from a draft: steps are taken away one by one."""
-    return shorten(program, start, route, begun.flight, program.solved + begun.left)
+    until = program.solved + begun.left
+    return (yield from shorten(program, start, route, begun.flight, until))
 
 
 def _coarse(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, until: int
-) -> Flight:
+) -> Work[Flight]:
     """All stretches shorter at once; those in which time is dear get their steps back."""
     share, frozen = _FIRST_SHARE, np.zeros(len(route) + 1, bool)
     while share > _LAST_SHARE and program.solved < until:
@@ -152,8 +156,9 @@ def _coarse(
             visits = flight.visits.copy()
             visits[order] = ends[:-1]
             new = retimed(program, start, route, flight, visits, int(ends[-1]))
+            yield new.steps
             if not new.is_clear and new.violation < _MENDABLE:
-                new = repair(program, start, route, new, 3)
+                new = yield from repair(program, start, route, new, 3)
             if new.is_clear:
                 break
             prices = worth(new).gain
@@ -172,7 +177,7 @@ def _coarse(
 
 def repair(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, tries: int
-) -> Flight:
+) -> Work[Flight]:
     """Move steps between stretches until nothing is violated, or nothing helps."""
     tabu: set[bytes] = set()
     for _ in range(tries):
@@ -185,6 +190,7 @@ def repair(
                 continue
             tabu.add(key)
             new = retimed(program, start, route, flight, visits, flight.steps)
+            yield new.steps
             if new.violation < flight.violation - 1e-3:
                 better = new
                 break
@@ -213,7 +219,7 @@ def _candidates(program: FlightProgram, route: IntArray, flight: Flight) -> list
 
 def shorten(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, until: int
-) -> Flight:
+) -> Work[Flight]:
     """Take steps away, one by one, as long as a flight is left that violates nothing."""
     hint: Flight | None = None
     while program.solved < until:
@@ -229,7 +235,8 @@ def shorten(
             if not np.isfinite(cost[stretch]) or (visits < 1).any():
                 continue
             new = retimed(program, start, route, flight, visits, steps)
-            new = repair(program, start, route, new, _REPAIRS)
+            yield new.steps
+            new = yield from repair(program, start, route, new, _REPAIRS)
             if new.is_clear:
                 flight, found, hint = new, True, None
                 break
