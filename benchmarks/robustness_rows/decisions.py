@@ -28,6 +28,17 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
 """Planner -> options, and steps that are flown (None: the mission)."""
 
 
+# missions of each: (quick, full)
+_MISSIONS = {
+    "tour": (3, 60),
+    "trajectory": (2, 30),
+    "learned-waypoint": (1, 30),
+    "milp-mpc": (2, 30),
+    "milp-mpc-guided": (2, 30),
+}
+_OTHERS = (10, 300)
+
+
 class _Timed:
     """A planner whose decisions are timed."""
 
@@ -59,11 +70,10 @@ def decide(planner: str, seed: int) -> Result:
 
 def trials(quick: bool) -> list[Trial]:
     """Missions of every planner."""
-    seeds = range(FIRST_SEED, FIRST_SEED + (1 if quick else 60))
     return [
         Trial(f"{planner} {seed}", decide, (planner, seed))
         for planner in PLANNERS
-        for seed in seeds
+        for seed in range(FIRST_SEED, FIRST_SEED + _MISSIONS.get(planner, _OTHERS)[not quick])
     ]
 
 
