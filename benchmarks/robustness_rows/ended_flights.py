@@ -54,11 +54,10 @@ def fly_and_end(folder: Path, how: str, seed: int) -> dict[str, Any]:
     if not ended:
         os.kill(child, getattr(signal, how))
         status = _wait(child)
-    return {
-        "ended": bool(ended),
-        "code": os.waitstatus_to_exitcode(status),
-        "traceback": b"Traceback" in said.read_bytes(),
-    }
+    code, text = os.waitstatus_to_exitcode(status), said.read_text(errors="replace")
+    # by the signal, as a process that has not begun to handle it, or by a code of its own
+    crashed = "Traceback" in text or code not in (0, 1, -getattr(signal, how))
+    return {"ended": bool(ended), "code": code, "crashed": crashed, "said": text[-600:] * crashed}
 
 
 def _wait(child: int) -> int:

@@ -72,23 +72,32 @@ def trials(quick: bool) -> list[Trial]:
 
 
 def finding(results: Mapping[str, Result]) -> Finding:
-    """A kill fails where it leaves what is no flight, or ends in a traceback."""
+    """A kill fails where it leaves what is no flight, or ends in a traceback or a crash."""
     cells: dict[str, Counter[str]] = {}
     broken = KILLS_OF_A_TRIAL * len(errors(results))
     for result in results.values():
         tally = cells.setdefault(result["how"], Counter()) if "error" not in result else Counter()
         for one in result.get("kills", ()):
             tally[one["left"]] += 1
-            tally["traceback"] += one["traceback"]
-            tally["failed"] += one["traceback"] or one["left"] in ("damaged", "disagrees")
-    names = ("nothing", "a whole flight", "ended before", "damaged", "disagrees", "traceback")
+            tally["crashed"] += one["crashed"]
+            tally["failed"] += one["crashed"] or one["left"] in ("damaged", "disagrees")
+    names = ("nothing", "a whole flight", "ended before", "damaged", "disagrees", "crashed")
     rows = [
         (how, sum(tally[n] for n in names[:5]), *(tally[n] for n in names))
         for how, tally in cells.items()
     ]
     tried = sum(tally[n] for tally in cells.values() for n in names[:5]) + broken
     failed = sum(tally["failed"] for tally in cells.values()) + broken
-    return Finding(tried, failed, markdown(("ended by", "flights", *names), rows))
+    table = markdown(("ended by", "flights", *names), rows)
+    crashes = [
+        f"- {key}, flight {number}: code {one['code']}, `{one['said'].strip()[-200:]!r}`"
+        for key, result in results.items()
+        for number, one in enumerate(result.get("kills", ()))
+        if one["crashed"]
+    ]
+    if crashes:
+        table += "\n\nCrashes:\n\n" + "\n".join(crashes)
+    return Finding(tried, failed, table)
 
 
 ROW = Row(
@@ -96,7 +105,7 @@ ROW = Row(
     "Kills",
     "kills",
     "nothing is left of the flight, or a whole flight up to that moment with which the "
-    "independent checker agrees; no traceback",
+    "independent checker agrees; no traceback, no crash",
     trials,
     finding,
     lambda quick: (

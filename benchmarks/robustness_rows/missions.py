@@ -10,6 +10,7 @@ from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, s
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import sample_scenario
+from uas_coverage_env.scenario.family import N_OBSTACLES, N_UAS, N_WAYPOINTS
 
 LEVELS = ("still", "light", "moderate", "strong")
 FIRST_SEED = 3000
@@ -27,12 +28,21 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
 """Planner -> options. The MILP planner decides without a clock, so that a seed repeats its
 flight."""
 
-# missions of each level: (quick, full)
-_MISSIONS = {"milp-mpc-guided": (1, 30), "learned-waypoint": (4, 100), "trajectory": (4, 100)}
-_OTHERS = (6, 110)
+# missions of each level: (quick, small of the full run, large of it)
+_MISSIONS = {
+    "tour": (6, 300, 30),
+    "trajectory": (4, 300, 10),
+    "learned-waypoint": (1, 300, 10),
+    "milp-mpc-guided": (1, 30, 1),
+}
+_OTHERS = (30, 300, 300)
+
+_LARGE = "; large: {} to {} UAS, {} to {} waypoints, {} to {} blocks".format(
+    *N_UAS, *N_WAYPOINTS, *N_OBSTACLES
+)
 
 SMALL = ((1, 2), (8, 12), (3, 8))
-"""Least and most UAS, waypoints and obstacles of the quick missions; the others are those of
+"""Least and most UAS, waypoints and obstacles of the small missions; the large ones are those of
 `sample_scenario`."""
 
 
@@ -56,6 +66,7 @@ def fly(planner: str, level: str, seed: int, small: bool) -> Result:
         "planner": planner,
         "level": level,
         "seed": seed,
+        "small": small,
         "uas": len(flight.names),
         "accomplished": accomplished(flight),
         "coverage": float(coverage(flight)),
@@ -72,36 +83,47 @@ def fly(planner: str, level: str, seed: int, small: bool) -> Result:
 
 
 def trials(quick: bool) -> list[Trial]:
-    """Every planner at every level on the same missions."""
-    return [
-        Trial(f"{planner} {level} {seed}{' small' * quick}", fly, (planner, level, seed, quick))
-        for planner in OPTIONS
-        for seed in range(FIRST_SEED, FIRST_SEED + _MISSIONS.get(planner, _OTHERS)[not quick])
-        for level in LEVELS
-    ]
+    """Every planner at every level on the same missions; of each number, all levels together."""
+    result = []
+    for planner in OPTIONS:
+        quickly, *fully = _MISSIONS.get(planner, _OTHERS)
+        for small, many in zip((True, False), (quickly, 0) if quick else fully, strict=True):
+            size = "small" if small else "large"
+            result += [
+                Trial(f"{planner} {level} {seed} {size}", fly, (planner, level, seed, small))
+                for seed in range(FIRST_SEED, FIRST_SEED + many)
+                for level in LEVELS
+            ]
+    return result
 
 
 def finding(results: Mapping[str, Result]) -> Finding:
     """Per level and planner; a mission with a violation has failed."""
-    cells: dict[tuple[str, str], list[Result]] = defaultdict(list)
+    cells: dict[tuple[bool, str, str], list[Result]] = defaultdict(list)
     for result in results.values():
         if "error" not in result:
-            cells[result["level"], result["planner"]].append(result)
-    order = [(level, planner) for level in LEVELS for planner in OPTIONS]
+            cells[result["small"], result["level"], result["planner"]].append(result)
+    order = [
+        (small, level, planner)
+        for small in (True, False)
+        for level in LEVELS
+        for planner in OPTIONS
+    ]
     rows = [_line(*cell, cells[cell]) for cell in order if cells[cell]]
-    headings = ("level", "planner", "missions", "accomplished", "covered, %", "UAS lost")
+    headings = ("size", "level", "planner", "missions", "accomplished", "covered, %", "UAS lost")
     headings += ("missions with a limit exceeded", "breaches", "missions with breaches", "Wh")
     failed = sum(bool(one["violations"]) for many in cells.values() for one in many)
     failed += len(errors(results))
     return Finding(len(results), failed, markdown(headings, rows))
 
 
-def _line(level: str, planner: str, flown: list[Result]) -> list[object]:
+def _line(small: bool, level: str, planner: str, flown: list[Result]) -> list[object]:
     uas = sum(one["uas"] for one in flown)
     lost = Counter(kind for one in flown for kind, *_ in one["violations"] if kind != "limit")
     to_what = ", ".join(f"{kind} {count}" for kind, count in sorted(lost.items()))
     beyond = sum(any(kind == "limit" for kind, *_ in one["violations"]) for one in flown)
     return [
+        "small" if small else "large",
         level,
         f"`{planner}`",
         len(flown),
@@ -123,8 +145,8 @@ ROW = Row(
     trials,
     finding,
     lambda quick: (
-        f"generated missions from {FIRST_SEED} on, the same for every level"
-        + ", small ones: 1 or 2 UAS, 8 to 12 waypoints, 3 to 8 blocks" * quick
+        f"generated missions from {FIRST_SEED} on, the same for every level; small: 1 or 2 UAS, "
+        "8 to 12 waypoints, 3 to 8 blocks" + _LARGE * (not quick)
     ),
     "Other families than `generated`, the nonlinear plant, `milp-mpc` without a guide, and the "
     "MILP planner with a clock. `milp-mpc-guided` flies with "
