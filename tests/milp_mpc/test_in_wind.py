@@ -1,15 +1,21 @@
 """Plans of still air flown in wind: the wind is found out, and commands fly the plan."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_worlds import meadow, waypoint
+from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
+from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.in_wind import InWind, axes
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 
-from uas_coverage_env import World
+from uas_coverage_env import World, generate_scenario, rollout
 from uas_coverage_env.disturbances import constant_wind, wind_velocity_mps
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import TAU_X, TAU_Y, X
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.vehicle import TAU_X, TAU_Y, VX, VY, X, Y, Z
 from uas_coverage_env.world import Velocity
 
 FIELD = meadow(((100.0, 100.0, -30.0),), waypoints=(waypoint((150.0, 100.0, -30.0)),))
@@ -30,10 +36,9 @@ def flown(world, in_wind, velocity_mps, steps):
     return seen
 
 
-def accelerating(seen, alpha_radps2, off_m=0.0):
-    """A plan of angular accelerations (north, east) from where the UAS is seen, or south of it."""
+def accelerating(seen, alpha_radps2):
+    """A plan of angular accelerations (north, east) from where the UAS is seen."""
     x, u = np.array([[seen.x[0], seen.x[0]]]), np.zeros((1, 1, 5))
-    x[0, :, X] -= off_m
     inertia_kgm2 = MissionBrief.of(FIELD).vehicles[0].airframe.inertia_kgm2
     u[0, 0, TAU_Y] = -alpha_radps2[0] * inertia_kgm2[1]
     u[0, 0, TAU_X] = alpha_radps2[1] * inertia_kgm2[0]
@@ -76,15 +81,31 @@ def test_the_commanded_velocity_flies_the_plans_accelerations_in_wind_as_in_stil
     np.testing.assert_allclose(gained, alpha * FIELD.dt_s, atol=4e-3)
 
 
-def test_what_an_old_plan_is_off_by_is_fed_back():
-    world, in_wind = world_in(0.0), InWind(MissionBrief.of(FIELD))
-    seen = flown(world, in_wind, (0.0, 0.0), 3)
-    here, off = (
-        in_wind.velocities(accelerating(seen, (0.0, 0.0), off_m), seen, lambda name: "covering")[
-            "uas_1"
-        ]
-        for off_m in (0.0, 2.0)
-    )
-    assert (here.north_mps, here.east_mps) == pytest.approx((0.0, 0.0), abs=1e-6)
-    assert off.north_mps < -0.5
-    assert off.east_mps == pytest.approx(0.0, abs=1e-6)
+def test_a_plan_goes_on_from_where_the_uas_is_and_leads_back_to_itself():
+    brief = MissionBrief.of(FIELD)
+    planner = MilpMpc(MilpMpcOptions(horizon=12))
+    planner.reset(brief, 0)
+    problem = planner.problem(first_sight(brief))
+    plan = fallback_plans(problem, 0, None, brief.dt_s)[0]
+    off = np.zeros(14)
+    off[[X, Y, Z, VX, VY]] = 0.8, -0.5, 0.3, 0.3, 0.2
+    here = replace(problem, x0=problem.x0 + off)
+    led = InWind(brief).from_here(plan, here)
+    np.testing.assert_array_equal(led.x[0, 0], here.x0[0])
+    model = problem.models[0]
+    for k in range(plan.u.shape[1]):  # a flight of the same model
+        step = model.A @ (led.x[0, k] - plan.x[0, k]) + model.B @ (led.u[0, k] - plan.u[0, k])
+        np.testing.assert_allclose(led.x[0, k + 1] - plan.x[0, k + 1], step, atol=1e-9)
+    assert np.abs((led.x - plan.x)[0, -1, :6]).max() < 0.1
+    assert np.abs((led.x - plan.x)[0, :, :3]).max() < 1.3
+    assert first_trouble(here, plan) is not None
+    assert first_trouble(here, led) is None
+
+
+def test_of_a_fleet_that_plans_in_turn_nobody_brakes_between_its_turns():
+    town = generate_scenario(5, n_uas=2, n_waypoints=6, n_obstacles=2, disturbances="light")
+    options = GuidedOptions(horizon=10, in_wind="tube", deterministic=True, at_once=1, threads=1)
+    flight = rollout(town, MilpMpcGuided(options), 0, max_steps=8)
+    first_mps = np.hypot(flight.x[2:, 0, VX], flight.x[2:, 0, VY])
+    assert first_mps[-1] > 10.0
+    assert (np.diff(first_mps) > 0.0).all()

@@ -7,8 +7,12 @@ wind, which is found out as the inner loop finds it out. What it does beyond, th
 
 The inner loop asks for -gain · (v - r, tilt + trim (w - r), rate). Told the velocity r for which
 that is the plan's angular acceleration, it flies the plan, within the governor's bounds, and holds
-against the wind. Where a plan goes on that was made before, what it is off by is fed back, the
-position too.
+against the wind.
+
+A plan that was made before begins where the UAS should be, not where it is. It goes on from there
+with what it is off by fed back, the position too: as the tube has it, in which there is room for
+that (constraint tightening: Chisci, Rossiter and Zappa, Automatica 37(7), 2001). Of a fleet that
+plans in turn, all but one go on so.
 """
 
 from __future__ import annotations
@@ -22,23 +26,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import (
+    LIFT,
     PHI,
     TAU_X,
     TAU_Y,
     THETA,
     VX,
     VY,
+    VZ,
     WX,
     WY,
+    LinearModel,
     VehicleParams,
     X,
     Y,
     Z,
 )
-from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.tube import belief_gain
 from uas_coverage_env.world import FLYING, Mode, SwarmState, Velocity
 
@@ -57,10 +65,24 @@ def position_gain(vehicle: VehicleParams, dt_s: float) -> FloatArray:
 
     The linear-quadratic regulator that weighs a metre, a metre per second and 0.3 rad/s² alike.
     """
-    A, B = horizontal_axis(vehicle, dt_s)
-    cost, B = np.array([[_HOLDING_COST]]), B[:, None]
-    P = solve_discrete_are(A, B, np.diag([1.0, 1.0, 0.0, 0.0]), cost)
-    gain: FloatArray = np.linalg.solve(cost + B.T @ P @ B, B.T @ P @ A)[0]
+    return _regulator(*horizontal_axis(vehicle, dt_s), _HOLDING_COST)
+
+
+@lru_cache(maxsize=64)
+def climb_gain(vehicle: VehicleParams, dt_s: float) -> FloatArray:
+    """(2,) [N/m, N s/m] of height and climb, for the lift; a metre weighs as much as 3 m/s²."""
+    A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
+    own = [Z, VZ]
+    return _regulator(A[np.ix_(own, own)], B[own, LIFT], 0.1 / vehicle.airframe.mass_kg**2)
+
+
+def _regulator(A: FloatArray, B: FloatArray, cost: float) -> FloatArray:
+    """Gain of the linear-quadratic regulator of position and velocity, one each, and one input."""
+    Q = np.zeros_like(A)
+    Q[0, 0] = Q[1, 1] = 1.0
+    costs, B = np.array([[cost]]), B[:, None]
+    P = solve_discrete_are(A, B, Q, costs)
+    gain: FloatArray = np.linalg.solve(costs + B.T @ P @ B, B.T @ P @ A)[0]
     return gain
 
 
@@ -82,6 +104,7 @@ class InWind:
         self._axis = [horizontal_axis(vehicle, brief.dt_s) for vehicle in brief.vehicles]
         self._loop = [design_velocity_loop(vehicle, brief.dt_s).gain for vehicle in brief.vehicles]
         self._hold = [position_gain(vehicle, brief.dt_s) for vehicle in brief.vehicles]
+        self._climb = [climb_gain(vehicle, brief.dt_s) for vehicle in brief.vehicles]
         self.wind_mps = np.zeros((len(brief.uas), 2))
         self._before: SwarmState | None = None
         self._seen = np.zeros(len(brief.uas), np.int64)
@@ -107,13 +130,40 @@ class InWind:
         self._seen[i] += 1
         self.wind_mps[i] += gain * (off_mps / (1.0 - A[1, 1]) - self.wind_mps[i])
 
+    def from_here(self, plan: Plan | None, problem: PlanningProblem) -> Plan | None:
+        """What is left of a plan, from where the UAS of the problem are."""
+        if plan is None:
+            return None
+        x, u = plan.x.copy(), plan.u.copy()
+        for uas, name in enumerate(problem.names):
+            if name in plan.names:
+                row, i = plan.of(name), self._names[name]
+                self._go_on(i, problem.models[uas], problem.x0[uas], x[row], u[row])
+        return replace(plan, x=x, u=u)
+
+    def _go_on(
+        self, i: int, model: LinearModel, x0: FloatArray, x: FloatArray, u: FloatArray
+    ) -> None:
+        """Change states (n+1, 14) and inputs (n, 5) such that they lead back from x0."""
+        vehicle, off, climb = self._vehicles[i], x0 - x[0], self._climb[i]
+        for k in range(len(u)):
+            x[k] += off
+            asked, planned = -axes(off) @ self._hold[i], u[k].copy()
+            for (torque, sign, axis), alpha in zip(_TORQUES, asked, strict=True):
+                most_Nm = vehicle.torque_max_Nm[axis]
+                u[k, torque] += sign * vehicle.airframe.inertia_kgm2[axis] * alpha
+                u[k, torque] = min(max(u[k, torque], -most_Nm), most_Nm)
+            u[k, LIFT] -= climb @ off[[Z, VZ]]
+            off = model.A @ off + model.B @ (u[k] - planned)
+        x[len(u)] += off
+
     def velocities(
         self, plan: Plan, swarm: SwarmState, mode: Callable[[str], Mode]
     ) -> dict[str, Velocity]:
         """The velocities and heights that fly the first step of a plan, for every active UAS.
 
         Args:
-            plan: for all of them.
+            plan: for all of them, from where they are.
             swarm: as `see` returns it.
             mode: of a UAS.
         """
@@ -128,7 +178,6 @@ class InWind:
                     for torque, sign, axis in _TORQUES
                 ]
             )
-            alpha -= (state - axes(plan.x[row, 0])) @ self._hold[i]
             asked = alpha + state[:, 1:] @ k
             velocity_mps = asked / (k[0] + k[1] * vehicle.trim_tilt_rad_per_mps)
             north_mps, east_mps = self._within(i, velocity_mps)

@@ -135,6 +135,9 @@ class MovingHorizon(ABC, Generic[Chosen]):
         problem = self._unheard.beside(self.problem(seen), whole, silent)
         if any(plan and set(problem.names) - set(plan.names) for plan in (self.plan, self._backup)):
             self.plan = self._backup = None  # one that is back has a part in neither
+        if self._in_wind is not None:
+            self.plan = self._in_wind.from_here(self.plan, problem)
+            self._backup = self._in_wind.from_here(self._backup, problem)
         overruled = self._overruled(problem, swarm)
         found = decide(
             problem,
