@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, defaultdict
 from collections.abc import Mapping
+from itertools import product
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
 from uas_coverage_env import load_planner, rollout
@@ -26,8 +27,8 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "milp-mpc-guided": _NO_CLOCK,
     "milp-mpc-guided in_wind=tube": {**_NO_CLOCK, "in_wind": "tube"},
 }
-"""Planner, and what tells its options apart -> options. The MILP planner decides without a clock, so that a seed repeats its
-flight."""
+"""Planner, and what tells its options apart -> options. The MILP planner decides without a clock,
+so that a seed repeats its flight."""
 
 # missions of each level: (quick, small of the full run, large of it)
 _MISSIONS = {
@@ -85,18 +86,24 @@ def fly(planner: str, level: str, seed: int, small: bool) -> Result:
 
 
 def trials(quick: bool) -> list[Trial]:
-    """Every planner at every level on the same missions; of each number, all levels together."""
+    """Every planner at every level on the same missions, quick planners and small missions first.
+
+    Within these, mission by mission: a run that is ended has as many of each level and planner.
+    """
     result = []
-    for planner in OPTIONS:
-        quickly, *fully = _MISSIONS.get(planner, _OTHERS)
-        for small, many in zip((True, False), (quickly, 0) if quick else fully, strict=True):
-            size = "small" if small else "large"
-            result += [
-                Trial(f"{planner} {level} {seed} {size}", fly, (planner, level, seed, small))
-                for seed in range(FIRST_SEED, FIRST_SEED + many)
-                for level in LEVELS
-                if level != "still" or "in_wind" not in planner
-            ]
+    slow = [planner for planner in OPTIONS if planner in _MISSIONS]
+    others = [planner for planner in OPTIONS if planner not in _MISSIONS]
+    for small, planners in product((True, False), (others, slow)):
+        size, column = ("small", int(not quick)) if small else ("large", 2)
+        many = {planner: _MISSIONS.get(planner, _OTHERS)[column] for planner in planners}
+        if quick and not small:
+            continue
+        for number, planner, level in product(range(max(many.values())), planners, LEVELS):
+            # where nothing is stated, the planner flies as it does without the option
+            if number < many[planner] and (level != "still" or "in_wind" not in planner):
+                seed = FIRST_SEED + number
+                key = f"{planner} {level} {seed} {size}"
+                result.append(Trial(key, fly, (planner, level, seed, small)))
     return result
 
 
