@@ -28,6 +28,17 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
 """Planner -> options, and steps that are flown (None: the mission)."""
 
 
+# missions of each: (quick, full)
+_MISSIONS = {
+    "tour": (3, 60),
+    "trajectory": (2, 30),
+    "learned-waypoint": (1, 30),
+    "milp-mpc": (2, 30),
+    "milp-mpc-guided": (2, 30),
+}
+_OTHERS = (10, 300)
+
+
 class _Timed:
     """A planner whose decisions are timed."""
 
@@ -59,16 +70,18 @@ def decide(planner: str, seed: int) -> Result:
 
 def trials(quick: bool) -> list[Trial]:
     """Missions of every planner."""
-    seeds = range(FIRST_SEED, FIRST_SEED + (1 if quick else 60))
     return [
         Trial(f"{planner} {seed}", decide, (planner, seed))
         for planner in PLANNERS
-        for seed in seeds
+        for seed in range(FIRST_SEED, FIRST_SEED + _MISSIONS.get(planner, _OTHERS)[not quick])
     ]
 
 
 def finding(results: Mapping[str, Result]) -> Finding:
-    """A decision of a planner with a clock has failed beyond MOST times its limit."""
+    """A decision of a planner with a clock has failed beyond MOST times its limit.
+
+    Those of the others are timed, and fail by an exception alone: they are not counted.
+    """
     rows, decisions, failed = [], 0, len(errors(results))
     for planner, (options, _) in PLANNERS.items():
         mine = [one["cpu_s"] for one in results.values() if one.get("planner") == planner]
@@ -77,7 +90,7 @@ def finding(results: Mapping[str, Result]) -> Finding:
         cpu_s = np.concatenate(mine)
         limit_s = float(options.get("time_limit_s", "inf"))
         late = int((cpu_s > MOST * limit_s).sum())
-        decisions, failed = decisions + len(cpu_s), failed + late
+        decisions, failed = decisions + len(cpu_s) * bool(np.isfinite(limit_s)), failed + late
         figures = [*np.quantile(cpu_s, (0.5, 0.95, 0.99)), cpu_s.max()]
         limit = f"{limit_s:g}" if np.isfinite(limit_s) else "none"
         milliseconds = [f"{1e3 * each:.3g}" for each in figures]
@@ -89,7 +102,7 @@ def finding(results: Mapping[str, Result]) -> Finding:
 ROW = Row(
     "R7",
     "Decision times, by processor time",
-    "decisions",
+    "decisions with a clock",
     f"a planner with a clock takes no more than {MOST:g} times its limit, on one thread",
     trials,
     finding,

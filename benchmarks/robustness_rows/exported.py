@@ -11,7 +11,7 @@ import numpy as np
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 
 MOST_OFF_M = 0.01
-_MISSIONS_OF_A_TRIAL = 5
+_MISSIONS_OF_A_TRIAL = 10
 
 
 def read_back(first: int) -> Result:

@@ -9,11 +9,13 @@ import signal
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 from uas_coverage_agents.policy import load_policy
+from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.waypoint.planner import SHIPPED
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
@@ -130,24 +132,44 @@ def _toml(source: str, package: str, *arguments: str) -> Callable[[Rng, Path], s
     return tried
 
 
-def _flight(rng: Rng, folder: Path) -> str:
+@cache
+def _flight_files() -> Mapping[str, bytes]:
+    """Of a flight that is flown once in a process."""
     town = generate_scenario(1, n_uas=2, n_waypoints=4, n_obstacles=2)
-    whole = folder / "flight"
-    rollout(town, "nearest-waypoint", max_steps=12).save(whole)
-    return _directory(rng, whole, Flight.load)
+    with tempfile.TemporaryDirectory() as folder:
+        rollout(town, "nearest-waypoint", max_steps=12).save(Path(folder))
+        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+@cache
+def _policy_files() -> Mapping[str, bytes]:
+    return {path.name: path.read_bytes() for path in SHIPPED.iterdir() if path.is_file()}
+
+
+def _flight(rng: Rng, folder: Path) -> str:
+    return _directory(rng, folder, _flight_files(), Flight.load)
 
 
 def _policy(rng: Rng, folder: Path) -> str:
-    whole = folder / "policy"
+    return _directory(rng, folder, _policy_files(), load_policy)
+
+
+def _config(rng: Rng, folder: Path) -> str:
+    configs = files("uas_coverage_agents").joinpath("configs")
+    whole = configs.joinpath(f"{_CONFIGS[int(rng.integers(len(_CONFIGS)))]}.toml")
+    path = folder / "file.toml"
+    path.write_bytes(damaged(rng, whole.read_bytes()))
+    return _reading(lambda path: load_config(str(path)), path)
+
+
+def _directory(
+    rng: Rng, folder: Path, contents: Mapping[str, bytes], read: Callable[[Path], object]
+) -> str:
+    whole = folder / "whole"
     whole.mkdir()
-    for path in SHIPPED.iterdir():
-        if path.is_file():
-            (whole / path.name).write_bytes(path.read_bytes())
-    return _directory(rng, whole, load_policy)
-
-
-def _directory(rng: Rng, whole: Path, read: Callable[[Path], object]) -> str:
-    paths = sorted(path for path in whole.iterdir() if path.is_file())
+    for name, content in contents.items():
+        (whole / name).write_bytes(content)
+    paths = sorted(whole.iterdir())
     path = paths[int(rng.integers(len(paths)))]
     if rng.random() < 0.1:
         path.unlink()
@@ -156,6 +178,7 @@ def _directory(rng: Rng, whole: Path, read: Callable[[Path], object]) -> str:
     return _reading(read, whole)
 
 
+_CONFIGS = ("maskable-ppo", "ppo", "ppo-end-to-end", "sac")
 _CHECK = ("scenarios", "check", "--picture", "{folder}/map.png")
 _SCENARIOS = ("village", "open_field", "corridor")
 KINDS: Mapping[str, Callable[[Rng, Path], str]] = {
@@ -166,6 +189,7 @@ KINDS: Mapping[str, Callable[[Rng, Path], str]] = {
     "vehicle": _toml("s500_v2.toml", "uas_coverage_env.vehicle", "vehicle", "check"),
     "flight directory": _flight,
     "policy directory": _policy,
+    "training configuration": _config,
 }
 """Kind of file -> damage one and read it: what became of it."""
 
@@ -227,6 +251,6 @@ ROW = Row(
         f"{FILES_OF_A_TRIAL} files of every seed from {FIRST_SEED} on: one to three of a "
         "number, line, word, byte or the end changed"
     ),
-    "Training configurations, checkpoints, comparison stores, imported areas, links and devices in "
+    "Checkpoints, comparison stores, imported areas, links and devices in "
     "place of files (their tests are in `tests/files` and `tests/cli`), and memory.",
 )

@@ -2,62 +2,48 @@
 
 from __future__ import annotations
 
-import os
-import signal
+import json
 import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from independent_check import BadFlightError, check
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
-from uas_coverage_env import generate_scenario
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 
 FIRST_SEED = 11_000
+KILLS_OF_A_TRIAL = 10
 _LONGEST_S = 600.0
-# the time of a flight, made long enough to be hit: a planner that decides in half a second
-_FLIGHT = ("--planner", "milp-mpc-guided", "--option", "time_limit_s=0.3")
-_PROGRAM = "import sys; from uas_coverage_env.cli import main; sys.exit(main(sys.argv[1:]))"
+_FLIGHTS = Path(__file__).with_name("ended_flights.py")
 
 
-def killed(how: str, seed: int) -> Result:
-    """One flight that is ended some time after its folder or its first step could be there.
+def killed(how: str, first: int) -> Result:
+    """Some flights that are ended: what is left of each.
 
     Args:
         how: `SIGKILL`, `SIGTERM` or `SIGINT`.
-        seed: Draws when; every second one overwrites a flight that is there.
+        first: Seed of the first.
     """
-    rng = np.random.default_rng([seed, len(how)])
-    with tempfile.TemporaryDirectory() as folder:
-        town, out = Path(folder) / "town.toml", Path(folder) / "flight"
-        generate_scenario(seed, n_uas=1, n_waypoints=5, n_obstacles=2).to_file(town)
-        command = [sys.executable, "-c", _PROGRAM, "run", str(town), "--out", str(out)]
-        process = subprocess.Popen(
-            [*command, *_FLIGHT], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-        )
-        until = time.monotonic() + float(rng.uniform(2.0, 25.0))
-        while process.poll() is None and time.monotonic() < until:
-            time.sleep(0.05)
-        ended = process.poll() is not None
-        if not ended:
-            os.kill(process.pid, getattr(signal, how))
-        _, said = process.communicate(timeout=_LONGEST_S)
-        outcome = "ended before" if ended else _left(out)
-        litter = [path.name for path in Path(folder).iterdir() if path.name.startswith(".")]
-    return {
-        "how": how,
-        "outcome": outcome,
-        "traceback": b"Traceback" in said,
-        "code": process.returncode,
-        "litter": len(litter),
-    }
+    seeds = range(first, first + KILLS_OF_A_TRIAL)
+    with tempfile.TemporaryDirectory() as place:
+        folders = [Path(place) / str(seed) for seed in seeds]
+        for folder in folders:
+            folder.mkdir()
+        command = [sys.executable, str(_FLIGHTS), place, how, *(str(seed) for seed in seeds)]
+        made = subprocess.run(command, capture_output=True, timeout=_LONGEST_S, check=False)
+        if made.returncode:
+            raise RuntimeError(made.stderr.decode(errors="replace")[-400:])
+        found = [json.loads(line) for line in made.stdout.splitlines()]
+        for folder, one in zip(folders, found, strict=True):
+            one["left"] = _left(folder / "flight")
+            if one.pop("ended"):
+                one["left"] = "ended before" if one["left"] == "a whole flight" else one["left"]
+    return {"how": how, "kills": found}
 
 
 def _left(out: Path) -> str:
@@ -77,40 +63,54 @@ def _left(out: Path) -> str:
 
 def trials(quick: bool) -> list[Trial]:
     """Some kills of each kind."""
+    last = FIRST_SEED + KILLS_OF_A_TRIAL * (2 if quick else 7)
     return [
-        Trial(f"{how} {seed}", killed, (how, seed))
-        for seed in range(FIRST_SEED, FIRST_SEED + (2 if quick else 67))
+        Trial(f"{how} {first}", killed, (how, first))
+        for first in range(FIRST_SEED, last, KILLS_OF_A_TRIAL)
         for how in ("SIGKILL", "SIGTERM", "SIGINT")
     ]
 
 
 def finding(results: Mapping[str, Result]) -> Finding:
-    """A kill fails where it leaves what is no flight, or ends in a traceback."""
+    """A kill fails where it leaves what is no flight, or ends in a traceback or a crash."""
     cells: dict[str, Counter[str]] = {}
-    failed = len(errors(results))
+    broken = KILLS_OF_A_TRIAL * len(errors(results))
     for result in results.values():
-        if "error" in result:
-            continue
-        tally = cells.setdefault(result["how"], Counter())
-        tally[result["outcome"]] += 1
-        tally["traceback"] += result["traceback"]
-        failed += result["traceback"] or result["outcome"] in ("damaged", "disagrees")
-    names = ("nothing", "a whole flight", "ended before", "damaged", "disagrees", "traceback")
+        tally = cells.setdefault(result["how"], Counter()) if "error" not in result else Counter()
+        for one in result.get("kills", ()):
+            tally[one["left"]] += 1
+            tally["crashed"] += one["crashed"]
+            tally["failed"] += one["crashed"] or one["left"] in ("damaged", "disagrees")
+    names = ("nothing", "a whole flight", "ended before", "damaged", "disagrees", "crashed")
     rows = [
         (how, sum(tally[n] for n in names[:5]), *(tally[n] for n in names))
         for how, tally in cells.items()
     ]
-    return Finding(len(results), failed, markdown(("ended by", "flights", *names), rows))
+    tried = sum(tally[n] for tally in cells.values() for n in names[:5]) + broken
+    failed = sum(tally["failed"] for tally in cells.values()) + broken
+    table = markdown(("ended by", "flights", *names), rows)
+    crashes = [
+        f"- {key}, flight {number}: code {one['code']}, `{one['said'].strip()[-200:]!r}`"
+        for key, result in results.items()
+        for number, one in enumerate(result.get("kills", ()))
+        if one["crashed"]
+    ]
+    if crashes:
+        table += "\n\nCrashes:\n\n" + "\n".join(crashes)
+    return Finding(tried, failed, table)
 
 
 ROW = Row(
     "R8",
     "Kills",
     "kills",
-    "nothing is left of the flight, or a whole flight up to that moment with which the independent "
-    "checker agrees; no traceback",
+    "nothing is left of the flight, or a whole flight up to that moment with which the "
+    "independent checker agrees; no traceback, no crash",
     trials,
     finding,
-    lambda quick: f"from {FIRST_SEED} on; the seed draws the moment, 2 to 25 s after the start",
-    "Kills in `--overwrite`, of `compare` and of `train`, and a full disk.",
+    lambda quick: (
+        f"from {FIRST_SEED} on; the seed draws the town and the moment, from the start of the "
+        "flight to its last file; every second flight overwrites one that is there"
+    ),
+    "Kills while a process starts, of `compare` and of `train`, and a full disk.",
 )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections import Counter, defaultdict
 from collections.abc import Mapping
+from itertools import product
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import sample_scenario
+from uas_coverage_env.scenario.family import N_OBSTACLES, N_UAS, N_WAYPOINTS
 
 LEVELS = ("still", "light", "moderate", "strong")
 FIRST_SEED = 3000
@@ -23,16 +25,27 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "learned-waypoint": {},
     "learned-velocity": {},
     "milp-mpc-guided": _NO_CLOCK,
+    "milp-mpc-guided in_wind=tube": {**_NO_CLOCK, "in_wind": "tube"},
 }
-"""Planner -> options. The MILP planner decides without a clock, so that a seed repeats its
-flight."""
+"""Planner, and what tells its options apart -> options. The MILP planner decides without a clock,
+so that a seed repeats its flight."""
 
-# missions of each level: (quick, full)
-_MISSIONS = {"milp-mpc-guided": (1, 30), "learned-waypoint": (4, 100), "trajectory": (4, 100)}
-_OTHERS = (6, 110)
+# missions of each level: (quick, small of the full run, large of it)
+_MISSIONS = {
+    "tour": (6, 300, 30),
+    "trajectory": (4, 300, 10),
+    "learned-waypoint": (1, 300, 10),
+    "milp-mpc-guided": (1, 30, 1),
+    "milp-mpc-guided in_wind=tube": (1, 30, 1),
+}
+_OTHERS = (30, 300, 300)
+
+_LARGE = "; large: {} to {} UAS, {} to {} waypoints, {} to {} blocks".format(
+    *N_UAS, *N_WAYPOINTS, *N_OBSTACLES
+)
 
 SMALL = ((1, 2), (8, 12), (3, 8))
-"""Least and most UAS, waypoints and obstacles of the quick missions; the others are those of
+"""Least and most UAS, waypoints and obstacles of the small missions; the large ones are those of
 `sample_scenario`."""
 
 
@@ -51,11 +64,12 @@ def fly(planner: str, level: str, seed: int, small: bool) -> Result:
     else:
         scenario = sample_scenario(seed, disturbances=disturbances)
     began = time.process_time()
-    flight = rollout(scenario, load_planner(planner, OPTIONS[planner]), seed)
+    flight = rollout(scenario, load_planner(planner.split()[0], OPTIONS[planner]), seed)
     return {
         "planner": planner,
         "level": level,
         "seed": seed,
+        "small": small,
         "uas": len(flight.names),
         "accomplished": accomplished(flight),
         "coverage": float(coverage(flight)),
@@ -72,36 +86,54 @@ def fly(planner: str, level: str, seed: int, small: bool) -> Result:
 
 
 def trials(quick: bool) -> list[Trial]:
-    """Every planner at every level on the same missions."""
-    return [
-        Trial(f"{planner} {level} {seed}{' small' * quick}", fly, (planner, level, seed, quick))
-        for planner in OPTIONS
-        for seed in range(FIRST_SEED, FIRST_SEED + _MISSIONS.get(planner, _OTHERS)[not quick])
-        for level in LEVELS
-    ]
+    """Every planner at every level on the same missions, quick planners and small missions first.
+
+    Within these, mission by mission: a run that is ended has as many of each level and planner.
+    """
+    result = []
+    slow = [planner for planner in OPTIONS if planner in _MISSIONS]
+    others = [planner for planner in OPTIONS if planner not in _MISSIONS]
+    for small, planners in product((True, False), (others, slow)):
+        size, column = ("small", int(not quick)) if small else ("large", 2)
+        many = {planner: _MISSIONS.get(planner, _OTHERS)[column] for planner in planners}
+        if quick and not small:
+            continue
+        for number, planner, level in product(range(max(many.values())), planners, LEVELS):
+            # where nothing is stated, the planner flies as it does without the option
+            if number < many[planner] and (level != "still" or "in_wind" not in planner):
+                seed = FIRST_SEED + number
+                key = f"{planner} {level} {seed} {size}"
+                result.append(Trial(key, fly, (planner, level, seed, small)))
+    return result
 
 
 def finding(results: Mapping[str, Result]) -> Finding:
     """Per level and planner; a mission with a violation has failed."""
-    cells: dict[tuple[str, str], list[Result]] = defaultdict(list)
+    cells: dict[tuple[bool, str, str], list[Result]] = defaultdict(list)
     for result in results.values():
         if "error" not in result:
-            cells[result["level"], result["planner"]].append(result)
-    order = [(level, planner) for level in LEVELS for planner in OPTIONS]
+            cells[result["small"], result["level"], result["planner"]].append(result)
+    order = [
+        (small, level, planner)
+        for small in (True, False)
+        for level in LEVELS
+        for planner in OPTIONS
+    ]
     rows = [_line(*cell, cells[cell]) for cell in order if cells[cell]]
-    headings = ("level", "planner", "missions", "accomplished", "covered, %", "UAS lost")
+    headings = ("size", "level", "planner", "missions", "accomplished", "covered, %", "UAS lost")
     headings += ("missions with a limit exceeded", "breaches", "missions with breaches", "Wh")
     failed = sum(bool(one["violations"]) for many in cells.values() for one in many)
     failed += len(errors(results))
     return Finding(len(results), failed, markdown(headings, rows))
 
 
-def _line(level: str, planner: str, flown: list[Result]) -> list[object]:
+def _line(small: bool, level: str, planner: str, flown: list[Result]) -> list[object]:
     uas = sum(one["uas"] for one in flown)
     lost = Counter(kind for one in flown for kind, *_ in one["violations"] if kind != "limit")
     to_what = ", ".join(f"{kind} {count}" for kind, count in sorted(lost.items()))
     beyond = sum(any(kind == "limit" for kind, *_ in one["violations"]) for one in flown)
     return [
+        "small" if small else "large",
         level,
         f"`{planner}`",
         len(flown),
@@ -123,8 +155,8 @@ ROW = Row(
     trials,
     finding,
     lambda quick: (
-        f"generated missions from {FIRST_SEED} on, the same for every level"
-        + ", small ones: 1 or 2 UAS, 8 to 12 waypoints, 3 to 8 blocks" * quick
+        f"generated missions from {FIRST_SEED} on, the same for every level; small: 1 or 2 UAS, "
+        "8 to 12 waypoints, 3 to 8 blocks" + _LARGE * (not quick)
     ),
     "Other families than `generated`, the nonlinear plant, `milp-mpc` without a guide, and the "
     "MILP planner with a clock. `milp-mpc-guided` flies with "

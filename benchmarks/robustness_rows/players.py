@@ -9,27 +9,46 @@ from typing import Any
 
 import numpy as np
 import return_mode
+from gymnasium import spaces
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
 from uas_coverage_env import generate_scenario, uas_coverage_v0
+from uas_coverage_env.env.actions import ACTION_NAMES
 from uas_coverage_env.world import CONTACT_NAMES
 
 FIRST_SEED = 8000
+EPISODES_OF_A_TOWN = 10
 _STEPS = 60
 
 Rng = np.random.Generator
 Actions = dict[Any, Any]
 
 
-def _hostile(rng: Rng, good: Actions) -> Actions:
+def _good(rng: Rng, space: spaces.Space[Any]) -> Any:
+    """An action that has to be taken, beyond the bounds that are clipped too."""
+    if isinstance(space, spaces.Discrete):
+        return int(rng.integers(space.n))
+    assert space.shape is not None
+    return rng.uniform(-2.0, 2.0, space.shape).astype(np.float32)
+
+
+def _hostile(rng: Rng, good: Actions, space: spaces.Space[Any]) -> Actions:
     """Actions that have to be refused, made of those that would be taken."""
     agent = str(rng.choice(sorted(good)))
     bad: list[Any] = [
-        np.full(3, np.nan), np.array([np.inf, 0.0, 0.0]), np.zeros(2), np.zeros((3, 1)),
-        np.zeros(0), None, "north", b"north", [0.0, "1", 0.0], {}, object(), 10**400,
-        [[0.0, 0.0], [0.0]],
-        np.array([1 + 1j, 0, 0]), np.array(["a", "b", "c"]), np.array([None, None, None]),
+        None, "north", b"north", {}, object(), 10**400, [[0.0, 0.0], [0.0]], np.zeros(0),
+        np.zeros(2), np.zeros((3, 1)), np.zeros((4, 1)), [0.0, "1", 0.0], np.nan, 1 + 1j,
     ]  # fmt: skip
+    if isinstance(space, spaces.Discrete):
+        bad += [-1, int(space.n), 1.5, True, "1", np.float32(1.0), np.array([1]), [1]]
+    else:
+        assert space.shape is not None
+        (size,) = space.shape
+        bad += [
+            np.full(size, np.nan), np.full(size, -np.inf), np.array([np.inf] + [0.0] * (size - 1)),
+            np.array([1 + 1j] * size), np.array(["a"] * size), np.array([None] * size),
+            np.zeros(size + 1), 0.0,
+        ]  # fmt: skip
     choice = int(rng.integers(len(bad) + 3))
     if choice < len(bad):
         return good | {agent: bad[choice]}
@@ -46,22 +65,36 @@ def _digest(parts: list[Any]) -> str:
 
 
 def attack(seed: int) -> Result:
-    """One episode beside a twin that never sees a hostile call.
+    """Some episodes of a town beside a twin that never sees a hostile call.
 
     A call has failed where it is accepted, raises anything but a ValueError, or leaves a trace: the
     twin's observations, rewards and ends are compared after every step.
     """
     rng = np.random.default_rng([seed, 3])
     town = generate_scenario(seed, n_uas=int(rng.integers(1, 4)), n_waypoints=6, n_obstacles=3)
-    attacked, twin = (uas_coverage_v0.parallel_env(town) for _ in range(2))
-    for env in (attacked, twin):
-        env.reset(seed=seed)
+    kind = str(rng.choice(sorted(ACTION_NAMES)))
+    envs = [uas_coverage_v0.parallel_env(town, action=kind) for _ in range(2)]
     tally: Counter[str] = Counter()
+    for episode in range(EPISODES_OF_A_TOWN):
+        for env in envs:
+            env.reset(seed=seed + episode)
+        tally["episodes"] += 1
+        found = _episode(rng, *envs)
+        tally.update(found)
+        tally["episodes failed"] += any(
+            count for name, count in found.items() if name not in ("calls", "refused")
+        )
+    return {"action": kind, "tally": dict(tally)}
+
+
+def _episode(rng: Rng, attacked: Any, twin: Any) -> Counter[str]:
+    tally: Counter[str] = Counter()
+    space = twin.action_space(twin.possible_agents[0])
     for _ in range(_STEPS):
         if not twin.agents:
             break
-        good = {name: rng.uniform(-2.0, 2.0, 3).astype(np.float32) for name in twin.agents}
-        bad = _hostile(rng, good)
+        good = {name: _good(rng, space) for name in twin.agents}
+        bad = _hostile(rng, good, space)
         tally["calls"] += 1
         try:
             attacked.step(bad)
@@ -76,29 +109,32 @@ def attack(seed: int) -> Result:
             digests = (_digest(list(mine.values())), _digest(list(other.values())))
             tally["traces"] += not (same and digests[0] == digests[1])
         tally["not finite"] += not all(np.isfinite(one).all() for one in ours[0].values())
-    return dict(tally)
+    return tally
 
 
 def attacks(quick: bool) -> list[Trial]:
-    """Episodes with hostile calls."""
+    """Towns in which episodes with hostile calls are flown."""
     return [
-        Trial(f"episode {seed}", attack, (seed,))
-        for seed in range(FIRST_SEED, FIRST_SEED + (100 if quick else 100_000))
+        Trial(f"town {seed}", attack, (seed,))
+        for seed in range(FIRST_SEED, FIRST_SEED + (50 if quick else 10_000))
     ]
 
 
 def attacks_found(results: Mapping[str, Result]) -> Finding:
-    """An episode fails by one call."""
-    total: Counter[str] = Counter()
-    failed = 0
+    """Per kind of action; an episode fails by one call."""
+    cells: dict[str, Counter[str]] = defaultdict(Counter)
     for result in results.values():
-        if "error" in result:
-            failed += 1
-            continue
-        total.update(result)
-        failed += any(count for name, count in result.items() if name not in ("calls", "refused"))
-    rows = sorted(total.items(), key=lambda item: -item[1])
-    return Finding(len(results), failed, markdown(("calls and what came of them", ""), rows))
+        if "error" not in result:
+            cells[result["action"]].update(result["tally"])
+    names = ["episodes", "calls", "refused", "traces", "not finite"]
+    others = {name for tally in cells.values() for name in tally if tally[name]}
+    names += sorted(others - {*names, "episodes failed"})
+    rows = [(kind, *(f"{tally[n]:,}" for n in names)) for kind, tally in sorted(cells.items())]
+    episodes, failed = (
+        sum(tally[name] for tally in cells.values()) for name in ("episodes", "episodes failed")
+    )
+    broken = EPISODES_OF_A_TOWN * len(errors(results))
+    return Finding(episodes + broken, failed + broken, markdown(("action", *names), rows))
 
 
 HOSTILE = Row(
@@ -111,11 +147,10 @@ HOSTILE = Row(
     attacks,
     attacks_found,
     lambda quick: (
-        f"episodes of {_STEPS} steps in generated towns from {FIRST_SEED} on, a hostile "
-        "call before each step"
+        f"generated towns from {FIRST_SEED} on, each with an action kind that its seed draws and "
+        f"{EPISODES_OF_A_TOWN} episodes of {_STEPS} steps, a hostile call before each step"
     ),
-    "Hostile arguments of `reset`, the other action kinds, Gymnasium's and the AEC interface, and "
-    "batches.",
+    "Hostile arguments of `reset`, Gymnasium's and the AEC interface, and batches.",
 )
 
 

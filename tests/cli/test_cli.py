@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from uas_coverage_env.cli import main, run
+from uas_coverage_env.cli import app, main, run
 from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.flight import Decision, Flight, load_planner, rollout
@@ -379,6 +379,29 @@ def test_sigterm_ends_a_flight_as_ctrl_c_does_and_keeps_what_was_flown(elsewhere
     assert flight.ended == "stopped"
     assert 4 <= flight.steps <= 5
     assert signal.getsignal(signal.SIGTERM) is handler
+
+
+@pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
+def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
+    monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))
+    assert main(["planners"]) == 1
+    said = capsys.readouterr().err
+    assert said == "error: stopped by hand before there was anything to keep\n"
+
+
+def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypatch, capsys):
+    def compare():  # as numpy does while it compares structured arrays
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as interruption:
+            raise TypeError("cannot compare") from interruption
+
+    monkeypatch.setattr(app, "command_group", compare)
+    assert main(["planners"]) == 1
+    assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
+    monkeypatch.setattr(app, "command_group", lambda: [].missing)
+    with pytest.raises(AttributeError):  # an error that nobody has asked for is none of these
+        main(["planners"])
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links of POSIX")

@@ -1,3 +1,4 @@
+import signal
 import time
 from types import SimpleNamespace
 from typing import Any
@@ -193,6 +194,41 @@ def test_ctrl_c_leaves_the_flight_so_far(yard, listed, interrupted):
         flight = rollout(yard, listed, on_step=stop)
     assert (flight.steps, flight.ended) == (5, "stopped")
     assert len(flight.u) == len(flight.covered) == len(flight.moving_position_m) == 6
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_flight_after_the_step_and_is_handled_as_before_after_it(
+    yard, listed, number
+):
+    act, finished = listed.act, []
+
+    def interrupted(swarm):
+        if swarm.step == 5:
+            signal.raise_signal(number)
+        finished.append(swarm.step)
+        return act(swarm)
+
+    def handler(*_):
+        raise KeyboardInterrupt
+
+    listed.act, before = interrupted, signal.signal(number, handler)
+    try:
+        flight = rollout(yard, listed)
+        assert signal.getsignal(number) is handler
+    finally:
+        signal.signal(number, before)
+    assert (flight.steps, flight.ended) == (6, "stopped")
+    assert finished[-1] == 5
+
+
+def test_a_second_ctrl_c_ends_the_flight_within_the_step(yard, listed):
+    def interrupted(swarm):
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    listed.act = interrupted
+    flight = rollout(yard, listed)
+    assert (flight.steps, flight.ended) == (0, "stopped")
 
 
 def test_a_flight_can_be_stopped_from_outside(yard):

@@ -11,6 +11,7 @@ from robustness_rows import (
     faults,
     fuzz,
     judge,
+    kills,
     missions,
     players,
 )
@@ -118,7 +119,7 @@ def test_a_mission_is_counted_by_what_happened_in_it():
     assert result["home"] == result["uas"]
     found = missions.ROW.finding({"a": result, "b": {"error": "gone"}})
     assert (found.trials, found.failures) == (2, 1)
-    assert "| light | `nearest-waypoint` | 1 | 1 | 100.0 |" in found.table
+    assert "| small | light | `nearest-waypoint` | 1 | 1 | 100.0 |" in found.table
 
 
 def test_judge_and_checker_agree_on_segments_and_a_difference_would_be_seen():
@@ -144,7 +145,8 @@ def test_decisions_are_timed_one_by_one_and_late_ones_counted():
     assert len(found["cpu_s"]) > 50
     late = {"planner": "milp-mpc", "cpu_s": [0.1, 1.4, 1.6]}
     row = decisions.ROW.finding({"a": found, "b": late})
-    assert (row.trials, row.failures) == (len(found["cpu_s"]) + 3, 1)
+    assert (row.trials, row.failures) == (3, 1)
+    assert f"| `nearest-waypoint` | {len(found['cpu_s'])} |" in row.table
 
 
 def test_an_export_that_is_off_has_failed():
@@ -156,10 +158,27 @@ def test_an_export_that_is_off_has_failed():
     )
 
 
-def test_hostile_calls_are_refused_and_leave_no_trace():
-    tally = players.attack(players.FIRST_SEED)
+@pytest.mark.parametrize("seed", range(4))
+def test_hostile_calls_are_refused_and_leave_no_trace(seed):
+    found = players.attack(players.FIRST_SEED + seed)
+    tally = found["tally"]
     assert tally["refused"] == tally["calls"] > 5
-    assert tally["traces"] == tally["not finite"] == 0
+    assert tally["traces"] == tally["not finite"] == tally["episodes failed"] == 0
+    row = players.attacks_found({"a": found, "b": {"error": "gone"}})
+    assert (row.trials, row.failures) == (20, 10)
+    assert f"| {found['action']} | 10 |" in row.table
+
+
+def test_flights_that_are_ended_leave_nothing_or_a_whole_flight(monkeypatch):
+    monkeypatch.setattr(kills, "KILLS_OF_A_TRIAL", 2)
+    found = kills.killed("SIGTERM", kills.FIRST_SEED)
+    whole = kills.ROW.finding({"a": found})
+    assert (whole.trials, whole.failures) == (2, 0), whole.table
+    found["kills"][0] |= {"crashed": True, "code": -11, "said": "Fatal error"}
+    found["kills"][1]["left"] = "damaged"
+    broken = kills.ROW.finding({"a": found})
+    assert (broken.trials, broken.failures) == (2, 2)
+    assert "flight 0: code -11" in broken.table
 
 
 def test_damaged_files_differ_from_the_whole_one_and_repeat_with_their_seed():
@@ -169,6 +188,7 @@ def test_damaged_files_differ_from_the_whole_one_and_repeat_with_their_seed():
     )
     assert first == again != other
     assert first != [text]
-    result = fuzz.try_files("vehicle", 1)
-    assert sum(result["tally"].values()) == fuzz.FILES_OF_A_TRIAL
-    assert not result["failures"]
+    for kind in ("vehicle", "training configuration"):
+        result = fuzz.try_files(kind, 1)
+        assert sum(result["tally"].values()) == fuzz.FILES_OF_A_TRIAL
+        assert not result["failures"]

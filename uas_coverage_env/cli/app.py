@@ -18,6 +18,7 @@ PROGRAM = "uas-coverage"
 
 # what typer makes of Ctrl-C that no command has caught
 _CTRL_C = 130
+_NOTHING_TO_KEEP = "stopped by hand before there was anything to keep"
 
 _CLI = "uas_coverage_env.cli"
 
@@ -145,11 +146,23 @@ def command_group() -> LazyGroup:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; invalid input is reported in one line."""
-    command = command_group()
-    _never_stop_at_a_letter()
+    with terminated_as_by_hand() as was_stopped:
+        try:
+            return _run(argv)
+        except Exception as error:
+            # an interruption inside a library may come out as any error
+            if not was_stopped():
+                raise
+            return _refuse(f"stopped by hand ({type(error).__name__})", FAILED)
+        except KeyboardInterrupt:
+            return _refuse(_NOTHING_TO_KEEP, FAILED)
+
+
+def _run(argv: Sequence[str] | None) -> int:
     try:
-        with terminated_as_by_hand():
-            code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
+        command = command_group()
+        _never_stop_at_a_letter()
+        code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
         return _refuse(_of_the_command_line(error), error.exit_code)
     except InputError as error:
@@ -161,7 +174,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # may raise them, and which call it was is of no use to the user
         return _refuse(_of_a_file(error), 2)
     if code == _CTRL_C:
-        return _refuse("stopped by hand before there was anything to keep", FAILED)
+        return _refuse(_NOTHING_TO_KEEP, FAILED)
     return code
 
 

@@ -107,7 +107,8 @@ def run(
 ) -> None:
     """Fly one mission and write a flight directory.
 
-    Ctrl-C or SIGTERM ends the flight early and keeps what was flown. Exits 0 where everything is
+    Ctrl-C or SIGTERM ends the flight after the step that is being flown, a second one at once, and
+    what was flown is kept. Exits 0 where everything is
     covered, all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
     otherwise.
     """

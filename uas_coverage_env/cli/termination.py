@@ -1,32 +1,43 @@
-"""What ends a command from outside: a scheduler or a container asks with SIGTERM."""
+"""What ends a command from outside: Ctrl-C, and a scheduler or a container by SIGTERM."""
 
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 
 @contextmanager
-def terminated_as_by_hand() -> Iterator[None]:
+def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
     """In this process, SIGTERM does what Ctrl-C does: what was flown up to there is kept.
 
     Its child processes, which inherit the handler, end at once as before.
+
+    Yields:
+        Whether one of them has come.
     """
+    came: list[int] = []
     if threading.current_thread() is not threading.main_thread():  # no other may ask for signals
-        yield
+        yield lambda: False
         return
     here = os.getpid()
 
     def stop(number: int, frame: FrameType | None) -> None:
         if os.getpid() == here:
+            came.append(number)
             raise KeyboardInterrupt
-        signal.signal(number, signal.SIG_DFL)
+        signal.signal(number, before[number])
         os.kill(os.getpid(), number)
 
-    before = signal.signal(signal.SIGTERM, stop)
+    numbers: list[int] = [signal.SIGTERM]
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        numbers.append(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in numbers}
+    before[signal.SIGTERM] = signal.SIG_DFL
+    outside = {number: signal.signal(number, stop) for number in numbers}
     try:
-        yield
+        yield lambda: bool(came)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in outside.items():
+            signal.signal(number, handler)

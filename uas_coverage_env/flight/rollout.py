@@ -17,6 +17,7 @@ from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
+from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.planner import Assistants, Planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
@@ -68,7 +69,8 @@ def rollout(
 ) -> Flight:
     """Fly one mission and keep its record.
 
-    Ctrl-C ends the flight as `should_stop` does: what was flown so far is returned.
+    Ctrl-C ends the flight as `should_stop` does, after the step that is being flown; a second one
+    at once. What was flown so far is returned.
 
     Args:
         scenario: A scenario, the name of a shipped one, or the path of a scenario file.
@@ -147,8 +149,13 @@ def rollout(
             on_step(Progress(swarm, limit, log.covered, decision_time_s, flown, world.known))
 
     ended = "stopped"
-    with contextlib.suppress(KeyboardInterrupt):  # the flight up to there is valid
-        ended = _fly(world, planner, log, limit, seed, tell, should_stop, plans_on=plans_on)
+    # the flight up to there is valid
+    with contextlib.suppress(KeyboardInterrupt), interruptions_noted() as interrupted:
+
+        def stops() -> bool:
+            return interrupted() or (should_stop is not None and should_stop())
+
+        ended = _fly(world, planner, log, limit, seed, tell, stops, plans_on=plans_on)
     return flown(ended)
 
 
@@ -186,7 +193,7 @@ def _fly(
     limit: int,
     seed: int,
     tell: Callable[[SwarmState, float | None], None],
-    should_stop: Callable[[], bool] | None,
+    should_stop: Callable[[], bool],
     *,
     plans_on: bool,
 ) -> str:
@@ -196,7 +203,7 @@ def _fly(
     while not world.done:
         if log.steps >= limit:
             return "steps"
-        if should_stop is not None and should_stop():
+        if should_stop():
             return "stopped"
         commands, packed, decision = _decide(planner, swarm)
         outcome = world.step(packed)
