@@ -130,7 +130,7 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
                     f"{track.name} is {-curved[step]:.3g} m too close to "
                     f"{partner.name or 'the fence'} on the curve from {step * dt_s:g} s"
                 )
-            # who is lost in a step is too near to nobody any more, and nobody to it
+            # one that is lost in a step is too near to none any more, and none to it
             gone = set(touched[row]) | (
                 set(touched[names.index(str(partner.name))]) if kind == "uas" else set()
             )

@@ -177,7 +177,7 @@ def table_row(
 def measured_cells(result: NDArray[np.float64], reference: NDArray[np.float64] | None) -> list[str]:
     """Means with 95 % intervals, under `MEASURED`; differences are paired, town by town.
 
-    Who is lost saves energy: where there were violations, there is no difference.
+    A lost UAS saves energy: where there were violations, there is no difference.
     """
     cells = [
         shown(100 * result[:, COVERAGE], 2),

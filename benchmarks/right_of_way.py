@@ -1,4 +1,4 @@
-"""Who comes home among mates that are in its way: missions in which the others try to prevent it.
+"""Which UAS come home among others in their way: missions in which the others try to prevent it.
 
     python benchmarks/right_of_way.py
     python benchmarks/right_of_way.py --missions 140 --players cage,doorstep
@@ -155,7 +155,7 @@ def fly(name: str, seed: int, n_uas: int) -> Counter[str]:
 
 
 def _table(tallies: Mapping[str, Counter[str]]) -> Table:
-    table = Table(title="Who comes home among mates that are in its way")
+    table = Table(title="Which UAS come home among others in their way")
     contacts = [name for name in CONTACT_NAMES if name != "none"]
     for column in ("player", "missions", "not home", "steps on the way home", "lost to"):
         table.add_column(column)

@@ -71,7 +71,7 @@ def _village_dict(num_envs: int, threads: int) -> Steps:
 
 
 def _vector(env: Any, count: Callable[[dict[str, Any]], float]) -> Steps:
-    """A Gymnasium vector environment whose infos tell who flies."""
+    """A Gymnasium vector environment whose infos tell which UAS fly."""
     latest = env.reset(seed=0)[1]
     env.action_space.seed(0)
     drawn = [env.action_space.sample() for _ in range(N_DRAWN)]

@@ -113,7 +113,7 @@ def test_columns_and_scales_come_from_the_table():
     assert [feature.name for feature in CANDIDATE.features] == list(CANDIDATE_AT._fields)
     assert tuple(range(N_CANDIDATE)) == CANDIDATE_AT
     assert CANDIDATE.features[WAY].name == "way"
-    assert CANDIDATE.features[0].name == "there"  # the network looks there for who is there
+    assert CANDIDATE.features[0].name == "there"  # the network looks there for which are there
     for feature in (*TEAM.features, *CANDIDATE.features):
         assert isinstance(feature, Number)
         assert feature.meaning.endswith(f" / {feature.over}" if feature.over else feature.meaning)

@@ -33,7 +33,7 @@ def drawn(rng, commands):
     commands["values"][:, :3] = rng.uniform([-9, -9, 5], [9, 9, 30], (3, 3))
 
 
-def test_who_is_not_asked_for_is_left_out():
+def test_a_uas_that_is_not_asked_for_is_left_out():
     home, guidance, keeper = assistants(True, True)
     assert list(assistants(False, False, goes_to=False)) == []
     assert list(assistants(False, False)) == [guidance]

@@ -150,7 +150,7 @@ def test_nor_does_any_mixture_of_them_from_anywhere_around_a_corner(seed, n_uas,
     assert apart_m >= KEPT_M - RESIDUE_M
 
 
-def test_a_mate_that_hovers_in_a_canyon_leaves_it_before_who_comes_home():
+def test_a_uas_that_hovers_in_a_canyon_leaves_it_before_one_that_comes_home():
     world = assisted(
         meadow([HOME_M, (20.0, 20.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY)
     )
@@ -199,7 +199,7 @@ def test_nobody_makes_way_for_a_uas_that_is_not_called_home():
     assert not hover(world, 10)
 
 
-def test_those_on_their_way_home_decide_first_and_who_does_not_fly_does_not_decide():
+def test_those_on_their_way_home_decide_first_and_those_that_do_not_fly_do_not_decide():
     state = World(meadow([(20.0 * k, 20.0, -1.0) for k in range(1, 6)])).state
     state.returning[[1, 3, 4]] = True
     state.status[1] = LANDED

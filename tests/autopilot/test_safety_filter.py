@@ -186,7 +186,7 @@ def test_a_uas_gets_out_of_the_way_of_a_moving_obstacle():
 
 @pytest.mark.parametrize("speed_mps", [4.0, 8.0])
 @pytest.mark.parametrize("aside_m", [0.0, 6.0, -12.0])
-def test_who_hovers_keeps_the_safe_distance_from_something_large_that_comes(speed_mps, aside_m):
+def test_a_hovering_uas_keeps_the_safe_distance_from_something_large_that_comes(speed_mps, aside_m):
     airship = mover(
         (190.0, 100.0 + aside_m, -15.0),
         (0.0, (-speed_mps, 0.0, 0.0)),

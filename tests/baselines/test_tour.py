@@ -90,7 +90,7 @@ def test_a_blocked_waypoint_is_visited_late(village):
     assert visitor.index(27) >= len(visitor) / 2
 
 
-def test_who_is_lost_leaves_its_waypoints_to_the_others(village):
+def test_a_uas_that_is_lost_leaves_its_waypoints_to_the_others(village):
     schedule = schedule_of(village, view_of(village))
     alone = np.array([True, False])
     schedule.update(view_of(village, may_work=alone, flies=alone, time_s=1.0))
@@ -113,7 +113,9 @@ def flown(schedule, scenario, view, seconds, slower):
     return view
 
 
-def test_who_flies_slower_than_thought_hands_over_what_its_battery_does_not_last_for(village):
+def test_a_uas_slower_than_thought_hands_over_what_its_battery_does_not_last_for(
+    village,
+):
     schedule = schedule_of(village, view_of(village))
     view = flown(schedule, village, view_of(village), 60, slower=(1.2, 1.8))
     assert 1.4 < schedule.pace[1] <= 1.8

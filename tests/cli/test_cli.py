@@ -150,7 +150,7 @@ def test_a_check_describes_and_draws_a_scenario(elsewhere, capsys):
     assert (elsewhere / "village.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_check_says_what_waypoints_ask_for_and_who_carries_it(elsewhere, capsys):
+def test_a_check_says_what_waypoints_ask_for_and_which_uas_carry_it(elsewhere, capsys):
     assert main(["scenarios", "check", "mixed_fleet"]) == 0
     out = capsys.readouterr().out
     assert "15 for camera: mapper" in out

@@ -60,7 +60,7 @@ def flight():
     return rollout(again(LOST_2), SecondUasWorks())
 
 
-def test_who_has_landed_covers_what_a_lost_uas_leaves(flight):
+def test_a_uas_that_has_landed_covers_what_a_lost_uas_leaves(flight):
     assert accomplished(flight)
     assert coverage(flight) == 1.0
     assert home(flight).tolist() == [True, False]
@@ -123,7 +123,7 @@ def test_no_file_says_so_that_did_not_before(tmp_path):
         parse({**data, "from_ground": True}, Scenario, "mission.toml")
 
 
-def test_in_an_environment_who_has_landed_has_left():
+def test_in_an_environment_a_uas_that_has_landed_has_left():
     env = parallel_env(again(LOST_2), action="waypoint")
     env.reset(seed=0)
     home_action = int(env.action_space("uas_1").n) - 1  # pyright: ignore[reportAttributeAccessIssue]
@@ -187,7 +187,7 @@ def test_of_two_that_stand_too_near_to_each_other_one_goes():
     assert due(again(), LANDED, FLYING, x=x, returning=np.array([False, True])) == [False, False]
 
 
-def test_who_flies_or_is_lost_cannot_take_off():
+def test_a_uas_that_flies_or_is_lost_cannot_take_off():
     world = World(again())
     with pytest.raises(ValueError, match="has not landed"):
         world.take_off(np.array([True, False]))

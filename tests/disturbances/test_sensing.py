@@ -1,4 +1,4 @@
-"""What is sensed is not what is true: who flies by what, and that missions still end well."""
+"""What is sensed is not what is true: which state is used for what; missions still end well."""
 
 import numpy as np
 import pytest

@@ -265,7 +265,7 @@ def test_a_pool_takes_names_and_cuts_missions():
     np.testing.assert_array_equal(pool.n_uas, [2, 3])
 
 
-def test_lanes_tell_who_flies():
+def test_lanes_tell_which_uas_fly():
     batch = CoverageBatch(1, MIXED)
     batch.reset(scenarios=[1])
     np.testing.assert_array_equal(batch.flying, [[True, False, False]])

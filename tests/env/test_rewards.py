@@ -132,7 +132,7 @@ def test_a_battery_that_is_overdrawn_costs_the_uas():
     assert infos["uas_1"]["contact"] == ContactKind.BATTERY
 
 
-def test_who_still_flies_at_the_end_is_stranded():
+def test_a_uas_that_still_flies_at_the_end_is_stranded():
     env = uas_coverage_v0.parallel_env(practice_ground(), max_cycles=5)
     steps = run(env, lambda *_: np.zeros(3))
     assert len(steps) == 5

@@ -42,7 +42,7 @@ def test_a_mission_fails_by_a_waypoint_a_uas_or_a_violation(flight):
     assert not accomplished(dataclasses.replace(flight, violations=("any",)))
 
 
-def test_only_who_has_landed_is_home(flight):
+def test_only_a_uas_that_has_landed_is_home(flight):
     mode = flight.mode.copy()
     mode[-1] = (LANDED, LOST)
     assert home(dataclasses.replace(flight, mode=mode)).tolist() == [True, False]

@@ -228,7 +228,7 @@ def test_a_policy_that_changes_under_way_fails(yard, with_planners):
     assert "have changed" in flights().filter(player="hover")["reason"][0]
 
 
-def test_options_and_labels_reach_who_flies(yard):
+def test_options_and_labels_reach_the_planners(yard):
     options = ("--option", "high:climb_m=12", "--reference", "high")
     assert compare(yard, *options, planners="hover,high=hover") == 0
     frame = flights().filter(seed=0)

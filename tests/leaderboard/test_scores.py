@@ -65,7 +65,7 @@ def test_what_the_filter_replaced_is_averaged_over_the_flights_there_are():
     assert nothing.filtered_percent == 0.0
 
 
-def test_energy_per_percent_leaves_out_who_covered_nothing():
+def test_energy_per_percent_leaves_out_planners_that_covered_nothing():
     rows = [
         row("a", "p", coverage=0.5, accomplished=False),
         row("b", "p", coverage=0.0, accomplished=False),
@@ -75,7 +75,7 @@ def test_energy_per_percent_leaves_out_who_covered_nothing():
     assert one.steps.value is None
 
 
-def test_who_accomplishes_more_comes_first_then_who_needs_less():
+def test_a_planner_that_accomplishes_more_comes_first_then_one_that_needs_less():
     rows = [
         row("a", "base"),
         row("a", "idle", coverage=0.0, energy_Wh=1.0, accomplished=False),

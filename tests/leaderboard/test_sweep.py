@@ -166,7 +166,7 @@ def test_a_difference_is_named_where_it_lies():
     assert difference({"seeds": "0:2"}, kept) == "it has no players"
 
 
-def test_the_source_is_that_of_the_world_and_of_who_flies():
+def test_the_source_is_that_of_the_world_and_of_the_planner():
     hover = planner_specs_of(["hover"], []).values()
     assert source_of(hover) == source_of(hover) != source_of([])
 

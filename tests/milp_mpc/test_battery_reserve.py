@@ -158,7 +158,7 @@ def test_whatever_the_battery_gives_satisfies_the_rows_with_some_shortage(spare_
         assert feasible(milp, [(v.u[0, :, :4], u[:, :4])]) == (to_cutoff > 0.0)
 
 
-def test_who_is_too_late_flies_home():
+def test_a_uas_that_is_too_late_flies_home():
     problem = with_seconds_to_spare(-30.0)
     solution, _, v = best(problem)
     x = solution.values[v.x[0]]
@@ -189,6 +189,6 @@ def test_a_backup_trajectory_turns_back_while_there_is_charge_to_come_home():
     assert followed.x[0, 9, 0] == pytest.approx(plan.x[0, 9, 0], abs=0.5)
 
 
-def test_who_is_too_late_is_not_kept_from_flying():
+def test_a_uas_that_is_too_late_is_not_kept_from_flying():
     problem = with_seconds_to_spare(-60.0)
     assert backup_trajectory(problem, planned(problem, [(-10.0, 0.0, 0.0)] * 9), 1.0) is not None

@@ -71,7 +71,7 @@ command_lists = st.lists(points(14.0, 3.0), min_size=5, max_size=5)
 @pytest.mark.parametrize("prune", [False, True])
 @few
 @given(places=waypoint_places, one=command_lists, other=command_lists)
-def test_each_waypoint_counts_once_for_who_is_there_first_and_stays_covered(
+def test_each_waypoint_counts_once_for_the_uas_that_is_there_first_and_stays_covered(
     prune, places, one, other
 ):
     starts = [state(MIDDLE, (6.0, 0.0, 0.0)), state(MIDDLE + np.array([30.0, 5.0, 4.0]))]

@@ -202,7 +202,7 @@ def nothing_for_b(monkeypatch):
     monkeypatch.setattr(team_search.TeamSearch, "refined", for_a_alone)
 
 
-def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
+def test_a_uas_that_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
     plan = planned(decide(problem, None, 1.0, BY_TEAM))
     assert first_trouble(problem, plan) is None
     assert plan.covers[0].any()
@@ -211,7 +211,7 @@ def test_who_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
     assert plan.x[1] == pytest.approx(braking.x[0])
 
 
-def test_who_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes, nothing_for_b):
+def test_a_uas_that_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes, nothing_for_b):
     out = backup_trajectory(problem, by_nodes, 1.0)
     # of b alone: with one of a, which plan is the cheaper one depends on the solver's
     of_b = {key: getattr(out, key)[1:] for key in ("names", "x", "u", "covers")}
@@ -402,7 +402,7 @@ def test_a_team_has_one_flight_of_each_uas(problem):
         )
 
 
-def test_who_has_nothing_to_gain_flies_no_way_to_what_another_one_takes():
+def test_a_uas_that_has_nothing_to_gain_flies_no_way_to_what_another_one_takes():
     starts = [state((60.0, 60.0, -10.0)), state((60.0, 35.0, -10.0))]
     problem = toy(*starts, horizon=9, waypoints=[((60.0, 72.0, -10.0), 8.0)])
     pools = [construct(problem, uas, 1.0) for uas in range(2)]

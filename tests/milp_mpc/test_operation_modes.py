@@ -67,7 +67,7 @@ def updated(memories, situations, planned=(), blocked=()):
     return update_modes(memories, situations, WAYPOINTS, planned, blocked, TargetChoice())
 
 
-def test_who_turns_to_transit_flies_to_the_best_fitting_waypoint():
+def test_a_uas_that_turns_to_transit_flies_to_the_best_fitting_waypoint():
     (memory,) = updated([ModeMemory()], [situation()])
     assert memory == ModeMemory(TRANSIT, 2)  # the nearest, at 40 m
 
@@ -91,7 +91,7 @@ def test_heading_decides_between_waypoints_at_the_same_distance():
         assert best_fitting_waypoint(now, places, (), TargetChoice()) == ahead
 
 
-def test_heading_means_nothing_to_who_hovers():
+def test_heading_means_nothing_in_a_hover():
     places = np.array([(39.0, 0.0, -10.0), (-40.0, 0.0, -10.0)])
     now = situation(velocity_mps=(-0.3, 0.0, 0.0), n_waypoints=2)
     assert best_fitting_waypoint(now, places, (), TargetChoice()) == 0
@@ -140,7 +140,7 @@ def test_without_any_possible_target_the_uas_stays_in_covering_mode():
     assert memory == ModeMemory(COVERING)
 
 
-def test_who_returns_forgets_its_target():
+def test_a_uas_that_returns_forgets_its_target():
     (memory,) = updated([ModeMemory(TRANSIT, 2)], [situation(dod=0.5)])
     assert memory == ModeMemory(RETURN)
 

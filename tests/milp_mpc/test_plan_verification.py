@@ -119,7 +119,7 @@ def test_an_obstacle_in_the_very_first_step_is_seen():
     assert first_trouble(problem, plan) is not None
 
 
-def test_who_starts_too_close_may_leave():
+def test_a_uas_that_starts_too_close_may_leave():
     plan = planned(ahead())
     behind = box((50.0, 50.0, -20.0), (58.5, 70.0, 0.0))
     problem = toy(START, horizon=8, obstacles=[behind], clearance_m=3.0)

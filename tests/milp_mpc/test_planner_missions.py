@@ -123,7 +123,7 @@ def test_a_uas_too_low_on_charge_lands_before_it_leaves():
 
 
 @pytest.mark.parametrize("horizon", [8, 18])
-def test_who_is_at_home_and_still_moves_comes_to_rest_and_lands(horizon):
+def test_a_uas_that_is_at_home_and_still_moves_comes_to_rest_and_lands(horizon):
     scenario = mission([((52.0, 51.0, -2.0), 8.0)], [(50.0, 50.0, -1.0)])
     world = World(scenario)
     world.state.x[0, VZ] = 0.9

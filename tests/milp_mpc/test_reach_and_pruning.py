@@ -76,7 +76,7 @@ def test_reachable_sets_hold_the_farthest_flights_and_are_not_silly(vehicle, see
     assert reach[:, vertical] == pytest.approx(true[:, vertical], abs=2e-3)
 
 
-def test_reachable_sets_hold_for_who_is_a_little_faster_than_allowed_and_can_slow_down():
+def test_reachable_sets_hold_for_a_uas_a_little_faster_than_allowed_that_can_slow_down():
     start = already_flying(S500, 0)
     start[[VX, VY]] = 11.7, -5.2  # the fast plant overshoots a limit; the polygon allows 12
     problem = toy(start, horizon=6, fence=OPEN_SKY)

@@ -241,7 +241,7 @@ def test_two_uas_that_swap_places_in_one_step_are_refused_though_both_samples_ar
 
 @few
 @given(hull_points, st.integers(0, 50), coordinates(0.1, 2.9), points(14.0, 8.0))
-def test_who_starts_too_close_may_only_leave_and_comes_no_closer_on_the_way(
+def test_a_uas_that_starts_too_close_may_only_leave_and_comes_no_closer_on_the_way(
     corners, face, distance_m, stride
 ):
     hull = hull_about(MIDDLE, corners)

@@ -54,7 +54,7 @@ def test_two_uas_keep_the_tubes_of_both_between_them():
     assert (plain.offset_m - tight.offset_m)[0, 2].max() == pytest.approx(4.0)
 
 
-def test_who_is_nearer_already_need_not_be_where_it_cannot_get():
+def test_a_uas_that_is_nearer_already_need_not_be_where_it_cannot_get():
     near = state((57.5, 100.0, -20.0))  # 1.5 m of room, and the wall's clearance is 1 m
     problem = toy(near, horizon=2, obstacles=(WALL,), clearance_m=1.0)
     (plain,) = from_obstacles(replace(problem, prune=False))

@@ -41,7 +41,7 @@ def test_a_target_that_comes_no_nearer_is_hard_after_the_patience_is_used_up(dt_
     assert attempts.is_hard(0, target)
 
 
-def test_who_comes_nearer_however_slowly_is_at_no_standstill(brief):
+def test_a_uas_that_comes_nearer_however_slowly_is_at_no_standstill(brief):
     attempts, swarm = Attempts(brief), first_sight(brief)
     for step in range(200):
         attempts.update(at(swarm, 20.0 + 0.15 * step), {"uas_1": 0})

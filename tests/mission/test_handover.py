@@ -55,7 +55,7 @@ def test_where_none_takes_commands_all_work_on(brief, swarm):
         assert handover.workers(heard(swarm, step, False, False)).all()
 
 
-def test_who_does_not_fly_does_not_work(brief, swarm):
+def test_a_uas_that_does_not_fly_does_not_work(brief, swarm):
     handover = Handover(brief)
     for status in (LANDED, LOST):
         gone = dataclasses.replace(swarm, status=np.array([status, FLYING]))

@@ -130,7 +130,7 @@ def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(
         assert len(plan["rallyPoints"]["points"]) == 1
 
 
-def test_who_looks_where_it_flies_leaves_its_yaw_to_the_autopilot():
+def test_a_uas_that_looks_where_it_flies_leaves_its_yaw_to_the_autopilot():
     flight, place = random_flight(0), Place(latitude_deg=60.0, longitude_deg=20.0)
     first, *others = flight.scenario.uas
     fleet = (first.model_copy(update={"heading": "course"}), *others)

@@ -218,7 +218,7 @@ class LeavesOne:
         return {name: GoTo(open_ones.get(name)) for name in swarm.active}
 
 
-def test_who_takes_off_again_on_the_same_pack_begins_with_what_is_left():
+def test_a_uas_that_takes_off_again_on_the_same_pack_begins_with_what_is_left():
     places = (100.0, 60.0), (170.0, 130.0), (150.0, 90.0)
     waypoints = [waypoint((*place, -20.0)) for place in places]
     field = meadow(STARTS_M, waypoints=waypoints, max_steps=800)

@@ -37,7 +37,7 @@ def test_what_is_called_covered_has_been_seen_by_the_camera_at_the_resolution_as
     assert ground.share > 0.999
 
 
-def test_areas_for_different_cameras_are_flown_by_those_who_carry_them():
+def test_areas_for_different_cameras_are_flown_by_the_uas_that_carry_them():
     part = [[10.001, 50.0005], [10.0015, 50.0005], [10.0015, 50.001], [10.001, 50.001]]
     hot = feature([*part, part[0]], camera="h20t-thermal", weight=3)
     area = collection(feature(SQUARE), hot)

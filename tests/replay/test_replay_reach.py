@@ -28,7 +28,7 @@ def test_the_grid_spans_the_fence_at_the_height_of_the_highest_waypoint(scenario
     assert found.height_m == max(-waypoint.position_m[2] for waypoint in scenario.waypoints)
 
 
-def test_who_arrives_with_what_is_needed_has_enough_for_home(scenario, found):
+def test_a_uas_that_arrives_with_what_is_needed_has_enough_for_home(scenario, found):
     range_ = Range(MissionBrief.of(scenario))
     rng = np.random.default_rng(0)
     x = np.zeros(N_STATES)

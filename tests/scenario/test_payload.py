@@ -83,7 +83,7 @@ def test_heights_that_nobody_may_fly_at_are_warned_of():
     )
 
 
-def test_who_covers_what_is_known_to_planners():
+def test_planners_know_which_uas_cover_what():
     brief = MissionBrief.of(load_scenario("mixed_fleet"))
     assert brief.can_cover.sum(axis=1).tolist() == [15, 5]
     assert (brief.can_cover.sum(axis=0) == 1).all()

@@ -73,7 +73,7 @@ def test_it_turns_the_shorter_way_round_and_counts_on_beyond_a_half_turn(dynamic
 
 
 @pytest.mark.parametrize("dynamics", MODELS)
-def test_who_hovers_or_creeps_does_not_spin(dynamics):
+def test_a_uas_that_hovers_or_creeps_does_not_spin(dynamics):
     rng = np.random.default_rng(2)
     creeping = [towards(rng.uniform(0, 360), 0.6)[0] for _ in range(20)]
     commands = [*towards(120, steps=12), *towards(0, 0.0, steps=8), *creeping]

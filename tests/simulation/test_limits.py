@@ -126,7 +126,7 @@ def test_a_battery_that_gives_too_much_is_noticed(limit, battery):
     assert exceeded(world.step({"uas_1": Velocity(9.0, 6.0, 40.0)})) == {limit}
 
 
-def test_who_has_landed_rests_and_exceeds_nothing():
+def test_a_uas_that_has_landed_rests_and_exceeds_nothing():
     for mode in ("covering", "return"):
         world = World(meadow([(100.0, 100.0, -1.0)]))
         world.state.x[0, 11] = 1.1 * S500.limits.yaw_rate_max_radps

@@ -79,7 +79,7 @@ def test_a_uas_alone_waits_as_long_as_its_charge_lasts_and_comes_home(until_s, c
         assert flight.covered[-1] == len(PLACES) - 1
 
 
-def test_who_can_wait_longest_waits():
+def test_the_uas_that_can_wait_longest_waits():
     one = waiting((1.0, 0.4))
     assert one.barred[:, PARKED_ON].tolist() == [False, True]
     assert not one.barred[:, :PARKED_ON].any()
@@ -87,7 +87,7 @@ def test_who_can_wait_longest_waits():
     assert other.barred[:, PARKED_ON].tolist() == [True, False]
 
 
-def test_who_can_wait_until_the_mission_ends_may_wait_wherever_its_home_is():
+def test_a_uas_that_can_wait_until_the_mission_ends_may_wait_wherever_its_home_is():
     both = waiting((1.0, 0.8), max_steps=120)
     assert not both.barred.any()
     assert 60 < both.latest[PARKED_ON] < 120

@@ -105,7 +105,7 @@ def test_the_mission_goes_on_while_one_swaps_and_ends_when_nobody_is_going_to_fl
     assert world.state.uncovered.any()
 
 
-def test_who_swaps_when_nothing_is_left_has_landed_for_good():
+def test_a_uas_that_swaps_when_nothing_is_left_has_landed_for_good():
     dropped = [event("waypoint_dropped", 60.0, waypoint=w) for w in (1, 2)]
     world = World(mission(*dropped, swap_s=1000.0, max_steps=3000))
     first_sortie(world)
@@ -119,14 +119,14 @@ def test_the_limit_of_steps_ends_a_swap():
     assert fly(world, has(0, LANDED), BACK) <= 100
 
 
-def test_nobody_takes_off_who_could_not_be_back_in_time():
+def test_no_uas_takes_off_that_could_not_be_back_in_time():
     far = waypoint((160.0, 20.0, -10.0), 4.0)
     world = World(mission(waypoints=(NEAR, far), swap_s=20.0, max_steps=50))
     first_sortie(world)
     assert world.state.status[0] == LANDED
 
 
-def test_it_waits_until_who_flies_past_is_gone():
+def test_it_waits_until_one_that_flies_past_is_gone():
     world = World(mission())
     landed = first_sortie(world)
     beside_m = world.state.x[0, [X, Y, Z]] + (0.0, 4.0, 0.0)

@@ -42,13 +42,13 @@ def over(*waypoints, sensors=((),), start_m=HERE) -> Scenario:
         ({"heights_m": (21.0, 29.0), "position_m": (100.0, 100.0, -25.0)}, (), False),
     ],
 )
-def test_at_rest_it_counts_who_is_there_with_what_and_how_high(asked, carried, covered):
+def test_at_rest_it_counts_which_uas_is_there_with_what_and_how_high(asked, carried, covered):
     world = World(over(asking() | asked, sensors=[carried]))
     assert world.state.uncovered.tolist() == [not covered]
 
 
 @pytest.mark.parametrize(("speed_mps", "covered"), [(4.0, True), (4.6, False)])
-def test_who_is_too_fast_covers_nothing(speed_mps, covered):
+def test_a_uas_that_is_too_fast_covers_nothing(speed_mps, covered):
     world = World(over(asking((130.0, 100.0, -20.0), 29.0, max_speed_mps=3.5)))
     world.state.x[0, VX] = speed_mps
     world.state.reference[0] = speed_mps, 0.0
@@ -78,7 +78,7 @@ def test_guidance_comes_to_rest_where_slowness_is_asked_for_and_passes_by_elsewh
     assert steps[1] < steps[0] < 60
 
 
-def test_return_mode_brings_home_who_has_nothing_to_cover():
+def test_return_mode_brings_home_a_uas_that_has_nothing_to_cover():
     far = asking((20.0, 20.0, -20.0), sensor="thermal")
     scenario = over(far, sensors=[("thermal",), ("camera",)])
     world = World(scenario, return_mode=True)

@@ -92,7 +92,7 @@ def _pair(scenario: Scenario, one: Timed, other: Timed) -> Pair:
             one.at_s(found[:, 0]),
             other.at_s(found[:, 1]),
         )
-        # who stands on the ground is there all the time: then no delay is needed to be close
+        # one on the ground is there all the time: then no delay is needed to be close
         late_s = np.maximum(np.maximum(b_from_s - a_until_s, a_from_s - b_until_s), 0.0)
         worst = int(late_s.argmin())
         slack_s = float(late_s[worst])

@@ -60,7 +60,7 @@ class Course:
         return Course(step, self.x[done:], self.u[done:], self.lands)
 
     def path_m(self, steps: int) -> FloatArray:
-        """(K+1, 3) positions, K at most `steps`; a hover is held, who has landed is gone."""
+        """(K+1, 3) positions, K at most `steps`; a hover is held, a UAS that has landed is gone."""
         path_m = self.x[: steps + 1, :3]
         missing = steps + 1 - len(path_m)
         if missing > 0 and not self.lands:

@@ -366,7 +366,7 @@ class Trajectory:
             now = replace(moment, barred=barred)
             return plan_mission(self._fleet, now, swarm.step, bodies, effort, seed, kept, flown)
 
-        # before take-off it costs little to have what is blocked visited by who can wait
+        # before take-off it costs little to have what is blocked visited by one that can wait
         barred = None
         if unknown.any() and (first or self._is_handed_over):
             barred = self._waiting.barred
