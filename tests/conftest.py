@@ -1,6 +1,7 @@
 """Options of the whole test suite, its quick part, and who runs what where several processes do."""
 
 import os
+import signal
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -25,6 +26,23 @@ def pytest_configure():
     if tested is not None and tested.origin and Path(tested.origin).parents[1] == ROOT:
         folders = filter(None, [str(ROOT), *path.split(os.pathsep)])
         os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(folders))
+
+
+@pytest.fixture
+def elsewhere(tmp_path, monkeypatch):
+    """A command runs in a folder of its own, on a terminal of a known width."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    return tmp_path
+
+
+@pytest.fixture
+def python_handles_interrupts():
+    """Ctrl-C raises: also where the tests run in the background of a shell, which ignores it, and
+    where a solver, flown before in this process, has taken the signal for itself."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before or signal.default_int_handler)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from uas_coverage_baselines.by_legs.course import CoursePlanner
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight.metrics import coverage
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.mission.lateness import pairs_of
+from uas_coverage_env.mission.lateness import Timed, pairs_of
 from uas_coverage_env.mission.leg_model import Autopilot
 from uas_coverage_env.scenario import Execution, Scenario
 from uas_coverage_env.world import Velocity
@@ -84,7 +84,8 @@ def test_uas_that_cross_wait_on_the_ground_until_one_may_be_late():
     scenario = by_autopilot(meadow(STARTS_M, waypoints=CROSSING))
     pilot = LegPilot(MissionBrief.of(scenario))
     pilot.begin([[0], [1]])
-    flown = [(u, course.followed) for u, course in enumerate(pilot.courses)]
+    names = [uas.name for uas in scenario.uas]
+    flown = [Timed(u, names[u], course.followed) for u, course in enumerate(pilot.courses)]
     (pair,) = pairs_of(scenario, flown)
     assert pair.slack_s >= 20.0
 

@@ -4,10 +4,9 @@ import io
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
@@ -17,20 +16,14 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from uas_coverage_env.cli import app, main, run
+from uas_coverage_env.cli import main
 from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.flight import Decision, Flight, load_planner, rollout
 from uas_coverage_env.scenario import load_scenario, scenario_names
 from uas_coverage_env.simulation import World
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    """Every command runs in a folder of its own, on a terminal of a known width."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "120")
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def village(tmp_path, **changes):
@@ -361,47 +354,6 @@ def test_the_version_is_told_also_to_python_dash_m(capsys):
     wrong = subprocess.run([*command[:-1], "fly"], capture_output=True, text=True)
     assert wrong.returncode == 2
     assert "fly" in wrong.stderr
-
-
-def test_sigterm_ends_a_flight_as_ctrl_c_does_and_keeps_what_was_flown(elsewhere, monkeypatch):
-    @contextmanager
-    def terminating(*_, **__):
-        def on_step(progress):
-            if progress.swarm.step == 4:
-                os.kill(os.getpid(), signal.SIGTERM)
-
-        yield on_step
-
-    handler = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(run, "shown", terminating)
-    assert main(["run", "open_field", "--planner", "hover", "--out", "mine"]) == 1
-    flight = Flight.load("mine")
-    assert flight.ended == "stopped"
-    assert 4 <= flight.steps <= 5
-    assert signal.getsignal(signal.SIGTERM) is handler
-
-
-@pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
-def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
-    monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))
-    assert main(["planners"]) == 1
-    said = capsys.readouterr().err
-    assert said == "error: stopped by hand before there was anything to keep\n"
-
-
-def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypatch, capsys):
-    def compare():  # as numpy does while it compares structured arrays
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt as interruption:
-            raise TypeError("cannot compare") from interruption
-
-    monkeypatch.setattr(app, "command_group", compare)
-    assert main(["planners"]) == 1
-    assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
-    monkeypatch.setattr(app, "command_group", lambda: [].missing)
-    with pytest.raises(AttributeError):  # an error that nobody has asked for is none of these
-        main(["planners"])
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links of POSIX")

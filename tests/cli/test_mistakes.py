@@ -51,10 +51,7 @@ def refused(capsys, *command: str) -> str:
     return err
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.mark.parametrize("mistake", SCENARIO_MISTAKES)

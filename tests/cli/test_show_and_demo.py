@@ -12,12 +12,7 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.flight import Flight, summary
 from uas_coverage_env.scenario import load_scenario
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "120")
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,7 @@ import pytest
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.suggestions import did_you_mean
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.mark.parametrize(

@@ -117,14 +117,6 @@ def test_a_window_that_a_person_closes_never_waits_again(window, naps, how, paus
     window.close()
 
 
-@pytest.fixture
-def python_handles_interrupts():
-    """Also where a solver, flown before in this process, has taken the signal for itself."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before or signal.default_int_handler)
-
-
 @pytest.mark.usefixtures("python_handles_interrupts")
 def test_ctrl_c_ends_a_pause(window, naps):
     naps += [nothing, lambda: signal.raise_signal(signal.SIGINT)]

@@ -221,6 +221,7 @@ def test_a_signal_ends_the_flight_after_the_step_and_is_handled_as_before_after_
     assert finished[-1] == 5
 
 
+@pytest.mark.usefixtures("python_handles_interrupts")
 def test_a_second_ctrl_c_ends_the_flight_within_the_step(yard, listed):
     def interrupted(swarm):
         signal.raise_signal(signal.SIGINT)

@@ -13,12 +13,7 @@ from uas_coverage_env.flight import PlannerError, evaluate, load_planner
 from uas_coverage_env.leaderboard import TIMES, workers
 from uas_coverage_env.world import Velocity
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "120")
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def compare(scenarios, *more: str, planners="nearest-waypoint,hover", out="sweep") -> int:

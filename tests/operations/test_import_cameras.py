@@ -12,10 +12,7 @@ from uas_coverage_env.flight import load_planner, rollout, seen_ground
 from uas_coverage_env.operations import load_camera
 from uas_coverage_env.scenario import load_scenario
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def test_what_is_called_covered_has_been_seen_by_the_camera_at_the_resolution_asked_for():

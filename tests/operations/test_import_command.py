@@ -27,9 +27,7 @@ from uas_coverage_env.scenario import warnings
 EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def point(longitude, latitude):

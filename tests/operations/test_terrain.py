@@ -28,9 +28,7 @@ CELL_DEG, WEST, NORTH, SIZE = 0.0001, 9.998, 50.004, 70
 BASE_M, HILL_M = 412.0, 35.0
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def ground_m(latitude, longitude):

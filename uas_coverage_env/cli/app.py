@@ -82,7 +82,7 @@ COMMANDS = (
     CommandEntry(
         "export",
         at(f"{_CLI}.operations:export"),
-        "Write one file per UAS, few straight checked legs, and a report of charge (extra `ops`).",
+        "Write a file for each sortie, few straight checked legs, and a report (extra `ops`).",
     ),
     CommandEntry(
         "stream",
