@@ -1,0 +1,61 @@
+"""Ctrl-C and SIGTERM: one line, and what was flown is kept."""
+
+import os
+import signal
+from contextlib import contextmanager
+
+import pytest
+
+from uas_coverage_env import Flight
+from uas_coverage_env.cli import app, main, run
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+def test_sigterm_ends_a_flight_as_ctrl_c_does_and_keeps_what_was_flown(elsewhere, monkeypatch):
+    @contextmanager
+    def terminating(*_, **__):
+        def on_step(progress):
+            if progress.swarm.step == 4:
+                os.kill(os.getpid(), signal.SIGTERM)
+
+        yield on_step
+
+    handler = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(run, "shown", terminating)
+    assert main(["run", "open_field", "--planner", "hover", "--out", "mine"]) == 1
+    flight = Flight.load("mine")
+    assert flight.ended == "stopped"
+    assert 4 <= flight.steps <= 5
+    assert signal.getsignal(signal.SIGTERM) is handler
+
+
+@pytest.mark.usefixtures("python_handles_interrupts")
+@pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
+def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
+    monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))
+    assert main(["planners"]) == 1
+    said = capsys.readouterr().err
+    assert said == "error: stopped by hand before there was anything to keep\n"
+
+
+def test_an_error_without_an_interruption_is_none_of_these(monkeypatch):
+    def broken():
+        raise AttributeError("a mistake of ours")
+
+    monkeypatch.setattr(app, "command_group", broken)
+    with pytest.raises(AttributeError, match="a mistake of ours"):
+        main(["planners"])
+
+
+@pytest.mark.usefixtures("python_handles_interrupts")
+def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypatch, capsys):
+    def compare():  # as numpy does while it compares structured arrays
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as interruption:
+            raise TypeError("cannot compare") from interruption
+
+    monkeypatch.setattr(app, "command_group", compare)
+    assert main(["planners"]) == 1
+    assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
