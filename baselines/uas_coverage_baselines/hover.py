@@ -18,7 +18,7 @@ class HoverOptions(PlannerOptions):
 
 
 class Hover:
-    """Holds position above the start until the battery is empty: covers nothing, fails honestly."""
+    """Holds position above the start until the battery is empty; covers nothing."""
 
     Options = HoverOptions
 

@@ -75,40 +75,42 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         {rewards}
 
     Infos:
-        Numbers and arrays, each of the same kind and shape in every step; enumerations of the
-        package name the codes.
+        Numbers and arrays, each of the same kind and shape in every step. The last info of an agent
+        that has ended is complete.
 
-        `status` (`UasStatus`: 0 flying, 1 landed, 2 lost, 3 swapping its battery pack);
-        `contact`, what it was lost to (`ContactKind`: 0 nothing, 1 obstacle, 2 moving obstacle,
-        3 UAS, 4 geofence, 5 battery), and `contact_with`, its index among those of the scenario,
-        else -1; `limits_exceeded` (the vehicle's limits beyond which it is, as a mask: bit k for
-        `vehicle.LIMIT_NAMES[k]`);
-        `returning` (it flies home); `covered` (waypoints the swarm has covered so far);
-        `energy_Wh` (drawn by this UAS so far); `reward_terms`, a dictionary; `action_mask` with the
-        waypoint action; with the safety filter `filter`, a dictionary of `changed`, and of the
-        commands `asked` and `applied`, each with `kind` (`CommandKind`) and four `values`. The last
-        info of an agent that has ended is complete.
+        - `status` (`UasStatus`): 0 flying, 1 landed, 2 lost, 3 swapping its battery pack
+        - `contact` (`ContactKind`): what it was lost to; 0 nothing, 1 obstacle, 2 moving obstacle,
+          3 UAS, 4 geofence, 5 battery
+        - `contact_with`: the index of that obstacle or UAS in the scenario, else -1
+        - `limits_exceeded`: limits of the vehicle that it exceeds, as a mask: bit k stands for
+          `vehicle.LIMIT_NAMES[k]`
+        - `returning`: whether it flies home
+        - `covered`: waypoints that the swarm has covered so far
+        - `energy_Wh`: energy drawn by this UAS so far
+        - `reward_terms`: a dictionary
+        - `action_mask`: with the waypoint action
+        - `filter`: with the safety filter, a dictionary of `changed`, and of the commands `asked`
+          and `applied`, each with `kind` (`CommandKind`) and four `values`
 
     Starting State:
-        All UAS at rest at their starts, with the charge that the scenario gives them. Nothing is
-        random but the draw of a mission where `scenario` draws, and what disturbances draw:
-        `reset(seed=...)` draws the same again, `reset()` what comes next,
-        `reset(options={"scenario": ...})` flies that scenario. Agents that a mission does not have
-        are not in `agents`. Otherwise equal actions make equal missions.
+        All UAS are at rest at their starts, with the charge that the scenario gives them. Only
+        drawn missions and disturbances are random: `reset(seed=...)` repeats a draw, `reset()`
+        draws the next one, `reset(options={"scenario": ...})` flies that scenario. Otherwise equal
+        actions give equal missions.
 
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
         lost (contact with an obstacle or a UAS, outside of the fence, battery overdrawn).
-        Truncated: still flying after `max_cycles` steps. A UAS that has ended leaves `agents`; one
-        that lands to swap its battery pack (`[sorties]`, `together = false`) has not ended.
+        Truncated: still flying after `max_cycles` steps. An agent that has ended leaves `agents`; a
+        UAS that lands to swap its battery pack (`[sorties]`, `together = false`) has not ended.
 
     Arguments:
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
-            data; or what draws a scenario at each reset: the name of a family (`generated`), a
+            data. To draw a scenario at each reset: the name of a family (`generated`), a
             `MissionSource`, or any function `generator(rng) -> Scenario`.
         {settings}
-        render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra `human`:
-            space pauses, right steps, escape closes it and the missions go on unseen).
+        render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra
+            `human`: space pauses, right steps, escape closes it and the missions go on).
 
     Version History:
         v0: First version.

@@ -36,23 +36,23 @@ class MissionSettings:
     Attributes:
         action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
-        return_mode: The world takes a UAS home in time, whatever it is asked for.
-        safety_filter: The world replaces commands after which a UAS could not brake clear of harm.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
         observation: Blocks that the observation is made of, see `ObservationBlock`; or the name of
             an observation (`default`, `local`, `grid`).
         reward: Terms that the reward is made of, see `RewardTerm`.
-        disturbances: What pushes back, see `Disturbance`; None: what each scenario says; with ()
-            nothing does.
-        mask_in_observation: With choices (waypoint), an observation is a dictionary of
-            `observation` and `action_mask`, for libraries that do not read infos; the mask is not
-            in the infos then.
-        images_apart: Blocks that are pictures (`grid`) stand beside the observation: it is a
-            dictionary of `observation` and of a uint8 `Box` (channels, rows, columns) for each of
-            them, 255 for 1; a picture without other blocks is that `Box`.
-        flat_infos: Infos have no sub-dictionaries, but `reward_terms_home` and so on, for libraries
-            that make an array of every info (TorchRL).
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL).
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.

@@ -87,8 +87,8 @@ class PlannerOptions(StrictModel):
 class AssistedOptions(PlannerOptions):
     """Options of a planner that flies with both assistants unless they are taken away."""
 
-    filter: bool = Field(default=True, description="keep commands clear of harm (safety filter)")
-    return_mode: bool = Field(default=True, description="bring each UAS home in time")
+    filter: bool = Field(default=True, description="fly with the safety filter")
+    return_mode: bool = Field(default=True, description="fly with return mode")
 
     @property
     def assistants(self) -> Assistants:

@@ -8,18 +8,18 @@ from uas_coverage_env.files.strict_toml import StrictModel
 
 
 class Execution(StrictModel):
-    """What a plan becomes: `flown_by = "autopilot"`, a file of straight legs for each UAS.
+    """How an autopilot will fly the mission: from a file of straight legs for each UAS.
 
     Planners that know it plan long straight legs, from rest to rest, as an autopilot flies them, so
-    that the file takes as long as the flight. In the world nothing is different.
+    that the file takes as long as the flight. The simulation does not change.
 
     Attributes:
         flown_by: What flies it.
-        tolerance_m: How far legs may be from the flight, that much less than its radius from a
-            waypoint [m].
+        tolerance_m: How far legs may be from the flight [m]. They pass waypoints nearer than their
+            radius by as much.
         corner_m: How far from a corner the autopilot may pass [m].
-        min_slack_s: How late any UAS has to be able to be before two come too close; plans hold
-            UAS on the ground for it [s].
+        min_slack_s: How late any UAS may be before two come too close; plans hold UAS on the
+            ground to allow it [s].
     """
 
     flown_by: Literal["autopilot"]

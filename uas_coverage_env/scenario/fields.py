@@ -215,9 +215,9 @@ class Sensor(StrictModel):
         field_of_view_deg: Opening angles of the picture, from side to side and from front to back
             of a UAS that faces north: from west to east, and from south to north; without it, the
             sensor shows no ground [degrees].
-        stabilised: Whether it looks straight down however the UAS tilts; if not, it tilts with it.
-        max_tilt_deg: Pictures at more tilt of the UAS than this show nothing of use; without it,
-            all do [degrees].
+        stabilised: Whether it looks straight down at any tilt of the UAS; if not, it tilts with it.
+        max_tilt_deg: Largest tilt of the UAS at which pictures are useful; without it, any
+            [degrees].
     """
 
     name: Name

@@ -25,7 +25,7 @@ class Scenario(UncheckedScenario):
         landing_distance_m: A UAS this close to its start can land [m].
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
-        min_height_m: Least height of a UAS above the ground (z = 0) and above roofs, but for
+        min_height_m: Least height of a UAS above the ground (z = 0) and above roofs, except for
             take-off and landing; without it, or at 0, there is no such rule [m].
         from_ground: Whether UAS climb from the ground to their starts before t = 0, and descend to
             it after the last sample; without it missions begin and end in the air.
@@ -35,18 +35,17 @@ class Scenario(UncheckedScenario):
         obstacles: Fixed obstacles.
         moving_obstacles: Moving obstacles.
         uas: The fleet.
-        waypoints: What is to be covered.
+        waypoints: Points to be covered.
         decorations: Drawn only.
-        place: Where on the Earth it is; without it, nowhere in particular.
+        place: Where on the Earth the origin lies; for maps and exported files.
         wind: Wind; without it, the air is still.
-        uncertainty: By how much the vehicles that fly may differ from their files; without it,
-            they are as planners believe.
-        disturbances: What else acts on the UAS: a table `[disturbances.NAME]` for each, whose keys
-            are those of the package that installed NAME.
-        sensing: How well UAS are known to planners and autopilots; without it, exactly.
-        events: What happens during the mission; a table `[[events]]` for each.
+        uncertainty: By how much the vehicles may differ from their files; without it, they do not.
+        disturbances: Other disturbances: a table `[disturbances.NAME]` for each, with the keys of
+            the package that installed NAME.
+        sensing: Errors with which planners and autopilots know the UAS; without it, none.
+        events: What happens during the mission: a table `[[events]]` for each.
         sorties: Battery packs of each UAS; without it, one.
-        execution: What flies it in the end, an autopilot; without it, the world alone.
+        execution: For missions that an autopilot will fly from files.
     """
 
     def __getstate__(self) -> dict[Any, Any]:

@@ -11,12 +11,12 @@ LONGEST_DELAY = 7
 
 
 class Sensing(StrictModel):
-    """How well a UAS knows its state: position, velocity and charge. All else it knows exactly.
+    """Errors with which a UAS knows its position, velocity and charge. The rest is known exactly.
 
     Noise is normal and new at every sample. A bias is normal, too, and drawn once for each UAS and
-    mission. The inner loop, whose own estimate is smooth, flies by the state with its biases;
-    return mode, guidance and safety filter by that with noise; planners and learners are told the
-    latter `delay_steps` later. What counts is the true state.
+    mission. The inner loop uses the state with biases; return mode, guidance and safety filter use
+    it with biases and noise; planners and learners get the latter `delay_steps` later. Rules judge
+    the true state.
 
     Attributes:
         position_noise_m: Standard deviation on each axis [m].
@@ -24,7 +24,7 @@ class Sensing(StrictModel):
         velocity_noise_mps: Standard deviation on each axis [m/s].
         velocity_bias_mps: Likewise of a constant error [m/s].
         charge_bias: Standard deviation of a constant error of the depth of discharge [-].
-        delay_steps: How many steps later planners and learners are told of it.
+        delay_steps: How many steps later planners and learners get it.
     """
 
     position_noise_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0

@@ -16,13 +16,13 @@ class LearnedRouteOptions(AssistedOptions):
 
     return_mode: bool = Field(
         default=False,
-        description="let the world fly it home; else it flies home itself, by the same rule",
+        description="let the world fly UAS home; else the planner does, by the same rule",
     )
     samples: int = Field(
         default=SAMPLES,
         ge=1,
         le=100_000,
-        description="routes built before the best are flown; 1: the network's first choices alone",
+        description="sets of routes drawn, the best of which is flown; 1: the first choices only",
     )
 
 

@@ -34,8 +34,8 @@ class GuidedOptions(MovingHorizonOptions):
 
     order: Literal["search", "trajectory"] = Field(
         default="search",
-        description="where the order before take-off comes from: a search of its own, or the plan "
-        "of `trajectory`, whose weight of energy is then its own, too",
+        description="where the order before take-off comes from: the planner's own search, or the "
+        "plan of `trajectory`, whose weight of energy is then used",
     )
     waypoint_sides: int = Field(default=12, ge=4, le=16, multiple_of=4, description="H_WP")
     limit_sides: int = Field(

@@ -46,17 +46,17 @@ class OcpOptions(PlannerOptions):
         default=0.0,
         ge=0.0,
         le=50.0,
-        description="acceleration towards a UAS that is assumed of a moving obstacle; widens "
-        "the margin; 0: none is assumed",
+        description="assumed acceleration of moving obstacles towards a UAS; widens the margin; "
+        "0: none",
     )
     moving_speed_mps: float = Field(
-        default=15.0, gt=0.0, le=100.0, description="speed up to which it is assumed to accelerate"
+        default=15.0, gt=0.0, le=100.0, description="speed up to which they may accelerate"
     )
     in_wind: Literal["guidance", "tube", "wrenches"] = Field(
         default="guidance",
-        description="what is flown where bounds of wind or vehicles are stated: the order by the "
-        "world's guidance; tube MPC (clearances that grow along the horizon, velocities are "
-        "commanded); or plans as in still air",
+        description="how to fly where bounds of wind or vehicles are stated: along the order by "
+        "the world's guidance; by tube MPC (clearances grow along the horizon, velocities are "
+        "commanded); or by plans as in still air",
     )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),
@@ -119,7 +119,7 @@ class MovingHorizonOptions(OcpOptions):
         default=64,
         ge=1,
         le=64,
-        description="UAS planned anew in a decision, at most; the others go on with their plans",
+        description="most UAS planned in one decision; the others continue with their plans",
     )
 
     @property
@@ -135,7 +135,7 @@ class ModeOptions(OcpOptions):
         default=0.15,
         ge=0.0,
         le=10.0,
-        description="added to a waypoint's weight per second its coverage takes off the way left",
+        description="added to a waypoint's weight per second that covering it saves later",
     )
     return_rule: Literal["fence", "vehicle"] = Field(
         default="fence",
@@ -154,11 +154,11 @@ class ModeOptions(OcpOptions):
     )
     return_scale: Literal["horizon", "distance"] = Field(
         default="horizon",
-        description="what normalises the way home: the distance, or while something is covered "
-        "on the way at least what is flown in N steps",
+        description="what normalises the way home: the distance; or, while waypoints are covered "
+        "on the way, at least the distance flown in N steps",
     )
     weight_transit: float = weight(Weights.transit, "of the way to a transit target")
     weight_return_home: float = weight(Weights.return_home, "of the way home")
     weight_home_per_m_max: float = weight(
-        Weights.home_per_m_max, "that a metre from home has in a step, at most"
+        Weights.home_per_m_max, "of a metre from home in a step, at most"
     )

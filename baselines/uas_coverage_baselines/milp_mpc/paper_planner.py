@@ -56,7 +56,7 @@ class PaperOptions(ModeOptions):
         default=0.01,
         ge=0.0,
         le=100.0,
-        description="or the absolute one this, in steps that a waypoint of weight 1 stays open",
+        description="or the absolute gap this, in steps that a waypoint of weight 1 stays open",
     )
     time_limit_s: Annotated[float | None, BeforeValidator(_endless)] = Field(
         default=None, gt=0.0, description="wall clock per decision [s]; none: until the gap"
@@ -79,7 +79,7 @@ class PaperOptions(ModeOptions):
     moving_margin_m: float = with_default(ModeOptions, "moving_margin_m", _ROUNDING_M)
     corner_cutting: Literal["fixed", "all"] = Field(
         default="fixed",
-        description="what has these rows: fixed obstacles, or moving ones and pairs of UAS, too",
+        description="what has these rows: fixed obstacles, or also moving ones and pairs of UAS",
     )
     battery_reserve: bool = Field(
         default=False, description="whether a plan's end keeps charge for the way home"

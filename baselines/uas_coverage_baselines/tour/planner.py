@@ -39,7 +39,7 @@ class TourOptions(AssistedOptions):
 
     return_mode: bool = Field(
         default=False,
-        description="let the world fly it home; else it flies home itself, by the same rule",
+        description="let the world fly UAS home; else the planner does, by the same rule",
     )
     moves: int = Field(
         default=2_000_000, ge=0, le=10**9, description="changes tried by the order search"

@@ -21,7 +21,7 @@ class TrajectoryOptions(PlannerOptions):
         default=1,
         ge=1,
         le=100,
-        description="of these, so many get flights before take-off, the cheapest first",
+        description="of these orders, how many are planned in full before take-off",
     )
     moves: int = Field(
         default=300_000,
@@ -29,27 +29,27 @@ class TrajectoryOptions(PlannerOptions):
         description="changes tried in each search; up to six times as many for large fleets",
     )
     programs: int = Field(
-        default=150, ge=0, description="programs solved to make one UAS's flight shorter, about"
+        default=150, ge=0, description="programs solved to shorten one UAS's flight, about"
     )
     idle_work: int = Field(
         default=450,
         ge=0,
         le=100_000,
-        description="steps of flights looked for in each later decision, to improve the plan "
-        "while flying; 0: none",
+        description="work on a better plan in each later decision, in steps of planned "
+        "flights; 0: none",
     )
     weight_energy: float = Field(
         default=0.6,
         ge=0.0,
         le=100.0,
-        description="worth of a second of each UAS's flight against one of the mission; "
-        "of more than four UAS, of four seconds shared by all",
+        description="weight of a second of each UAS's flight against one of the mission; "
+        "more than four UAS share the weight of four",
     )
     speed_share: float = Field(
         default=1.0,
         ge=0.2,
         le=1.0,
-        description="of the largest horizontal speed: so fast is flown at most",
+        description="highest speed flown, as a share of the largest horizontal speed",
     )
     margin_m: MarginM = 0.3
     moving_margin_m: MovingMarginM = 3.0
@@ -57,5 +57,5 @@ class TrajectoryOptions(PlannerOptions):
         default=2,
         ge=1,
         le=64,
-        description="searches and UAS planned side by side; plans stay the same",
+        description="searches and UAS planned in parallel; plans stay the same",
     )

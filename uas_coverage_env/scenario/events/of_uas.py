@@ -32,7 +32,7 @@ class UasLost(OfUas):
 
 
 class RadioLost(OfUas):
-    """No command reaches a UAS for a while. What flies aboard (return mode, filter) goes on.
+    """No command reaches a UAS for a while. On-board functions (return mode, filter) go on.
 
     Attributes:
         kind: `"radio_lost"`.
