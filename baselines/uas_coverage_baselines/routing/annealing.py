@@ -44,9 +44,24 @@ def cost_s(task, seconds, left_out, n_left_out, total_weight):
         cost += total_weight * seconds[u]
         if seconds[u] > max(budget[u], 0.0):  # a UAS that may not fly costs nothing where it stays
             cost += OVERTIME * (seconds[u] - budget[u])
+    if len(task.ground_s):
+        longest = _last_home_s(task, seconds)
     for k in range(n_left_out):
         cost += left_out_s[left_out[k]]
     return cost + longest
+
+
+@allocating_kernel
+def _last_home_s(task, seconds):
+    """When the last UAS has flown its flights one after the other, packs swapped in between."""
+    last, home = 0.0, 0.0
+    for r in range(len(seconds)):
+        if r == 0 or task.uas[r] != task.uas[r - 1]:
+            home = 0.0
+        if seconds[r] > 0.0:
+            home += task.ground_s[r] + seconds[r]
+            last = max(last, home)
+    return last
 
 
 @allocating_kernel

@@ -34,6 +34,10 @@ class RoutingArrays(NamedTuple):
     left_out_s: FloatArray
     neighbours: NDArray[np.int64]
     turn_of_cosine: FloatArray
+    uas: NDArray[np.int64]
+    """(U,) which UAS flies what; empty where each flies once."""
+    ground_s: FloatArray
+    """(U,) on the ground before; likewise."""
 
 
 @allocating_kernel

@@ -63,6 +63,9 @@ class Routes:
         seconds: (U,) estimated flight time of each.
         cost_s: what the search minimises.
         left_out_s: what is left out contributes to that.
+        trips: (U) what each UAS visits with fresh packs later, a route for each (`improve_trips`);
+            empty where nothing is planned for later.
+        mission_s: with `trips`, when the last UAS has flown all of its flights; else 0.
     """
 
     routes: tuple[NDArray[np.int64], ...]
@@ -70,6 +73,13 @@ class Routes:
     seconds: FloatArray
     cost_s: float
     left_out_s: float = 0.0
+    trips: tuple[tuple[NDArray[np.int64], ...], ...] = ()
+    mission_s: float = 0.0
+
+    @property
+    def later(self) -> NDArray[np.int64]:
+        """Waypoints of all trips."""
+        return np.concatenate([np.zeros(0, np.int64), *(w for trips in self.trips for w in trips)])
 
 
 def empty_routes(n_uas: int) -> Routes:
@@ -186,6 +196,8 @@ def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
 def _opens_s(task: RoutingTask) -> FloatArray:
     """(U, W) from when on each UAS may visit, beyond every budget where it must not at all."""
     opens_s = np.tile(task.not_before_s, (task.n_uas, 1))
+    if task.uas is not None:  # when a later flight takes off, everything is taken to be open
+        opens_s[1:][task.uas[1:] == task.uas[:-1]] = 0.0
     if task.barred is not None:
         opens_s[task.barred] = _BARRED_S
     return opens_s
@@ -212,4 +224,6 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
         turn_of_cosine=turning,
+        uas=np.zeros(0, np.int64) if task.uas is None else task.uas,
+        ground_s=np.zeros(0) if task.ground_s is None else task.ground_s,
     )

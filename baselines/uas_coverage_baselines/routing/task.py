@@ -40,6 +40,9 @@ class RoutingTask:
         turn_of_cosine: What turning costs, in `turn_s`, by cosine from -1 to 1; None: of flights
             that cut through waypoints.
         barred: (U, W) which UAS must not visit which waypoint; None: any may visit any.
+        uas: Where a UAS flies more than once, U counts flights, and this says which UAS (U,) flies
+            each; flights of a UAS stand in their order. None: each UAS flies once.
+        ground_s: (U,) how long it is on the ground before that flight; None likewise.
     """
 
     open_waypoints: NDArray[np.int64]
@@ -61,6 +64,8 @@ class RoutingTask:
     budget_s: FloatArray
     turn_of_cosine: FloatArray | None = None
     barred: NDArray[np.bool_] | None = None
+    uas: NDArray[np.int64] | None = None
+    ground_s: FloatArray | None = None
 
     @classmethod
     def of(

@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
-from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
+from uas_coverage_baselines.routing import (
+    FreshPacks,
+    Packs,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement
@@ -94,7 +101,7 @@ class Trajectory:
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
-        self._way_home = Range(brief)
+        self._way_home, self._packs = Range(brief), Packs.of(brief)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
@@ -317,6 +324,9 @@ class Trajectory:
         known = np.zeros(len(swarm.uncovered), np.bool_)
         known[self.mission_plan.order.left_out] = True
         known |= self._latest_visit < self._planned_at
+        for u, trips in enumerate(self.mission_plan.order.trips):
+            if swarm.packs_left[u]:
+                known[np.concatenate([*trips, np.zeros(0, np.int64)])] = True
         for planned in self._planned.values():
             known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
         return known
@@ -358,13 +368,16 @@ class Trajectory:
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
         back = (flying & self._silent_then).any() or self._back.any()
-        if self.mission_plan is not None and not back:
+        if self.mission_plan is not None and (self.mission_plan.order.trips or not back):
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
+        fresh = self._fresh_packs(swarm, moment.uncovered)
 
         def found(barred: BoolArray | None) -> MissionPlan:
             now = replace(moment, barred=barred)
-            return plan_mission(self._fleet, now, swarm.step, bodies, effort, seed, kept, flown)
+            return plan_mission(
+                self._fleet, now, swarm.step, bodies, effort, seed, kept, flown, fresh
+            )
 
         # before take-off it costs little to have what is blocked visited by who can wait
         barred = None
@@ -387,6 +400,19 @@ class Trajectory:
         self._ends = {u: p.course.end for u, p in plan.planned.items()}
         self._had = set(plan.planned)
 
+    def _fresh_packs(self, swarm: SwarmState, uncovered: BoolArray) -> FreshPacks | None:
+        """What is there for later flights."""
+        brief = self._brief
+        n_uas, n_waypoints = len(swarm.x), len(uncovered)
+
+        def task(x: FloatArray, may_work: BoolArray) -> RoutingTask:
+            now = np.zeros(n_waypoints, np.int64)
+            moment = Moment(x, may_work, uncovered, now, swarm.time_s)
+            return self._fleet.task(moment, np.zeros(n_uas))
+
+        until_s = brief.max_steps * brief.dt_s - swarm.time_s
+        return FreshPacks.seen(self._packs, swarm, until_s, task)
+
     def _improve(self, swarm: SwarmState, movers: Movers) -> None:
         """Look for a better plan, where it is known where the UAS will be."""
         plan, flying = self.mission_plan, set(np.flatnonzero(swarm.status == FLYING).tolist())
@@ -406,11 +432,18 @@ class Trajectory:
                 late = unknown[p.route]
                 earliest[p.route[late]] = np.maximum(visits[late], 0)
             bodies = {u: self._bodies(expected, u) for u in range(len(swarm.x))}
-            return Ahead(earliest, self._waiting.barred if unknown.any() else None, bodies)
+            barred = self._waiting.barred if unknown.any() else None
+            if plan.order.trips:  # who visits what is part of a larger plan
+                others = np.ones((len(swarm.x), len(swarm.uncovered)), np.bool_)
+                for u, p in planned.items():
+                    others[u, p.route] = False
+                barred = others if barred is None else barred | others
+            return Ahead(earliest, barred, bodies)
 
         better = self._improvement.better(swarm, plan, self._planned, ahead)
         if better is not None:
-            order = replace(better.order, left_out=plan.order.left_out)
+            kept = plan.order
+            order = replace(better.order, left_out=kept.left_out, trips=kept.trips)
             self.mission_plan = replace(better, order=order)
             self._planned |= better.planned
             self._ends |= {u: p.course.end for u, p in better.planned.items()}
