@@ -184,6 +184,8 @@ def _orders(
     fresh: FreshPacks | None,
 ) -> list[Routes]:
     nothing = SearchEffort(0)
+    if kept is not None and kept.trips:  # the cheapest of these is flown, with no other look at it
+        nothing = SearchEffort(0, total_weight=effort.total_weight)
     found = [] if kept is None else [improve_trips(task, kept, nothing, 0, fresh)]
 
     def searched(k: int) -> Routes:
