@@ -54,14 +54,16 @@ def cost_s(task, seconds, left_out, n_left_out, total_weight):
 @allocating_kernel
 def _last_home_s(task, seconds):
     """When the last UAS has flown its flights one after the other, packs swapped in between."""
-    last, home = 0.0, 0.0
+    last, home, for_nothing = 0.0, 0.0, 0.0
     for r in range(len(seconds)):
         if r == 0 or task.uas[r] != task.uas[r - 1]:
             home = 0.0
         if seconds[r] > 0.0:
             home += task.ground_s[r] + seconds[r]
             last = max(last, home)
-    return last
+        if task.for_nothing_s[r] > 0.0 and seconds[r] == task.idle[r]:
+            for_nothing += task.for_nothing_s[r]
+    return last + for_nothing
 
 
 @allocating_kernel

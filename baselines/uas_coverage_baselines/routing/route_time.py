@@ -38,6 +38,8 @@ class RoutingArrays(NamedTuple):
     """(U,) which UAS flies what; empty where each flies once."""
     ground_s: FloatArray
     """(U,) on the ground before; likewise."""
+    for_nothing_s: FloatArray
+    """(U,) cost of a flight without a visit; likewise."""
 
 
 @allocating_kernel

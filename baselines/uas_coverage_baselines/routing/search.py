@@ -226,4 +226,5 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         turn_of_cosine=turning,
         uas=np.zeros(0, np.int64) if task.uas is None else task.uas,
         ground_s=np.zeros(0) if task.ground_s is None else task.ground_s,
+        for_nothing_s=np.zeros(0) if task.for_nothing_s is None else task.for_nothing_s,
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_CHARGE_SHARE = 0.96  # of a budget: flights take 1.6 % (one sigma) more or less than orders say
 _FRESH = 0.98  # of the budget of a fresh pack: more is as good as one
+_NO_RETURN = 0.5  # likewise: with more charge than that, a UAS is not to come home for a fresh pack
+_FOR_NOTHING_S = 600.0
 _NOTHING = np.zeros(0, np.int64)
 
 
@@ -67,6 +69,9 @@ class FreshPacks:
         ground_s: (U,) on the ground until the next take-off, for UAS that are there already.
         swap_s: (U,) likewise for all others, and from then on.
         until_s: From now to the end of the mission at the latest.
+        budget_share: Of the budgets, for flights that take longer than their routes say.
+        is_planned: (U,) the flight along the route to begin with is planned, and its charge
+            lasts, whatever the budget says; None: of none.
     """
 
     left: IntArray
@@ -74,6 +79,8 @@ class FreshPacks:
     ground_s: FloatArray
     swap_s: FloatArray
     until_s: float
+    budget_share: float = 1.0
+    is_planned: BoolArray | None = None
 
     @classmethod
     def seen(
@@ -82,6 +89,8 @@ class FreshPacks:
         swarm: SwarmState,
         until_s: float,
         task: Callable[[FloatArray, BoolArray], RoutingTask],
+        budget_share: float = 1.0,
+        is_planned: BoolArray | None = None,
     ) -> FreshPacks | None:
         """As a swarm is seen now; None where no fresh pack is left.
 
@@ -90,12 +99,15 @@ class FreshPacks:
             swarm: What is seen.
             until_s: From now to the end of the mission at the latest.
             task: Makes the routing problem of states (U, 14), of UAS (U,) that may work.
+            budget_share: See the attribute.
+            is_planned: Likewise.
         """
         left = swarm.packs_left
         if packs is None or not left.any():
             return None
         ground_s = np.where(swarm.status == FLYING, packs.swap_s, swarm.ground_s)
-        return cls(left, lambda: task(packs.x, left > 0), ground_s, packs.swap_s, until_s)
+        fresh = partial(task, packs.x, left > 0)
+        return cls(left, fresh, ground_s, packs.swap_s, until_s, budget_share, is_planned)
 
 
 def improve_trips(
@@ -137,6 +149,10 @@ def improve_trips(
         if len(more.left_out) >= len(best.left_out):
             break
         best = more
+    if effort.moves and len(best.left_out) and fresh.budget_share < 1.0:  # at the very last
+        all_of_it = replace(fresh, budget_share=1.0)
+        far = _with_trips(task, later, all_of_it, n_trips, begin, effort, seed)
+        best = far if len(far.left_out) < len(best.left_out) else best
     if best.mission_s <= fresh.until_s:
         return best
     return now or improve_routes(task, order, effort, seed)
@@ -173,9 +189,13 @@ def _with_trips(
         rows = [route, *trips, *[_NOTHING] * n_trips]
         begin += rows[: np.count_nonzero(uas == u)]
     flights = _flights(task, later, fresh, uas, follows)
-    by_pieces = replace(effort, by_pieces=True)
-    found = improve_routes(flights, Routes((*begin,), order.left_out, np.zeros(len(uas)), np.inf),
-                           by_pieces, seed)  # fmt: skip
+    first = Routes((*begin,), order.left_out, np.zeros(len(uas)), np.inf)
+    if fresh.is_planned is not None and fresh.is_planned.any():
+        lasts = np.isin(np.arange(len(uas)), np.flatnonzero(~follows)[fresh.is_planned])
+        kept_s = improve_routes(flights, first, SearchEffort(0), 0).seconds
+        budget_s = np.where(lasts, np.maximum(flights.budget_s, kept_s), flights.budget_s)
+        flights = replace(flights, budget_s=budget_s)
+    found = improve_routes(flights, first, replace(effort, by_pieces=True), seed)
     routes: list[IntArray] = []
     trips_of: list[tuple[IntArray, ...]] = []
     for u in range(n_uas):
@@ -228,9 +248,12 @@ def _flights(
         acceleration_mps2=task.acceleration_mps2[uas],
         start_m=task.start_m[uas],
         turn_s=task.turn_s[uas],
-        budget_s=_CHARGE_SHARE * of_each(task.budget_s, later.budget_s),
+        budget_s=fresh.budget_share * of_each(task.budget_s, later.budget_s),
         barred=barred,
         uas=uas,
+        for_nothing_s=np.where(
+            ~follows & (task.budget_s > _NO_RETURN * later.budget_s)[uas], _FOR_NOTHING_S, 0.0
+        ),
         ground_s=np.where(
             follows, np.where(lands_before, fresh.swap_s[uas], fresh.ground_s[uas]), 0.0
         ),

@@ -74,6 +74,7 @@ class Schedule:
         self.order = empty_routes(len(brief.uas))
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
+        self._is_new = True
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
@@ -95,6 +96,9 @@ class Schedule:
         left_out = self.order.left_out[open_[self.order.left_out]]
         trips = tuple(tuple(trip[open_[trip]] for trip in trips) for trips in self.order.trips)
         self.order = replace(self.order, routes=routes, left_out=left_out, trips=trips)
+        if self._is_new and self._packs is not None:  # planned in mid-mission, as if at the start
+            self._seen, self._legs_left_s = view, self._legs_left(view)
+        self._is_new = False
         self._time_legs(view)
         if self._has_changed(view):
             task, fresh = self.task(view), self._fresh_packs(view)
