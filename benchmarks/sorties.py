@@ -15,12 +15,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import NamedTuple
 
-from uas_coverage_env import Scenario, generate_scenario, rollout
+from uas_coverage_env import Scenario, generate_scenario, load_planner, rollout
 from uas_coverage_env.flight import (
     Flight,
     energy_Wh,
@@ -43,7 +42,7 @@ class Flown(NamedTuple):
     covered: int
     waypoints: int
     time_s: float
-    spent_Wh: float
+    spent_Wh: float  # noqa: N815
     packs: int
     harm: int
 
@@ -56,20 +55,24 @@ def mission(charge: float, swap_s: float, town: Scenario | None = None) -> Scena
     return town.model_copy(update={"uas": fleet, "sorties": packs, "max_steps": 5000})
 
 
-def together(scenario: Scenario, planner: str) -> Flown:
+def together(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
     """Sorties one after the other."""
-    fly = partial(rollout, planner=planner)
+
+    def fly(sortie: Scenario) -> Flight:
+        return rollout(sortie, load_planner(planner, options))
+
     result = sorties_summary(list(fly_sorties(scenario, fly, 20)))
     harm = result["violations"] + result["breaches"]
     return Flown(result["covered"], result["covered"] + result["left"], result["time_s"],
                  result["energy_Wh"], sum(result["packs"].values()), harm)  # fmt: skip
 
 
-def alone(scenario: Scenario, planner: str) -> Flown:
+def alone(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
     """One flight in which each swaps while the others fly on."""
     packs = Sorties(packs=20, swap_s=scenario.sorties.swap_s if scenario.sorties else 0.0,
                     together=False)  # fmt: skip
-    flight: Flight = rollout(scenario.model_copy(update={"sorties": packs}), planner)
+    alone = scenario.model_copy(update={"sorties": packs})
+    flight = rollout(alone, load_planner(planner, options))
     covered = int(flight.covered[-1])
     harm = len(flight.violations) + flight.breaches
     time_s, spent_Wh = flight.steps * scenario.dt_s, float(energy_Wh(flight).sum())
@@ -106,7 +109,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--towns", default=f"{TOWN}:{TOWN + 1}", help="seeds, FIRST:LAST+1")
     parser.add_argument("--forms", default=",".join(FORMS))
     parser.add_argument("--each", action="store_true", help="print each mission, too")
+    parser.add_argument("--option", action="append", default=[], help="NAME=VALUE, of the planners")
     given = parser.parse_args(arguments)
+    options = dict(one.split("=", 1) for one in given.option)
     seeds = range(*map(int, given.towns.split(":")))
     towns = [generate_scenario(seed, n_uas=3, n_waypoints=90) for seed in seeds]
     print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
@@ -115,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for charge in map(float, given.charges.split(",")):
                 flown = []
                 for seed, town in zip(seeds, towns, strict=True):
-                    flown.append(fly(mission(charge, given.swap, town), planner))
+                    flown.append(fly(mission(charge, given.swap, town), planner, options))
                     if given.each:
                         print(f"seed {seed}:", *row(flown[-1:]), file=sys.stderr, flush=True)
                 print("|", " | ".join([f"`{planner}`", form, f"{charge}", *row(flown)]), "|",

@@ -89,7 +89,7 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         responds=responding(arena, state),
         turned_rad=turned_rad,
         packs_left=packs_left(arena, state),
-        ground_s=scenario.dt_s * swap_steps_left(arena, state),
+        ground_s=scenario.dt_s * swap_steps_left(arena, state).astype(float),
     )
 
 

@@ -57,13 +57,16 @@ def _last_home_s(task, seconds):
     last, home, for_nothing = 0.0, 0.0, 0.0
     for r in range(len(seconds)):
         if r == 0 or task.uas[r] != task.uas[r - 1]:
-            home = 0.0
+            home, for_nothing = 0.0, 0.0
+        elif seconds[r] > 0.0:
+            home += for_nothing
+            for_nothing = 0.0
         if seconds[r] > 0.0:
             home += task.ground_s[r] + seconds[r]
             last = max(last, home)
-        if task.for_nothing_s[r] > 0.0 and seconds[r] == task.idle[r]:
+        if seconds[r] == task.idle[r]:
             for_nothing += task.for_nothing_s[r]
-    return last + for_nothing
+    return last
 
 
 @allocating_kernel

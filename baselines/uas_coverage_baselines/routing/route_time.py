@@ -39,7 +39,7 @@ class RoutingArrays(NamedTuple):
     ground_s: FloatArray
     """(U,) on the ground before; likewise."""
     for_nothing_s: FloatArray
-    """(U,) cost of a flight without a visit; likewise."""
+    """(U,) cost of another flight after one without a visit; likewise."""
 
 
 @allocating_kernel

@@ -43,8 +43,8 @@ class RoutingTask:
         uas: Where a UAS flies more than once, U counts flights, and this says which UAS (U,) flies
             each; flights of a UAS stand in their order. None: each UAS flies once.
         ground_s: (U,) how long it is on the ground before that flight; None likewise.
-        for_nothing_s: (U,) what it costs to come home from that flight without a visit: such a UAS
-            is not sent out again; None likewise.
+        for_nothing_s: (U,) what it costs to fly again after a flight without a visit, after which
+            no UAS is sent out; None likewise.
     """
 
     open_waypoints: NDArray[np.int64]

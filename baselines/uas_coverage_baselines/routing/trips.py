@@ -32,7 +32,7 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 _FRESH = 0.98  # of the budget of a fresh pack: more is as good as one
-_NO_RETURN = 0.5  # likewise: with more charge than that, a UAS is not to come home for a fresh pack
+_NO_RETURN = 0.5  # likewise: with more, a UAS is to visit something before it swaps
 _FOR_NOTHING_S = 600.0
 _NOTHING = np.zeros(0, np.int64)
 
@@ -180,21 +180,25 @@ def _with_trips(
     uas = np.repeat(np.arange(n_uas), 1 + np.minimum(fresh.left, n_trips))
     follows = np.append(False, uas[1:] == uas[:-1])
     is_fresh = works & (task.budget_s >= _FRESH * later.budget_s)
+    flights = _flights(task, later, fresh, uas, follows)
+    open_ = np.zeros(task.n_waypoints, np.bool_)
+    open_[flights.open_waypoints] = True
     begin: list[IntArray] = []
     for u in range(n_uas):
-        trips = list(order.trips[u]) if order.trips else []
-        route = order.routes[u]
+        route, *trips = [order.routes[u], *(order.trips[u] if order.trips else ())]
+        route, trips = route[open_[route]], [trip for trip in trips if open_[trip].any()]
         if is_fresh[u] and not len(route) and trips:
             route = trips.pop(0)
         rows = [route, *trips, *[_NOTHING] * n_trips]
         begin += rows[: np.count_nonzero(uas == u)]
-    flights = _flights(task, later, fresh, uas, follows)
     first = Routes((*begin,), order.left_out, np.zeros(len(uas)), np.inf)
     if fresh.is_planned is not None and fresh.is_planned.any():
-        lasts = np.isin(np.arange(len(uas)), np.flatnonzero(~follows)[fresh.is_planned])
-        kept_s = improve_routes(flights, first, SearchEffort(0), 0).seconds
-        budget_s = np.where(lasts, np.maximum(flights.budget_s, kept_s), flights.budget_s)
-        flights = replace(flights, budget_s=budget_s)
+        visited = np.concatenate(begin)
+        kept = replace(flights, open_waypoints=visited[open_[visited]])
+        kept_s = improve_routes(kept, first, SearchEffort(0), 0).seconds
+        lasts = ~follows & fresh.is_planned[uas]
+        longer_s = np.maximum(flights.budget_s, kept_s)
+        flights = replace(flights, budget_s=np.where(lasts, longer_s, flights.budget_s))
     found = improve_routes(flights, first, replace(effort, by_pieces=True), seed)
     routes: list[IntArray] = []
     trips_of: list[tuple[IntArray, ...]] = []
@@ -206,6 +210,7 @@ def _with_trips(
         routes.append(route)
         trips_of.append((*trips,))
     # as long as they take, and as long as the UAS is on the ground before
+    assert flights.ground_s is not None
     ground_s = np.where(found.seconds > 0.0, flights.ground_s, 0.0)
     home_s = np.bincount(uas, found.seconds + ground_s)
     return replace(
@@ -235,6 +240,7 @@ def _flights(
     if barred is not None:
         barred = of_each(barred, np.zeros_like(barred))
     lands_before = np.append(False, follows[:-1]) | (task.budget_s > -np.inf)[uas]
+    has_charge = task.budget_s > _NO_RETURN * later.budget_s
     return replace(
         task,
         open_waypoints=np.union1d(task.open_waypoints, later.open_waypoints),
@@ -251,9 +257,7 @@ def _flights(
         budget_s=fresh.budget_share * of_each(task.budget_s, later.budget_s),
         barred=barred,
         uas=uas,
-        for_nothing_s=np.where(
-            ~follows & (task.budget_s > _NO_RETURN * later.budget_s)[uas], _FOR_NOTHING_S, 0.0
-        ),
+        for_nothing_s=np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0.0),
         ground_s=np.where(
             follows, np.where(lands_before, fresh.swap_s[uas], fresh.ground_s[uas]), 0.0
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,6 +163,9 @@ def plan_mission(
         too_long = [u for u, why in best.troubles.items() if why == _BATTERY]
         if not too_long:
             return best
+        if fresh is not None and fresh.is_planned is not None:
+            others = ~np.isin(np.arange(task.n_uas), too_long)
+            fresh = replace(fresh, is_planned=fresh.is_planned & others)
         battery_s = fleet.battery_s(moment.x)
         if task.n_uas <= SMALL_FLEET:
             less_s[too_long] += _SHORTER * battery_s[too_long]

@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
-from uas_coverage_baselines.routing import (
-    FreshPacks,
-    Packs,
-    RoutingTask,
-    SearchEffort,
-    empty_routes,
-    improve_routes,
-)
+from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement
@@ -59,9 +52,6 @@ _OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _SOON_S = BRAKING_S  # a visit to what is still blocked so soon is put off,
-_LATER_SHARE = (
-    0.96  # of budgets, where flights are not planned yet: they differ from orders by 1.6 %
-)
 _AT_LAST_S = 8.0  # given up where it cannot be put off
 
 
@@ -104,7 +94,7 @@ class Trajectory:
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
-        self._way_home, self._packs = Range(brief), Packs.of(brief)
+        self._way_home = Range(brief)
         self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
@@ -374,7 +364,7 @@ class Trajectory:
         if self.mission_plan is not None and (self.mission_plan.order.trips or not back):
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
-        fresh = self._fresh_packs(swarm, moment.uncovered, flown)
+        fresh = self._fleet.fresh_packs(swarm, moment.uncovered, flown)
 
         def found(barred: BoolArray | None) -> MissionPlan:
             now = replace(moment, barred=barred)
@@ -402,22 +392,6 @@ class Trajectory:
                 self._may_fly[u] = u in plan.planned or u in plan.troubles
         self._ends = {u: p.course.end for u, p in plan.planned.items()}
         self._had = set(plan.planned)
-
-    def _fresh_packs(
-        self, swarm: SwarmState, uncovered: BoolArray, flown: Mapping[int, object]
-    ) -> FreshPacks | None:
-        """What is there for later flights."""
-        brief = self._brief
-        n_uas, n_waypoints = len(swarm.x), len(uncovered)
-
-        def task(x: FloatArray, may_work: BoolArray) -> RoutingTask:
-            now = np.zeros(n_waypoints, np.int64)
-            moment = Moment(x, may_work, uncovered, now, swarm.time_s)
-            return self._fleet.task(moment, np.zeros(n_uas))
-
-        until_s = brief.max_steps * brief.dt_s - swarm.time_s
-        is_planned = np.isin(np.arange(n_uas), list(flown))
-        return FreshPacks.seen(self._packs, swarm, until_s, task, _LATER_SHARE, is_planned)
 
     def _improve(self, swarm: SwarmState, movers: Movers) -> None:
         """Look for a better plan, where it is known where the UAS will be."""
