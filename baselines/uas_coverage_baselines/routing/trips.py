@@ -8,7 +8,7 @@ each charge of a UAS, flown one after the other (`RoutingTask.uas`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -34,6 +34,7 @@ BoolArray = NDArray[np.bool_]
 _FRESH = 0.98  # of the budget of a fresh pack: more is as good as one
 _NO_RETURN = 0.5  # likewise: with more, a UAS is to visit something before it swaps
 _FOR_NOTHING_S = 600.0
+_AT_LAST = 0.04  # of budgets, for what is beyond the reach of flights otherwise
 _NOTHING = np.zeros(0, np.int64)
 
 
@@ -109,6 +110,13 @@ class FreshPacks:
         fresh = partial(task, packs.x, left > 0)
         return cls(left, fresh, ground_s, packs.swap_s, until_s, budget_share, is_planned)
 
+    def shorter(self, share: float, uas: Sequence[int]) -> FreshPacks:
+        """With budgets shorter by a share, and no flight planned of some UAS."""
+        is_planned = self.is_planned
+        if is_planned is not None:
+            is_planned = is_planned & ~np.isin(np.arange(len(is_planned)), uas)
+        return replace(self, budget_share=self.budget_share - share, is_planned=is_planned)
+
 
 def improve_trips(
     task: RoutingTask,
@@ -149,9 +157,10 @@ def improve_trips(
         if len(more.left_out) >= len(best.left_out):
             break
         best = more
-    if effort.moves and len(best.left_out) and fresh.budget_share < 1.0:  # at the very last
-        all_of_it = replace(fresh, budget_share=1.0)
-        far = _with_trips(task, later, all_of_it, n_trips, begin, effort, seed)
+    if effort.moves and len(best.left_out) and fresh.budget_share < 1.0:
+        share = min(fresh.budget_share + _AT_LAST, 1.0)
+        more = replace(fresh, budget_share=share)
+        far = _with_trips(task, later, more, n_trips, begin, effort, seed)
         best = far if len(far.left_out) < len(best.left_out) else best
     if best.mission_s <= fresh.until_s:
         return best

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,9 +163,9 @@ def plan_mission(
         too_long = [u for u, why in best.troubles.items() if why == _BATTERY]
         if not too_long:
             return best
-        if fresh is not None and fresh.is_planned is not None:
-            others = ~np.isin(np.arange(task.n_uas), too_long)
-            fresh = replace(fresh, is_planned=fresh.is_planned & others)
+        if fresh is not None and best.order.trips:
+            fresh = fresh.shorter(_SHORTER, too_long)  # for later flights as for those of now
+            continue
         battery_s = fleet.battery_s(moment.x)
         if task.n_uas <= SMALL_FLEET:
             less_s[too_long] += _SHORTER * battery_s[too_long]
