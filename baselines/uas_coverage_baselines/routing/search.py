@@ -196,8 +196,9 @@ def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
 def _opens_s(task: RoutingTask) -> FloatArray:
     """(U, W) from when on each UAS may visit, beyond every budget where it must not at all."""
     opens_s = np.tile(task.not_before_s, (task.n_uas, 1))
-    if task.uas is not None:  # when a later flight takes off, everything is taken to be open
-        opens_s[1:][task.uas[1:] == task.uas[:-1]] = 0.0
+    if task.packs is not None:  # when a later flight takes off, everything is taken to be open
+        uas = task.packs[:, 0]
+        opens_s[1:][uas[1:] == uas[:-1]] = 0.0
     if task.barred is not None:
         opens_s[task.barred] = _BARRED_S
     return opens_s
@@ -214,9 +215,7 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         home=task.home_s,
         idle=task.idle_s,
         place=np.ascontiguousarray(place),
-        velocity=task.velocity_mps,
-        speed=task.speed_mps,
-        acceleration=task.acceleration_mps2,
+        motion=np.column_stack([task.velocity_mps, task.speed_mps, task.acceleration_mps2]),
         turn=task.turn_s,
         opens=opens_s,
         opens_late=np.any(opens_s > 0.0, axis=0),
@@ -224,7 +223,5 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
         turn_of_cosine=turning,
-        uas=np.zeros(0, np.int64) if task.uas is None else task.uas,
-        ground_s=np.zeros(0) if task.ground_s is None else task.ground_s,
-        for_nothing_s=np.zeros(0) if task.for_nothing_s is None else task.for_nothing_s,
+        packs=np.zeros((0, 3)) if task.packs is None else task.packs,
     )

@@ -2,7 +2,7 @@
 
 A search for flights that are over soon fills every charge, and plans the last of them for what
 happens to be left. Here all flights are planned at once: the search is the same, over one route for
-each charge of a UAS, flown one after the other (`RoutingTask.uas`).
+each charge of a UAS, flown one after the other (`RoutingTask.packs`).
 """
 
 from __future__ import annotations
@@ -219,8 +219,8 @@ def _with_trips(
         routes.append(route)
         trips_of.append((*trips,))
     # as long as they take, and as long as the UAS is on the ground before
-    assert flights.ground_s is not None
-    ground_s = np.where(found.seconds > 0.0, flights.ground_s, 0.0)
+    assert flights.packs is not None
+    ground_s = np.where(found.seconds > 0.0, flights.packs[:, 1], 0.0)
     home_s = np.bincount(uas, found.seconds + ground_s)
     return replace(
         found,
@@ -249,6 +249,8 @@ def _flights(
     if barred is not None:
         barred = of_each(barred, np.zeros_like(barred))
     lands_before = np.append(False, follows[:-1]) | (task.budget_s > -np.inf)[uas]
+    ground_s = np.where(lands_before, fresh.swap_s[uas], fresh.ground_s[uas])
+    ground_s = np.where(follows, ground_s, 0.0)
     has_charge = task.budget_s > _NO_RETURN * later.budget_s
     return replace(
         task,
@@ -265,9 +267,7 @@ def _flights(
         turn_s=task.turn_s[uas],
         budget_s=fresh.budget_share * of_each(task.budget_s, later.budget_s),
         barred=barred,
-        uas=uas,
-        for_nothing_s=np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0.0),
-        ground_s=np.where(
-            follows, np.where(lands_before, fresh.swap_s[uas], fresh.ground_s[uas]), 0.0
+        packs=np.column_stack(
+            [uas, ground_s, np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0)]
         ),
     )
