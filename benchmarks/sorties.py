@@ -2,22 +2,24 @@
 
     python benchmarks/sorties.py                       # some minutes of processor time
     python benchmarks/sorties.py --planners tour --swap 30
+    python benchmarks/sorties.py --towns 7:12 --charges 0.33,0.37 --forms alone --each
 
-The town is `generate_scenario(7, n_uas=3, n_waypoints=90)`, its packs charged to `--charge`. It is
-flown as sorties one after the other (`run --sorties`: all wait for the last one to land) and in one
-flight (`together = false`). A row for each planner and form: waypoints covered, time of the whole
-mission with its swaps, energy, packs used, violations and breaches.
+The towns are `generate_scenario(seed, n_uas=3, n_waypoints=90)`, packs charged to `--charges`. They
+are flown as sorties one after the other (`run --sorties`: all wait for the last one to land)
+and in one flight (`together = false`). A row for each planner, form and charge, of all towns, as
+median (range): waypoints covered, time of the whole mission with its swaps, energy, packs used, and
+violations and breaches in all. `--each` prints a row for each mission, too.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from functools import partial
-from typing import Any
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import NamedTuple
 
-from uas_coverage_env import Scenario, generate_scenario, rollout
+from uas_coverage_env import Scenario, generate_scenario, load_planner, rollout
 from uas_coverage_env.flight import (
     Flight,
     energy_Wh,
@@ -29,58 +31,100 @@ from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.scenario.packs import Sorties
 
 PLANNERS = ("nearest-waypoint", "trajectory")
-HEAD = ("planner", "packs are swapped", "covered", "time, s", "energy, Wh", "packs", "harm")
+HEAD = ("planner", "packs are swapped", "charge", "covered", "time, s", "energy, Wh", "packs",
+        "harm")  # fmt: skip
+TOWN = 7
+
+
+class Flown(NamedTuple):
+    """What came of a mission."""
+
+    covered: int
+    waypoints: int
+    time_s: float
+    spent_Wh: float  # noqa: N815
+    packs: int
+    harm: int
 
 
 def mission(charge: float, swap_s: float, town: Scenario | None = None) -> Scenario:
     """A town with packs charged to a share, swapped together."""
-    town = town or generate_scenario(7, n_uas=3, n_waypoints=90)
+    town = town or generate_scenario(TOWN, n_uas=3, n_waypoints=90)
     fleet = tuple(uas.model_copy(update={"soc_0": charge}) for uas in town.uas)
     packs = Sorties(packs=20, swap_s=swap_s)
     return town.model_copy(update={"uas": fleet, "sorties": packs, "max_steps": 5000})
 
 
-def together(scenario: Scenario, planner: str) -> tuple[Any, ...]:
-    """Covered, time [s], energy [Wh], packs and harm of sorties one after the other."""
-    fly = partial(rollout, planner=planner)
+def together(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
+    """Sorties one after the other."""
+
+    def fly(sortie: Scenario) -> Flight:
+        return rollout(sortie, load_planner(planner, options))
+
     result = sorties_summary(list(fly_sorties(scenario, fly, 20)))
-    share = f"{result['covered']}/{result['covered'] + result['left']}"
     harm = result["violations"] + result["breaches"]
-    return share, result["time_s"], result["energy_Wh"], sum(result["packs"].values()), harm
+    return Flown(result["covered"], result["covered"] + result["left"], result["time_s"],
+                 result["energy_Wh"], sum(result["packs"].values()), harm)  # fmt: skip
 
 
-def alone(scenario: Scenario, planner: str) -> tuple[Any, ...]:
-    """The same of one flight in which each swaps while the others fly on."""
+def alone(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
+    """One flight in which each swaps while the others fly on."""
     packs = Sorties(packs=20, swap_s=scenario.sorties.swap_s if scenario.sorties else 0.0,
                     together=False)  # fmt: skip
-    flight: Flight = rollout(scenario.model_copy(update={"sorties": packs}), planner)
+    alone = scenario.model_copy(update={"sorties": packs})
+    flight = rollout(alone, load_planner(planner, options))
     covered = int(flight.covered[-1])
-    share = f"{covered}/{covered + open_waypoints(flight)}"
     harm = len(flight.violations) + flight.breaches
-    time_s = flight.steps * scenario.dt_s
-    return share, time_s, energy_Wh(flight).sum(), sum(packs_used(flight).values()), harm
+    time_s, spent_Wh = flight.steps * scenario.dt_s, float(energy_Wh(flight).sum())
+    packs_in_all = sum(packs_used(flight).values())
+    return Flown(covered, covered + open_waypoints(flight), time_s, spent_Wh, packs_in_all, harm)
+
+
+FORMS = {"together": ("together", together), "alone": ("each on its own", alone)}
+
+
+def _spread(values: Sequence[float], digits: int) -> str:
+    low, middle, high = (f"{f(values):.{digits}f}" for f in (min, median, max))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def row(flown: Sequence[Flown]) -> list[str]:
+    """The figures of a row, of several missions."""
+    covered = sum(one.covered for one in flown)
+    return [
+        f"{covered}/{sum(one.waypoints for one in flown)}",
+        _spread([one.time_s for one in flown], 0),
+        _spread([one.spent_Wh for one in flown], 1),
+        _spread([one.packs for one in flown], 0),
+        str(sum(one.harm for one in flown)),
+    ]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Fly both forms with every planner and print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--planners", default=",".join(PLANNERS))
-    parser.add_argument("--charge", type=float, default=0.4, help="of a fresh pack, 0 to 1")
+    parser.add_argument("--charges", default="0.4", help="of a fresh pack, 0 to 1")
     parser.add_argument("--swap", type=float, default=60.0, help="[s]")
+    parser.add_argument("--towns", default=f"{TOWN}:{TOWN + 1}", help="seeds, FIRST:LAST+1")
+    parser.add_argument("--forms", default=",".join(FORMS))
+    parser.add_argument("--each", action="store_true", help="print each mission, too")
+    parser.add_argument("--option", action="append", default=[], help="NAME=VALUE, of the planners")
     given = parser.parse_args(arguments)
-    scenario = mission(given.charge, given.swap)
+    options = dict(one.split("=", 1) for one in given.option)
+    seeds = range(*map(int, given.towns.split(":")))
+    towns = [generate_scenario(seed, n_uas=3, n_waypoints=90) for seed in seeds]
     print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
     for planner in given.planners.split(","):
-        for form, flown in (
-            ("together", together(scenario, planner)),
-            ("each on its own", alone(scenario, planner)),
-        ):
-            share, time_s, spent_Wh, packs, harm = flown
-            print(
-                f"| `{planner}` | {form} | {share} | {time_s:.0f} | {spent_Wh:.1f} | {packs} "
-                f"| {harm} |",
-                flush=True,
-            )
+        for form, fly in (FORMS[name] for name in given.forms.split(",")):
+            for charge in map(float, given.charges.split(",")):
+                flown = []
+                for seed, town in zip(seeds, towns, strict=True):
+                    flown.append(fly(mission(charge, given.swap, town), planner, options))
+                    if given.each:
+                        print(f"seed {seed}:", *row(flown[-1:]), file=sys.stderr, flush=True)
+                print("|", " | ".join([f"`{planner}`", form, f"{charge}", *row(flown)]), "|",
+                      flush=True)  # fmt: skip
     return 0
 
 

@@ -45,6 +45,7 @@ PUBLIC = {
         *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
         *("geofence", "obstacles"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
+        "sorties",
     },
     MovingObstacle: {"name", "kind", "radius_m", "height_m", "safe_distance_m", "start_m"},
     # these are handed over as they are
@@ -59,8 +60,7 @@ PUBLIC = {
     Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
 HIDDEN = {
-    # a brief is that of one sortie
-    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "sorties", "relaunch"},
+    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "relaunch"},
     MovingObstacle: {"schedule"},
 }
 

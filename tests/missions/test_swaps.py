@@ -7,14 +7,16 @@ import independent_check
 import numpy as np
 import pytest
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
+from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
-from uas_coverage_env import Flight, load_scenario, rollout
+from uas_coverage_env import Flight, generate_scenario, load_scenario, rollout
 from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import accomplished, energy_Wh, packs_used, rest_of, summary
 from uas_coverage_env.flight.record import MODES
+from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.replay.flight_data import flight_data
 
 SWAP_S = 20.0
@@ -79,6 +81,60 @@ def test_every_swap_begins_with_a_landing_and_ends_with_a_fresh_pack(flight, mis
         assert flight.resting[:, i].sum() == SWAP_S
 
 
+def test_players_see_packs_that_are_left_and_when_a_uas_is_ready(mission, flight):
+    seen = []
+    FLY(mission, max_steps=int(flight.swaps[-1].time_s) + 2, on_step=lambda p: seen.append(p.swarm))
+    for swap in flight.swaps:
+        i, landed, took_off = flight.names.index(swap.uas), int(swap.landed_s), int(swap.time_s)
+        rests = [seen[k] for k in range(landed, took_off)]
+        assert [swarm.ground_s[i] for swarm in rests] == list(range(int(SWAP_S), 0, -1))
+        assert {int(swarm.packs_left[i]) for swarm in (seen[0], *rests)} == {3}
+        assert (seen[took_off].packs_left[i], seen[took_off].ground_s[i]) == (2, 0.0)
+
+
+def test_players_of_other_missions_see_no_packs():
+    swarm = first_sight(MissionBrief.of(load_scenario("village")))
+    assert not len(swarm.packs_left)
+    assert not len(swarm.ground_s)
+
+
+class OneCharge(Trajectory):
+    """As if it knew of no packs."""
+
+    def reset(self, brief, seed):
+        super().reset(brief.model_copy(update={"sorties": None}), seed)
+
+
+@pytest.fixture(scope="module")
+def large_mission(mission):
+    """A town of too many waypoints for what is in the batteries, in which nothing moves."""
+    town = generate_scenario(7, n_uas=2, n_waypoints=60)
+    return with_charge(town, 0.36, sorties=mission.sorties)
+
+
+def test_a_planner_that_knows_packs_is_done_earlier_than_one_that_does_not(large_mission):
+    options = Trajectory.Options(orders=1, moves=20_000, programs=20, idle_work=0)
+    knows, plans_charge_by_charge = (
+        rollout(large_mission, planner(options)) for planner in (Trajectory, OneCharge)
+    )
+    assert accomplished(knows)
+    assert not knows.breaches
+    assert knows.steps < plans_charge_by_charge.steps
+
+
+@pytest.mark.parametrize(("planner", "charge"), [(Trajectory, 0.36), (Tour, 0.42)])
+def test_before_take_off_each_waypoint_is_for_now_or_for_a_fresh_pack(
+    large_mission, planner, charge
+):
+    made = planner(planner.Options(moves=20_000))
+    made.reset(MissionBrief.of(with_charge(large_mission, charge)), 0)
+    order = made.mission_plan.order if planner is Trajectory else made._schedule.order
+    visits = np.concatenate([*order.routes, order.later])
+    assert sorted(visits.tolist()) == list(range(len(large_mission.waypoints)))
+    assert len(order.later)
+    assert not len(order.left_out)
+
+
 def test_the_energy_is_that_of_all_packs(flight):
     power_W = flight.voltage_V * flight.current_A
     assert energy_Wh(flight).sum() == pytest.approx(power_W.sum() / 3600.0)
@@ -136,9 +192,9 @@ def test_a_flight_broken_off_while_one_swaps_has_it_landed(mission, flight):
     assert rest.sorties == mission.sorties
 
 
-def test_a_planner_of_whole_missions_plans_on_without_a_reset(mission):
+def test_a_planner_of_whole_missions_plans_on_without_a_reset(large_mission):
     planner = Counted(Trajectory.Options(orders=1, moves=20_000, programs=20))
-    flown = rollout(with_charge(load_scenario("village"), 0.36, sorties=mission.sorties), planner)
+    flown = rollout(large_mission, planner)
     assert accomplished(flown)
     assert flown.swaps
     assert not flown.breaches

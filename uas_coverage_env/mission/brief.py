@@ -20,6 +20,7 @@ from uas_coverage_env.scenario import (
     Place,
     Scenario,
     ScheduledVelocity,
+    Sorties,
     Uas,
     Waypoint,
 )
@@ -76,6 +77,8 @@ class MissionBrief(StrictModel):
         conditions: Stated bounds of wind and of the true vehicles, never what is drawn; None where
             nothing pushes back.
         execution: What flies it in the end, and how exactly; None where the scenario does not say.
+        sorties: Packs of each UAS, and how long swapping takes. They are swapped in this flight
+            where `together` is false; otherwise the brief is that of one sortie. None: one pack.
     """
 
     schema_version: int
@@ -97,6 +100,7 @@ class MissionBrief(StrictModel):
     place: Place | None = None
     conditions: Conditions | None = None
     execution: Execution | None = None
+    sorties: Sorties | None = None
 
     if not TYPE_CHECKING:
 

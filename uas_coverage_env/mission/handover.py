@@ -53,7 +53,7 @@ class Handover:
 
 
 def without(swarm: SwarmState, uas: BoolArray) -> SwarmState:
-    """What is seen, some UAS out of the mission as if they had landed.
+    """What is seen, some UAS out of the mission as if they had landed for good.
 
     Args:
         swarm: What is seen.
@@ -61,4 +61,5 @@ def without(swarm: SwarmState, uas: BoolArray) -> SwarmState:
     """
     if not uas.any():
         return swarm
-    return replace(swarm, status=np.where(uas, LANDED, swarm.status))
+    packs_left = np.where(uas, 0, swarm.packs_left) if len(swarm.packs_left) else swarm.packs_left
+    return replace(swarm, status=np.where(uas, LANDED, swarm.status), packs_left=packs_left)

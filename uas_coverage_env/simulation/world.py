@@ -21,7 +21,7 @@ from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, 
 from uas_coverage_env.world.disturbance import checked_disturbances
 from uas_coverage_env.world.events import begin_events, is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.packs import swaps_alone
+from uas_coverage_env.world.packs import packs_left, swap_steps_left, swaps_alone
 from uas_coverage_env.world.state import (
     FLYING,
     LANDED,
@@ -88,6 +88,8 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         moving_velocity_mps=arena.moving_velocity_mps[sample].copy(),
         responds=responding(arena, state),
         turned_rad=turned_rad,
+        packs_left=packs_left(arena, state),
+        ground_s=scenario.dt_s * swap_steps_left(arena, state).astype(float),
     )
 
 

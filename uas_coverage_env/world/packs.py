@@ -68,6 +68,36 @@ def pack_records(scenario: Scenario) -> NDArray[np.void]:
     return records
 
 
+def packs_left(arena, state) -> NDArray[np.int64]:
+    """Fresh packs that each UAS may still swap for, as the rule below has it.
+
+    Args:
+        arena: The arena.
+        state: Its state.
+
+    Returns:
+        (U,), empty where none swaps while the others fly on.
+    """
+    if not len(arena.packs):
+        return np.zeros(0, np.int64)
+    out = np.isin(state.status, (LANDED, LOST)).sum()
+    waits = (state.packs[:, PACK_COVERED] == 0) & (state.packs[:, PACK_OUT] >= out)
+    flies_again = (state.status == FLYING) | ((state.status == SWAPPING) & ~waits)
+    return np.where(flies_again, arena.packs["number"] - 1 - state.packs[:, PACK_NUMBER], 0)
+
+
+def swap_steps_left(arena, state) -> NDArray[np.int64]:
+    """Steps until each UAS that swaps is ready; arguments as for `packs_left`.
+
+    Returns:
+        (U,), 0 for UAS that do not swap; empty where none swaps while the others fly on.
+    """
+    if not len(arena.packs):
+        return np.zeros(0, np.int64)
+    left = np.maximum(state.packs[:, PACK_READY] - state.step[0], 0)
+    return np.where(state.status == SWAPPING, left, 0)
+
+
 @rare_kernel
 def is_clear(arena, moving_m, x, status, i, ahead_s):
     """Whether UAS i keeps all safe distances where it stands.

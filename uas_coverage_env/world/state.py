@@ -162,6 +162,10 @@ class SwarmState:
         responds: (U,) takes commands now; not without its radio, nor before a late start.
         turned_rad: (U,) [rad] how far those have turned that look where they fly, 0 for the others;
             empty where none does.
+        packs_left: (U,) fresh packs that each UAS may still swap for in this flight; empty where
+            none swaps (`[sorties]` with `together = false`). 0 of one that waits because its last
+            sortie has covered nothing.
+        ground_s: (U,) [s] until a UAS that swaps is ready to take off, 0 for the others; likewise.
     """
 
     time_s: float
@@ -178,6 +182,8 @@ class SwarmState:
     moving_velocity_mps: NDArray[np.float64]
     responds: NDArray[np.bool_]
     turned_rad: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    packs_left: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    ground_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def heading_rad(self) -> NDArray[np.float64]:

@@ -50,13 +50,35 @@ def cost_s(task, seconds, left_out, n_left_out, total_weight):
 
 
 @allocating_kernel
+def _waiting_s(packs, idle_s, seconds):
+    """How much later the last UAS is home than the longest flight takes.
+
+    It has flown its flights one after the other then, packs swapped in between.
+    """
+    longest, last, home, for_nothing = 0.0, 0.0, 0.0, 0.0
+    for r in range(len(seconds)):
+        longest = max(longest, seconds[r])
+        if r == 0 or packs[r, 0] != packs[r - 1, 0]:
+            home, for_nothing = 0.0, 0.0
+        elif seconds[r] > 0.0:
+            home += for_nothing
+            for_nothing = 0.0
+        if seconds[r] > 0.0:
+            home += packs[r, 1] + seconds[r]
+            last = max(last, home)
+        if seconds[r] == idle_s[r]:
+            for_nothing += packs[r, 2]
+    return last - longest
+
+
+@allocating_kernel
 def insert_missing(task, routes, lengths, missing, total_weight, by_pieces):
     """Give each missing waypoint, taken out of the last row, to the route it lengthens least.
 
     What makes the longest route longer counts fully, another one's length by its weight.
     """
     n_uas, width = len(routes) - 1, routes.shape[1]
-    seconds = np.empty(n_uas)
+    seconds, swaps = np.empty(n_uas), len(task.packs) > 0
     trial, pieces = np.empty(width, np.int64), np.empty((3, 4), np.int64)
     sums = sums_of(task, n_uas, width)
     for u in range(n_uas):
@@ -80,6 +102,8 @@ def insert_missing(task, routes, lengths, missing, total_weight, by_pieces):
                     new_s = route_s(task, u, trial, lengths[u] + 1)
                 old_s, seconds[u] = seconds[u], new_s
                 cost = cost_s(task, seconds, routes[n_uas], 0, total_weight)
+                if swaps:
+                    cost += _waiting_s(task.packs, task.idle, seconds)
                 seconds[u] = old_s
                 if cost < best:
                     best, best_u, best_at, best_s = cost, u, at, new_s
@@ -156,7 +180,10 @@ def anneal(
         seconds[u] = route_s(task, u, routes[u], lengths[u])
         if by_pieces:
             sum_up(task, sums, u, routes[u], lengths[u])
+    swaps = len(task.packs) > 0
     cost = cost_s(task, seconds, routes[n_uas], lengths[n_uas], total_weight)
+    if swaps:
+        cost += _waiting_s(task.packs, task.idle, seconds)
     if begin == 0:
         keep(now, cost, best)
     one, two = np.empty(2 * width, np.int64), np.empty(2 * width, np.int64)
@@ -250,6 +277,8 @@ def anneal(
         elif m >= 0 and s == n_uas:
             out, n_out = two, n_two
         new = cost_s(task, seconds, out, n_out, total_weight)
+        if swaps:
+            new += _waiting_s(task.packs, task.idle, seconds)
         if new > cost and rng.random() >= np.exp((cost - new) / temperature):
             if r < n_uas:
                 seconds[r] = old_r

@@ -22,9 +22,8 @@ class RoutingArrays(NamedTuple):
     idle: FloatArray
     place: FloatArray
     """(W+2U, 2) of waypoints, UAS and starts, north and east."""
-    velocity: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
+    motion: FloatArray
+    """(U, 4) velocity to the north and east, cruising speed, and acceleration."""
     turn: FloatArray
     opens: FloatArray
     """(U, W) from when on each UAS may visit."""
@@ -34,6 +33,10 @@ class RoutingArrays(NamedTuple):
     left_out_s: FloatArray
     neighbours: NDArray[np.int64]
     turn_of_cosine: FloatArray
+    packs: FloatArray
+    """(U, 3) which UAS flies what, how long it is on the ground before, and what another flight
+    costs after this one without a visit; of none where each UAS flies once. Kernels pay for every
+    array that they hand on, so these are one."""
 
 
 @allocating_kernel
@@ -49,11 +52,12 @@ def turn_radii(table, place, a, b, c):
 
 
 @allocating_kernel
-def setting_off_s(place, velocity, speed_mps, acceleration_mps2, here, to):
+def setting_off_s(place, motion, u, here, to):
     """What is lost until the velocity points to the first waypoint."""
     dx, dy = place[to, 0] - place[here, 0], place[to, 1] - place[here, 1]
     length = np.hypot(dx, dy) + 1e-9
-    ax, ay = velocity[0] - speed_mps * dx / length, velocity[1] - speed_mps * dy / length
+    speed_mps, acceleration_mps2 = motion[u, 2], motion[u, 3]
+    ax, ay = motion[u, 0] - speed_mps * dx / length, motion[u, 1] - speed_mps * dy / length
     return (ax * ax + ay * ay) / (2.0 * acceleration_mps2 * speed_mps)
 
 
@@ -66,9 +70,7 @@ def route_s(task, u, route, length):
     n_waypoints, n_uas = len(opens), len(task.kind)
     before, here = n_waypoints + u, route[0]
     time = task.first[u, here]
-    time += setting_off_s(
-        place, task.velocity[u], task.speed[u], task.acceleration[u], before, here
-    )
+    time += setting_off_s(place, task.motion, u, before, here)
     time = max(time, opens[here])
     for k in range(1, length + 1):
         following = route[k] if k < length else n_waypoints + n_uas + u
@@ -173,9 +175,7 @@ def pieces_s(task, sums, u, routes, pieces, n):
         following = routes[row, at]
         if here < 0:
             time += task.first[u, following]
-            time += setting_off_s(
-                place, task.velocity[u], task.speed[u], task.acceleration[u], before, following
-            )
+            time += setting_off_s(place, task.motion, u, before, following)
         else:
             time += task.turn[u, here] * turn_radii(table, place, before, here, following)
             time += task.between[kind, here, following]

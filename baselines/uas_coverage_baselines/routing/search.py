@@ -63,6 +63,9 @@ class Routes:
         seconds: (U,) estimated flight time of each.
         cost_s: what the search minimises.
         left_out_s: what is left out contributes to that.
+        trips: (U) what each UAS visits with fresh packs later, a route for each (`improve_trips`);
+            empty where nothing is planned for later.
+        mission_s: with `trips`, when the last UAS has flown all of its flights; else 0.
     """
 
     routes: tuple[NDArray[np.int64], ...]
@@ -70,6 +73,13 @@ class Routes:
     seconds: FloatArray
     cost_s: float
     left_out_s: float = 0.0
+    trips: tuple[tuple[NDArray[np.int64], ...], ...] = ()
+    mission_s: float = 0.0
+
+    @property
+    def later(self) -> NDArray[np.int64]:
+        """Waypoints of all trips."""
+        return np.concatenate([np.zeros(0, np.int64), *(w for trips in self.trips for w in trips)])
 
 
 def empty_routes(n_uas: int) -> Routes:
@@ -186,6 +196,9 @@ def _left_out_s(task: RoutingTask, total_weight: float) -> FloatArray:
 def _opens_s(task: RoutingTask) -> FloatArray:
     """(U, W) from when on each UAS may visit, beyond every budget where it must not at all."""
     opens_s = np.tile(task.not_before_s, (task.n_uas, 1))
+    if task.packs is not None:  # when a later flight takes off, everything is taken to be open
+        uas = task.packs[:, 0]
+        opens_s[1:][uas[1:] == uas[:-1]] = 0.0
     if task.barred is not None:
         opens_s[task.barred] = _BARRED_S
     return opens_s
@@ -202,9 +215,7 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         home=task.home_s,
         idle=task.idle_s,
         place=np.ascontiguousarray(place),
-        velocity=task.velocity_mps,
-        speed=task.speed_mps,
-        acceleration=task.acceleration_mps2,
+        motion=np.column_stack([task.velocity_mps, task.speed_mps, task.acceleration_mps2]),
         turn=task.turn_s,
         opens=opens_s,
         opens_late=np.any(opens_s > 0.0, axis=0),
@@ -212,4 +223,5 @@ def _arrays(task: RoutingTask, total_weight: float) -> RoutingArrays:
         left_out_s=_left_out_s(task, total_weight),
         neighbours=task.neighbours,
         turn_of_cosine=turning,
+        packs=np.zeros((0, 3)) if task.packs is None else task.packs,
     )

@@ -40,6 +40,10 @@ class RoutingTask:
         turn_of_cosine: What turning costs, in `turn_s`, by cosine from -1 to 1; None: of flights
             that cut through waypoints.
         barred: (U, W) which UAS must not visit which waypoint; None: any may visit any.
+        packs: (U, 3) where a UAS flies more than once: U counts flights then, those of a UAS in
+            their order, and the columns say which UAS flies each, how long it is on the ground
+            before, and what it costs to fly again after this flight without a visit, after which no
+            UAS is sent out. None: each UAS flies once.
     """
 
     open_waypoints: NDArray[np.int64]
@@ -61,6 +65,7 @@ class RoutingTask:
     budget_s: FloatArray
     turn_of_cosine: FloatArray | None = None
     barred: NDArray[np.bool_] | None = None
+    packs: FloatArray | None = None
 
     @classmethod
     def of(

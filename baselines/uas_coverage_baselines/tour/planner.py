@@ -17,7 +17,7 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight, without
 from uas_coverage_env.vehicle import VX, VY, VZ
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
 
@@ -197,11 +197,13 @@ class Tour:
             self._returns[i] = swarm.returning[i] or has_to_return(
                 self._arena, self._world.state, i
             )
+        works = self._handover.workers(swarm)
         return View(
             x=swarm.x,
-            may_work=self._handover.workers(swarm) & ~self._returns,
+            may_work=works & ~self._returns,
             flies=flies,
             uncovered=swarm.uncovered,
             blocked=self._world.blocked(_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M),
             time_s=swarm.time_s,
+            swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
         )

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import (
+    FreshPacks,
+    Packs,
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
+    improve_trips,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.vehicle.range import TOUR
-from uas_coverage_env.world import Arena
+from uas_coverage_env.world import Arena, SwarmState
 
 FloatArray = NDArray[np.float64]
 
@@ -46,6 +49,7 @@ class View:
         uncovered: (W,).
         blocked: (W,) inside the keep-out of something that moves, now.
         time_s: since the start.
+        swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
     """
 
     x: FloatArray
@@ -54,13 +58,14 @@ class View:
     uncovered: NDArray[np.bool_]
     blocked: NDArray[np.bool_]
     time_s: float
+    swarm: SwarmState | None = None
 
 
 class Schedule:
     """The order of the swarm, kept up to date."""
 
     def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
-        self.legs = Legs(brief)
+        self.legs, self._packs = Legs(brief), Packs.of(brief)
         self._arena, self._can_cover = arena, brief.can_cover
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         self._moves = moves
@@ -69,6 +74,7 @@ class Schedule:
         self.order = empty_routes(len(brief.uas))
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
+        self._is_new = True
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
@@ -76,11 +82,9 @@ class Schedule:
             self.take(
                 improve_routes(self.task(view), self.order, SearchEffort(self._moves), seed), view
             )
-        task = self.task(view)
+        task, fresh, effort = self.task(view), self._fresh_packs(view), SearchEffort(self._moves)
         orders = [
-            improve_routes(
-                task, empty_routes(task.n_uas), SearchEffort(self._moves), seed + attempt
-            )
+            improve_trips(task, empty_routes(task.n_uas), effort, seed + attempt, fresh)
             for attempt in range(_FIRST_SEARCHES)
         ]
         self.take(min(orders, key=lambda order: order.cost_s), view)
@@ -90,13 +94,19 @@ class Schedule:
         open_ = view.uncovered
         routes = tuple(route[open_[route]] for route in self.order.routes)
         left_out = self.order.left_out[open_[self.order.left_out]]
-        self.order = Routes(routes, left_out, self.order.seconds, self.order.cost_s)
+        trips = tuple(tuple(trip[open_[trip]] for trip in trips) for trips in self.order.trips)
+        self.order = replace(self.order, routes=routes, left_out=left_out, trips=trips)
+        if self._is_new and self._packs is not None:  # planned in mid-mission, as if at the start
+            self._seen, self._legs_left_s = view, self._legs_left(view)
+        self._is_new = False
         self._time_legs(view)
         if self._has_changed(view):
-            task = self.task(view)
-            kept = improve_routes(task, self.order, SearchEffort(0), 0)
+            task, fresh = self.task(view), self._fresh_packs(view)
+            kept = improve_trips(task, self.order, SearchEffort(0), 0, fresh)
             efforts = (SearchEffort(_MOVES_AGAIN, hottest_s=1.5), SearchEffort(_MOVES_AGAIN))
-            found = [improve_routes(task, kept, effort, round(view.time_s)) for effort in efforts]
+            found = [
+                improve_trips(task, kept, effort, round(view.time_s), fresh) for effort in efforts
+            ]
             better = min(found, key=lambda order: order.cost_s)
             worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
             self.take(better if worthwhile else kept, view)
@@ -181,6 +191,18 @@ class Schedule:
         return float(
             np.linalg.norm(first_m[:2]) / self.legs.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
         )
+
+    def _fresh_packs(self, view: View) -> FreshPacks | None:
+        """What is there for later flights."""
+        if view.swarm is None:
+            return None
+
+        def task(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingTask:
+            return self.task(
+                replace(view, x=x, may_work=may_work, blocked=np.zeros_like(view.blocked))
+            )
+
+        return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, task)
 
     def task(self, view: View) -> RoutingTask:
         """The routing problem of a moment."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import RoutingTask
+from uas_coverage_baselines.routing import FreshPacks, Packs, RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
@@ -25,6 +25,7 @@ from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -33,6 +34,7 @@ _LEGS = 0.96  # flights along a route take this share of its legs, measured on g
 _LANDING_S = 4.0
 _SPARE_S = 6.0  # of the battery, left in routes
 _ROOM = 0.06  # share of the limits left to tracking where the plant is not the model
+_LATER_SHARE = 0.96  # of budgets of flights not planned yet: they differ from routes by 1.6 %
 _LATER_STEPS = 12  # to make way for another
 
 
@@ -68,7 +70,7 @@ class Fleet:
 
     def __init__(self, brief: MissionBrief, margin_m: float, speed_share: float = 1.0) -> None:
         self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
-        self.terrain = Terrain(brief)
+        self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
@@ -128,6 +130,27 @@ class Fleet:
             speed_share=self._speed_share,
             barred=moment.barred,
         )
+
+    def fresh_packs(
+        self, swarm: SwarmState, uncovered: NDArray[np.bool_], planned: Collection[int]
+    ) -> FreshPacks | None:
+        """What is there for later flights.
+
+        Args:
+            swarm: What is seen.
+            uncovered: (W,) waypoints to be visited.
+            planned: UAS whose flights are planned, along the routes to begin with.
+        """
+        n_uas = len(swarm.x)
+
+        def task(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingTask:
+            now = np.zeros(len(uncovered), np.int64)
+            moment = Moment(x, may_work, uncovered, now, swarm.time_s)
+            return self.task(moment, np.zeros(n_uas))
+
+        until_s = self.brief.max_steps * self.brief.dt_s - swarm.time_s
+        is_planned = np.isin(np.arange(n_uas), list(planned))
+        return FreshPacks.seen(self._packs, swarm, until_s, task, _LATER_SHARE, is_planned)
 
     def program(
         self,

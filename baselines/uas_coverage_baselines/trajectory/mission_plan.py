@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import (
+    FreshPacks,
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
-    improve_routes,
+    improve_trips,
 )
 from uas_coverage_baselines.trajectory.course import (
     Course,
@@ -125,6 +126,7 @@ def plan_mission(
     seed: int,
     kept: Routes | None = None,
     flown: Mapping[int, tuple[IntArray, Flight]] | None = None,
+    fresh: FreshPacks | None = None,
 ) -> MissionPlan:
     """The best plan found; the same arguments give the same plan.
 
@@ -137,6 +139,7 @@ def plan_mission(
         seed: Of the order search.
         kept: An order to begin from; none before take-off.
         flown: Routes and flights from here that are as good as planned already.
+        fresh: Packs for later flights, of which nothing is planned yet but what they will visit.
     """
     less_s = np.zeros(len(moment.x))
     best: MissionPlan | None = None
@@ -144,7 +147,9 @@ def plan_mission(
     for _ in range(_BUDGETS):
         task = fleet.task(moment, less_s)
         known: set[tuple[bytes, ...]] = set()
-        orders = _orders(task, effort, seed, kept)[: effort.planned]
+        orders = _orders(task, effort, seed, kept, fresh)[: effort.planned]
+        if orders[0].trips:  # flights of now alone do not tell which order is cheaper
+            orders = orders[:1]
         for order in orders:
             if task.n_uas > SMALL_FLEET and order.cost_s > HOPELESS * orders[0].cost_s:
                 break
@@ -158,6 +163,9 @@ def plan_mission(
         too_long = [u for u, why in best.troubles.items() if why == _BATTERY]
         if not too_long:
             return best
+        if fresh is not None and best.order.trips:
+            fresh = fresh.shorter(_SHORTER, too_long)  # for later flights as for those of now
+            continue
         battery_s = fleet.battery_s(moment.x)
         if task.n_uas <= SMALL_FLEET:
             less_s[too_long] += _SHORTER * battery_s[too_long]
@@ -171,8 +179,17 @@ def plan_mission(
     return best
 
 
-def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -> list[Routes]:
-    found = [] if kept is None else [improve_routes(task, kept, SearchEffort(0), 0)]
+def _orders(
+    task: RoutingTask,
+    effort: Effort,
+    seed: int,
+    kept: Routes | None,
+    fresh: FreshPacks | None,
+) -> list[Routes]:
+    nothing = SearchEffort(0)
+    if kept is not None and kept.trips:  # the cheapest of these is flown, with no other look at it
+        nothing = SearchEffort(0, total_weight=effort.total_weight)
+    found = [] if kept is None else [improve_trips(task, kept, nothing, 0, fresh)]
 
     def searched(k: int) -> Routes:
         begin = empty_routes(task.n_uas) if kept is None else kept
@@ -182,7 +199,7 @@ def _orders(task: RoutingTask, effort: Effort, seed: int, kept: Routes | None) -
             total_weight=effort.total_weight,
             by_pieces=task.n_uas > SMALL_FLEET,
         )
-        return improve_routes(task, begin, search, seed + k)
+        return improve_trips(task, begin, search, seed + k, fresh)
 
     with ThreadPoolExecutor(effort.threads) as side_by_side:  # the search frees the GIL
         found += side_by_side.map(searched, range(effort.orders))

@@ -317,6 +317,9 @@ class Trajectory:
         known = np.zeros(len(swarm.uncovered), np.bool_)
         known[self.mission_plan.order.left_out] = True
         known |= self._latest_visit < self._planned_at
+        for u, trips in enumerate(self.mission_plan.order.trips):
+            if swarm.packs_left[u]:
+                known[np.concatenate([*trips, np.zeros(0, np.int64)])] = True
         for planned in self._planned.values():
             known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
         return known
@@ -358,13 +361,16 @@ class Trajectory:
         kept = None
         # changes of an order in which one that is back has no part rarely give it one
         back = (flying & self._silent_then).any() or self._back.any()
-        if self.mission_plan is not None and not back:
+        if self.mission_plan is not None and (self.mission_plan.order.trips or not back):
             kept = self.mission_plan.order
         seed = self._seed + swarm.step
+        fresh = self._fleet.fresh_packs(swarm, moment.uncovered, flown)
 
         def found(barred: BoolArray | None) -> MissionPlan:
             now = replace(moment, barred=barred)
-            return plan_mission(self._fleet, now, swarm.step, bodies, effort, seed, kept, flown)
+            return plan_mission(
+                self._fleet, now, swarm.step, bodies, effort, seed, kept, flown, fresh
+            )
 
         # before take-off it costs little to have what is blocked visited by one that can wait
         barred = None
@@ -406,11 +412,18 @@ class Trajectory:
                 late = unknown[p.route]
                 earliest[p.route[late]] = np.maximum(visits[late], 0)
             bodies = {u: self._bodies(expected, u) for u in range(len(swarm.x))}
-            return Ahead(earliest, self._waiting.barred if unknown.any() else None, bodies)
+            barred = self._waiting.barred if unknown.any() else None
+            if plan.order.trips:  # who visits what is part of a larger plan
+                others = np.ones((len(swarm.x), len(swarm.uncovered)), np.bool_)
+                for u, p in planned.items():
+                    others[u, p.route] = False
+                barred = others if barred is None else barred | others
+            return Ahead(earliest, barred, bodies)
 
         better = self._improvement.better(swarm, plan, self._planned, ahead)
         if better is not None:
-            order = replace(better.order, left_out=plan.order.left_out)
+            kept = plan.order
+            order = replace(better.order, left_out=kept.left_out, trips=kept.trips)
             self.mission_plan = replace(better, order=order)
             self._planned |= better.planned
             self._ends |= {u: p.course.end for u, p in better.planned.items()}
