@@ -214,6 +214,14 @@ class Improvement:
         return found if found is not None and not found.troubles else None
 
 
+def all_but_own(planned: Mapping[int, Planned], shape: tuple[int, int]) -> BoolArray:
+    """(U, W) waypoints that are not on a UAS's own route."""
+    others = np.ones(shape, np.bool_)
+    for u, p in planned.items():
+        others[u, p.route] = False
+    return others
+
+
 def _varied(task: RoutingTask, seed: int) -> RoutingTask:
     """The same problem with somewhat other leg times: legs are not as exact as flights are."""
     rng = np.random.default_rng(seed)

@@ -12,7 +12,7 @@ from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
-from uas_coverage_baselines.trajectory.improving import Ahead, Improvement
+from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
 from uas_coverage_baselines.trajectory.mission_plan import (
     SMALL_FLEET,
     Effort,
@@ -413,10 +413,8 @@ class Trajectory:
                 earliest[p.route[late]] = np.maximum(visits[late], 0)
             bodies = {u: self._bodies(expected, u) for u in range(len(swarm.x))}
             barred = self._waiting.barred if unknown.any() else None
-            if plan.order.trips:  # who visits what is part of a larger plan
-                others = np.ones((len(swarm.x), len(swarm.uncovered)), np.bool_)
-                for u, p in planned.items():
-                    others[u, p.route] = False
+            if plan.order.trips:  # which UAS visits what is part of a larger plan
+                others = all_but_own(planned, (len(swarm.x), len(swarm.uncovered)))
                 barred = others if barred is None else barred | others
             return Ahead(earliest, barred, bodies)
 
