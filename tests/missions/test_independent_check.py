@@ -16,6 +16,7 @@ from own_disturbances import gusts
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.world import Wrench
 
 
@@ -59,6 +60,25 @@ def test_it_agrees_on_a_mission_that_ends_well(covered_town):
     assert report.all_home
     assert set(report.straight_room_m) == {"obstacle", "moving_obstacle", "uas", "geofence"}
     assert min(report.straight_room_m.values()) > 0.0
+
+
+@pytest.mark.parametrize("packs", [0, 3])
+def test_it_agrees_how_often_waypoints_were_covered_that_are_asked_for_again(
+    lively_town, tmp_path, packs
+):
+    every = {"again_after_s": (20.0, 45.0)}
+    waypoints = (
+        *(waypoint.model_copy(update=every) for waypoint in lively_town.waypoints[:3]),
+        *lively_town.waypoints[3:],
+    )
+    sorties = Sorties(packs=packs, swap_s=5.0, together=False) if packs else None
+    changes = {"waypoints": waypoints, "sorties": sorties, "relaunch": not packs}
+    flown(tmp_path / "f", lively_town.model_copy(update=changes), "nearest-waypoint")
+    report = independent_check.check(tmp_path / "f")
+    assert report.problems == []
+    assert report.coverage == 1.0
+    first, *rows = (tmp_path / "f" / "flight.csv").read_text("utf-8").splitlines()
+    assert int(rows[-1].split(",")[first.split(",").index("covered")]) == len(waypoints) + 6
 
 
 @pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

@@ -101,6 +101,14 @@ def import_area(
             "file, so that the file takes as long as the flight."
         ),
     ] = None,
+    again: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MIN,...",
+            help="Minutes after which waypoints are to be covered again, once for each number, "
+            "such as 10,10; for areas that do not say (`again_min`).",
+        ),
+    ] = None,
     home: Annotated[
         list[str] | None,
         typer.Option(
@@ -113,7 +121,12 @@ def import_area(
 ) -> None:
     """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
     with extra():
-        from uas_coverage_env.operations import ImportOptions, make_scenario, read_drawings
+        from uas_coverage_env.operations import (
+            ImportOptions,
+            make_scenario,
+            minutes_of,
+            read_drawings,
+        )
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:
@@ -134,6 +147,7 @@ def import_area(
         terrain=terrain,
         min_height_m=min_height,
         flown_by=flown_by,
+        again_after_s=() if again is None else minutes_of("--again", again),
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
     made = make_scenario(read_drawings(areas), name, options)

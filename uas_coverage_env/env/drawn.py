@@ -63,6 +63,7 @@ class DrawnPool:
         self.sizes["S"] = source.room.n_uas if eventful else 0
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
+        self.sizes["repeats"] = 0
         self._slots: list[Slots[Any]] = [Slots(memory, num_envs) for memory in _MEMORIES]
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self.drawn_from = np.zeros((num_envs, _WORDS), dtype=np.uint64)

@@ -34,6 +34,11 @@ def check_scene(scenario: Scenario) -> None:
                 f"scenario {scenario.name!r} has an event {event.kind!r}, which changes the "
                 f"scene: batches do not fly that; take parallel_env, env or gymnasium.make"
             )
+    if scenario.asks_again:
+        raise ValueError(
+            f"scenario {scenario.name!r} has waypoints with again_after_s, by which the scene "
+            f"changes: batches do not fly that; take parallel_env, env or gymnasium.make"
+        )
 
 
 class MissionPool(NamedTuple):

@@ -73,13 +73,15 @@ class FlightLog:
         self._scenario = scenario
         self._meter = meter
         self._steps: list[_Step] = []
+        # in which all UAS rest: they belong to the flight if one flies again
+        self._resting: list[_Step] = []
         self._covered = int((~world.state.uncovered).sum())
         self._start = self._sample()
 
     @property
     def steps(self) -> int:
-        """Steps flown so far."""
-        return len(self._steps)
+        """Steps so far."""
+        return len(self._steps) + len(self._resting)
 
     @property
     def covered(self) -> int:
@@ -107,8 +109,13 @@ class FlightLog:
         record = _decision_record(duration_s, decision, filtered)
         plan = _plan_rows(decision, self.steps, names)
         self._covered += int(outcome["newly_covered"].sum())
-        # one append, so that there is no half a step
-        self._steps.append(_Step(outcome, modes, record, plan, paid, self._sample()))
+        step = _Step(outcome, modes, record, plan, paid, self._sample())
+        if outcome["flew"].any():
+            rested, self._resting = self._resting, []
+            # one statement, so that there is no half a step
+            self._steps += [*rested, step]
+        else:
+            self._resting.append(step)
 
     def series(self) -> dict[str, Any]:
         """The fields of `Flight` that follow from what was kept."""
@@ -143,8 +150,8 @@ class FlightLog:
             "swaps": tuple(self._swaps()),
             "reward_terms": self._reward_terms(),
             "reward_names": () if self._meter is None else self._meter.names,
-            "open_waypoints": int(self._world.state.uncovered.sum())
-            if self._scenario.events
+            "open_waypoints": self._world.visits_to_come
+            if self._scenario.events or self._scenario.asks_again
             else None,
             "min_separation_m": self._smallest("separation_m"),
             "min_obstacle_clearance_m": self._smallest("obstacle_clearance_m"),
@@ -167,7 +174,7 @@ class FlightLog:
         found = []
         for e, event in enumerate(self._scenario.events):
             sample, uas = int(state.event_step[e]), int(state.event_uas[e])
-            if sample <= self.steps:
+            if sample <= len(self._steps):
                 name = names[uas] if isinstance(event, OfUas) else None
                 found.append(EventRecord(sample * self._scenario.dt_s, event.kind, name, e))
         return tuple(sorted(found, key=lambda event: event.time_s))

@@ -20,7 +20,7 @@ def coverage(flight: FlightRecord) -> float:
     """Fraction of the waypoints that the swarm has covered, 0..1.
 
     Of those that events have dropped before they were covered none counts; of those that events
-    have added, all that were added in time.
+    have added, all that were added in time. One that is to be covered again counts each time.
     """
     left = open_waypoints(flight)
     covered = int(flight.covered[-1])
@@ -28,7 +28,7 @@ def coverage(flight: FlightRecord) -> float:
 
 
 def open_waypoints(flight: FlightRecord) -> int:
-    """How many waypoints were still to be covered at the end."""
+    """How many waypoints were still to be covered at the end, each time counted."""
     if flight.open_waypoints is not None:
         return flight.open_waypoints
     return len(flight.scenario.waypoints) - int(flight.covered[-1])

@@ -154,7 +154,7 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
     mode, covered = np.zeros(shape, np.int8), np.zeros(shape[0], np.int64)
     last = np.zeros(len(index), np.int64)
     found = np.zeros(shape, np.bool_)
-    most_covered = len(scenario.waypoints) + len(scenario.events)
+    most_covered = sum(w.visits for w in scenario.waypoints) + len(scenario.events)
 
     def put(row: list[str]) -> None:
         told = dict(zip(FLIGHT_COLUMNS, row, strict=True))

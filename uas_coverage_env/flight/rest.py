@@ -18,7 +18,8 @@ def rest_of(flight: FlightRecord, *, from_here: bool = False, name: str | None =
     """The scenario of the waypoints that a flight has not covered, with their weights.
 
     The scene is that at the end of the flight, whatever events have changed it; events themselves
-    are not in it. UAS that were lost are left out.
+    are not in it. What was going to be asked for again is asked for at once. UAS that were lost are
+    left out.
 
     Args:
         flight: The flight, simulated or from a log, whole or broken off.
@@ -33,6 +34,8 @@ def rest_of(flight: FlightRecord, *, from_here: bool = False, name: str | None =
     began = flight.scenario
     history = SceneHistory.of(flight)
     known, open_ = history.scenario, history.open_at_end
+    for w in np.flatnonzero(history.asked_later).tolist():
+        known, open_ = known.asked_again(w), np.append(open_, True)
     if not open_.any():
         raise InputError(f"the flight of {began.name!r} has covered everything; nothing is left")
     alive = np.flatnonzero(flight.mode[-1] != LOST)

@@ -200,7 +200,7 @@ def _fly(
     """Fly until the end; returns how it came about, see `Flight.ended`."""
     swarm, revisions, relaunch = world.swarm_state(), 0, _relaunch(world)
     tell(swarm, None)
-    while not world.done:
+    while not world.done or (relaunch and world.waits):
         if log.steps >= limit:
             return "steps"
         if should_stop():

@@ -1,5 +1,6 @@
 """What there was in a mission, and when: events add to the scene and take waypoints away."""
 
+import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Self
@@ -7,9 +8,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LOST, FlightRecord
+from uas_coverage_env.flight.record import LANDED, LOST, EventRecord, FlightRecord
 from uas_coverage_env.scenario import NoFlyZone, Scenario
+from uas_coverage_env.vehicle import VZ
 from uas_coverage_env.world.coverage import covering_samples
+from uas_coverage_env.world.events import steps_until
 
 IntArray = NDArray[np.int64]
 
@@ -31,6 +34,7 @@ class SceneHistory:
         covered_at: (W,) sample in which it was covered; T: never.
         moving_position_m: (T, M, 3) [m] centres of the moving obstacles.
         home_m: (T, U, 3) [m] where each UAS is to land.
+        asked_later: (W,) which waypoints were covered and going to be asked for again.
         changes: Sample and scenario from then on, in order of time; the first is of sample 0.
     """
 
@@ -42,30 +46,19 @@ class SceneHistory:
     covered_at: IntArray
     moving_position_m: NDArray[np.float64]
     home_m: NDArray[np.float64]
+    asked_later: NDArray[np.bool_]
     changes: tuple[tuple[int, Scenario], ...]
     _fewer: dict[tuple[int, int], Scenario] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(cls, flight: FlightRecord) -> Self:
         """The scenes of a flight, as its events made them."""
-        known = flight.scenario
-        since = {key: [0] * len(getattr(known, key)) for key in _GROWING}
-        dropped: dict[int, int] = {}
-        changes = [(0, known)]
-        for record in sorted(flight.events, key=lambda record: record.time_s):
-            event = flight.scenario.events[record.event]
-            sample = round(record.time_s / known.dt_s)
-            effect = event.effect()
-            if effect.name == "drop":
-                dropped.setdefault(int(effect.values[0]), sample)
-            if event.changes_scene:
-                uas = flight.names.index(record.uas) if record.uas in flight.names else 0
-                known = known.after(event, record.time_s, uas)
-                changes.append((sample, known))
-                for key, samples in since.items():
-                    samples += [sample] * (len(getattr(known, key)) - len(samples))
-        obstacle_from, moving_from, waypoint_from = (np.array(since[key], int) for key in _GROWING)
-        covered_at = covered_since(flight, known, waypoint_from)
+        story = _Story(flight)
+        known, dropped = story.known, story.dropped
+        obstacle_from, moving_from, waypoint_from = (
+            np.array(story.since[key], int) for key in _GROWING
+        )
+        covered_at = np.array(story.covered_at, int)
         until = np.full(len(known.waypoints), len(flight.x))
         for w, sample in dropped.items():
             until[w] = sample
@@ -84,8 +77,9 @@ class SceneHistory:
             waypoint_until=until,
             covered_at=covered_at,
             moving_position_m=_moving_m(flight, known),
-            home_m=_homes_m(changes, len(flight.x)),
-            changes=tuple(changes),
+            home_m=_homes_m(story.changes, len(flight.x)),
+            asked_later=np.array(story.asked_later),
+            changes=tuple(story.changes),
         )
 
     @property
@@ -118,15 +112,112 @@ class SceneHistory:
         return self._fewer[key], there
 
 
+class _Story:
+    """What happened in a flight, told in order of time.
+
+    Attributes:
+        known: The scenario at the end.
+        since: Field -> the sample from which each of its entries is there.
+        dropped: Waypoint -> the sample in which an event dropped it.
+        covered_at: Sample in which each waypoint was covered; T: never.
+        asked_later: Whether each was going to be asked for again.
+        changes: Sample and scenario from then on.
+    """
+
+    def __init__(self, flight: FlightRecord) -> None:
+        self._flight, self._flying = flight, _flying(flight)
+        self.known = flight.scenario
+        self.since = {key: [0] * len(getattr(self.known, key)) for key in _GROWING}
+        self.dropped: dict[int, int] = {}
+        self.covered_at: list[int] = []
+        self.asked_later: list[bool] = []
+        self.changes = [(0, self.known)]
+        # at the same sample, events come first
+        self._ahead = [
+            (round(record.time_s / self.known.dt_s), 0, n)
+            for n, record in enumerate(flight.events)
+        ]  # fmt: skip
+        heapq.heapify(self._ahead)
+        self._look_at_waypoints()
+        while self._ahead:
+            sample, again, number = heapq.heappop(self._ahead)
+            if again:
+                self._ask_again(sample, number)
+            else:
+                self._happen(sample, flight.events[number])
+
+    def _happen(self, sample: int, record: EventRecord) -> None:
+        event = self._flight.scenario.events[record.event]
+        effect = event.effect()
+        if effect.name == "drop":
+            self.dropped.setdefault(int(effect.values[0]), sample)
+        if event.changes_scene:
+            names = self._flight.names
+            uas = names.index(record.uas) if record.uas in names else 0
+            self._change(sample, self.known.after(event, record.time_s, uas))
+
+    def _ask_again(self, sample: int, w: int) -> None:
+        self.asked_later[w] = False
+        if w not in self.dropped and not self._was_closed(w):
+            self._change(sample, self.known.asked_again(w))
+
+    def _was_closed(self, w: int) -> bool:
+        """Whether a waypoint lay in a no-fly zone before a UAS came near it."""
+        centre_m = np.array([self.known.waypoints[w].position_m])
+        return any(
+            isinstance(obstacle, NoFlyZone)
+            and 0 < since <= self.covered_at[w]
+            and bool(obstacle.hull.signed_distance(centre_m)[0] < 0.0)
+            for obstacle, since in zip(self.known.obstacles, self.since["obstacles"], strict=True)
+        )
+
+    def _change(self, sample: int, known: Scenario) -> None:
+        self.known = known
+        self.changes.append((sample, known))
+        for key, samples in self.since.items():
+            samples += [sample] * (len(getattr(known, key)) - len(samples))
+        self._look_at_waypoints()
+
+    def _look_at_waypoints(self) -> None:
+        """When the new ones were covered, and whether they are asked for again."""
+        end = len(self._flight.x)
+        for w in range(len(self.covered_at), len(self.known.waypoints)):
+            since = self.since["waypoints"][w]
+            covered_at = _covered_at(self._flight.x, self._flying, self.known, w, since)
+            self.covered_at.append(covered_at)
+            gaps_s = self.known.waypoints[w].again_after_s
+            asked_later = bool(gaps_s) and covered_at < end
+            self.asked_later.append(asked_later)
+            if asked_later:
+                due = covered_at + steps_until(gaps_s[0], self.known.dt_s)
+                if due < end:
+                    heapq.heappush(self._ahead, (due, 1, w))
+
+
 def covered_since(flight: FlightRecord, known: Scenario, since: IntArray) -> IntArray:
     """(W,) the sample in which each waypoint was covered, not before `since`; T: never."""
-    alive = flight.mode < LOST
-    samples = np.full(len(known.waypoints), len(flight.x))
-    for w, first in enumerate(since):
-        covers = (covering_samples(known, w, flight.x[first:]) & alive[first:]).any(axis=1)
-        if covers.any():
-            samples[w] = first + covers.argmax()
-    return samples
+    flying = _flying(flight)
+    each = [_covered_at(flight.x, flying, known, w, k) for w, k in enumerate(since.tolist())]
+    return np.array(each, int)
+
+
+def _covered_at(
+    x: NDArray[np.float64], flying: NDArray[np.bool_], known: Scenario, w: int, since: int
+) -> int:
+    """The sample in which a waypoint was covered, not before `since`; T: never."""
+    covers = covering_samples(known, w, x[since:]) & flying[since:]
+    found = covers.any(axis=1)
+    return since + int(found.argmax()) if found.any() else len(x)
+
+
+def _flying(flight: FlightRecord) -> NDArray[np.bool_]:
+    """(T, U) which UAS have flown the step to each sample and are not lost."""
+    flying = flight.mode < LOST
+    moves = (flight.x[1:, :, : VZ + 1] != flight.x[:-1, :, : VZ + 1]).any(axis=2)
+    # one that takes off again is on its return while it rests
+    rests = ~moves & (flight.current_A[:-1] == 0.0)
+    flying[1:] &= (flight.mode[:-1] < LANDED) & ~rests
+    return flying
 
 
 def _homes_m(changes: Sequence[tuple[int, Scenario]], samples: int) -> NDArray[np.float64]:

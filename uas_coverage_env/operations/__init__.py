@@ -4,7 +4,7 @@ Needs the extra `ops`.
 """
 
 from uas_coverage_env.operations.cameras import Camera, camera_names, load_camera
-from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff, minutes_of
 from uas_coverage_env.operations.export import Export, ExportOptions, make_export
 from uas_coverage_env.operations.flown import Flown, flown_flight
 from uas_coverage_env.operations.formats import ENDINGS, FORMATS
@@ -36,6 +36,7 @@ __all__ = [
     "load_camera",
     "make_export",
     "make_scenario",
+    "minutes_of",
     "read_drawings",
     "read_log",
 ]

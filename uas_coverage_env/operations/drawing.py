@@ -17,6 +17,7 @@ Role = Literal["search", "no_fly", "fence"]
 MOST_BYTES = 20_000_000
 MOST_CORNERS = 100_000
 _HEAVIEST = 1e6
+_MOST_TIMES, _LONGEST_MIN = 100, 1440.0
 
 _ROLES: dict[str, Role | Literal["home"]] = {
     **dict.fromkeys(("search", "survey", "area"), "search"),
@@ -39,6 +40,8 @@ class DrawnPolygon:
         outer: (N, 2) latitude and longitude of the corners [degrees].
         holes: The same of each hole.
         camera: Name of the one that is to see it; None: the usual one.
+        again_after_s: Times after which it is to be seen again, each from the time before; None:
+            as usual [s].
     """
 
     source: str
@@ -48,6 +51,7 @@ class DrawnPolygon:
     outer: NDArray[np.float64]
     holes: tuple[NDArray[np.float64], ...] = ()
     camera: str | None = None
+    again_after_s: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ def polygon(
     Args:
         source: The file.
         rings: Outer ring and holes, each a list of (longitude, latitude, ...).
-        attributes: `name`, `role`, `weight` and `camera`, where the file has them.
+        attributes: `name`, `role`, `weight`, `camera` and `again_min`, where the file has them.
         fallback_name: Where it has no name.
 
     Raises:
@@ -94,7 +98,11 @@ def polygon(
     camera = str(camera).strip()[:80] or None if camera is not None else None
     if camera and role != "search":
         raise InputError(f"{source} is no area to be seen, but names the camera {camera!r}")
-    return DrawnPolygon(source, name, role, weight, outer, tuple(holes), camera)
+    again = attributes.get("again_min")
+    again_after_s = None if again in (None, "") else minutes_of(f"{source}: again_min", again)
+    if again_after_s and role != "search":
+        raise InputError(f"{source} is no area to be seen, but has again_min")
+    return DrawnPolygon(source, name, role, weight, outer, tuple(holes), camera, again_after_s)
 
 
 def take_off(source: str, position: Any, attributes: Mapping[str, Any]) -> TakeOff:
@@ -180,6 +188,28 @@ def _weight(source: str, given: Any) -> float:
             f"{_HEAVIEST:g}"
         )
     return weight
+
+
+def minutes_of(source: str, given: Any) -> tuple[float, ...]:
+    """Times [s] from minutes: a number, or numbers with commas between them.
+
+    Args:
+        source: Where they are given, for messages.
+        given: What is given.
+
+    Raises:
+        InputError: It is something else.
+    """
+    try:
+        minutes = [float(part) for part in str(given).strip("[] ").split(",")]
+    except ValueError:
+        minutes = [math.nan]
+    if len(minutes) > _MOST_TIMES or not all(0.0 < each <= _LONGEST_MIN for each in minutes):
+        raise InputError(
+            f"{source} {str(given)[:40]!r} should be minutes, such as 10 or 10,20: at most "
+            f"{_MOST_TIMES}, each greater than 0, at most {_LONGEST_MIN:g}"
+        )
+    return tuple(60.0 * each for each in minutes)
 
 
 def _ring(source: str, positions: Any) -> NDArray[np.float64]:

@@ -65,6 +65,8 @@ class ImportOptions:
         terrain: Grid of heights; None: the ground is flat.
         min_height_m: Least height of UAS above ground and roofs, but for take-off and landing [m].
         flown_by: What flies it in the end, `autopilot`; None: the world alone.
+        again_after_s: Times after which waypoints are asked for again, each from the time before,
+            where an area does not say [s].
     """
 
     fleet: str = "s500_v2:2"
@@ -80,6 +82,7 @@ class ImportOptions:
     terrain: Path | None = None
     min_height_m: float = 0.0
     flown_by: str | None = None
+    again_after_s: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,8 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     walls = [*site.no_fly, *relief.walls, *building_walls(higher, site.fence)]
     seen = [(area, look_at(looks, area.camera, area.source)) for area in site.areas]
     asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
-    asked = Asked(options.radius_m, options.max_speed_mps, options.min_height_m, asks)
+    speed_mps, again_after_s = options.max_speed_mps, options.again_after_s
+    asked = Asked(options.radius_m, speed_mps, options.min_height_m, asks, again_after_s)
     waypoints = make_waypoints(site, relief, walls, seen, ceiling_m, asked)
     tables = {
         "schema": 1,
@@ -157,6 +161,8 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         **({"execution": {"flown_by": options.flown_by}} if options.flown_by else {}),
     }
     scenario = _finite(parse(tables, Scenario, name))
+    if scenario.asks_again:
+        scenario = scenario.model_copy(update={"relaunch": True})
     notes = [
         *_look_notes(looks, seen, waypoints.above_m, uneven=relief.ground is not None),
         f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} "
@@ -164,6 +170,12 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         *([relief.note(site)] if relief.ground else []),
         *_town_notes(town),
     ]
+    if scenario.asks_again:
+        visits = sum(waypoint.visits for waypoint in scenario.waypoints)
+        notes.append(
+            f"{len(scenario.waypoints)} waypoints, to be covered {visits} times in all: UAS take "
+            f"off again (relaunch = true) on what their charge leaves; [sorties] gives them packs"
+        )
     if waypoints.too_high:
         notes.append(
             f"{waypoints.too_high} waypoints lie higher above the ground than asked: it is below "
@@ -244,7 +256,9 @@ def _within(name: str, value: float, least: float, most: float) -> None:
 
 def _finite(scenario: Scenario) -> Scenario:
     """The scenario with as many steps as it should need, twice over."""
-    seconds = back_and_forth(scenario).makespan_s
+    rounds = max(waypoint.visits for waypoint in scenario.waypoints)
+    waits_s = max(sum(waypoint.again_after_s) for waypoint in scenario.waypoints)
+    seconds = rounds * back_and_forth(scenario).makespan_s + waits_s
     steps = math.ceil(2.0 * seconds / scenario.dt_s) + 300
     return scenario.model_copy(update={"max_steps": min(steps, _MOST_STEPS)})
 

@@ -56,12 +56,14 @@ class Area(NamedTuple):
         shape: Polygons (x east, y north) [m].
         camera: Name of the one that is to see it; None: the usual one.
         source: File and name, for messages.
+        again_after_s: See `DrawnPolygon`.
     """
 
     weight: float
     shape: BaseGeometry
     camera: str | None
     source: str
+    again_after_s: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,11 @@ def make_site(
     ]
     homes_m = _homes_m(frame, things, homes)
     areas = _apart(
-        [Area(t.weight, a, t.camera, t.source) for t, a in polygons if t.role == "search"]
+        [
+            Area(t.weight, a, t.camera, t.source, t.again_after_s)
+            for t, a in polygons
+            if t.role == "search"
+        ]
     )
     drawn_fence = shapely.union_all([area for t, area in polygons if t.role == "fence"])
     fence = _fence(drawn_fence, areas, homes_m)

@@ -30,12 +30,14 @@ class Asked(NamedTuple):
         max_speed_mps: At which they are covered; None: at any [m/s].
         min_height_m: Least height of UAS above ground and roofs [m].
         camera: Whether they ask for their camera in any case.
+        again_after_s: Times after which they are asked for again, where an area does not say [s].
     """
 
     radius_m: float
     max_speed_mps: float | None
     min_height_m: float
     camera: bool
+    again_after_s: tuple[float, ...] = ()
 
 
 @dataclass
@@ -94,6 +96,7 @@ def make_waypoints(
     for number, (area, look) in enumerate(seen):
         layout = lay_waypoints(area.shape, look.pitch_m, allowed, f"area {number + 1}")
         found.left_out_m2 += layout.left_out_m2
+        again_s = asked.again_after_s if area.again_after_s is None else area.again_after_s
         for east_m, north_m in layout.places_m:
             under = roofs.query(Point(east_m, north_m), "intersects")
             low_m, high_m = relief.range_m(*_seen_from(east_m, north_m, look))
@@ -115,6 +118,7 @@ def make_waypoints(
                     "radius_m": asked.radius_m,
                     "weight": area.weight,
                     **_demand(look, asked),
+                    **({"again_after_s": list(again_s)} if again_s else {}),
                 }
             )
     count = sum(map(len, found.tables.values()))

@@ -41,6 +41,7 @@ def problems(scenario: UncheckedScenario) -> list[str]:
         *_batteries(scenario),
         *_events(scenario),
         *_relaunch(scenario),
+        *_asked_again(scenario),
     ]
 
 
@@ -48,6 +49,7 @@ def warnings(scenario: UncheckedScenario) -> list[str]:
     """What is allowed but probably not meant; one line each."""
     return [
         *_waypoints_nobody_covers(scenario),
+        *_nobody_flies_again(scenario),
         *_waypoints_out_of_reach(scenario),
         *_mission_too_long(scenario),
     ]
@@ -193,6 +195,23 @@ def _relaunch(scenario: UncheckedScenario) -> Iterator[str]:
         yield (
             "relaunch: true does not go with sorties.together = false, by which UAS take off again "
             "with fresh packs; leave one of them out"
+        )
+
+
+def _asked_again(scenario: UncheckedScenario) -> Iterator[str]:
+    if scenario.sorties and scenario.sorties.together and scenario.asks_again:
+        yield (
+            "sorties.together: true does not go with waypoints.again_after_s, which counts within "
+            "one flight; set it to false"
+        )
+
+
+def _nobody_flies_again(scenario: UncheckedScenario) -> Iterator[str]:
+    if scenario.asks_again and not scenario.relaunch and not scenario.sorties:
+        index = next(w for w, waypoint in enumerate(scenario.waypoints) if waypoint.again_after_s)
+        yield (
+            f"waypoints[{index}].again_after_s: UAS that have landed do not fly again for it; add "
+            f"[sorties] with together = false (fresh packs), or relaunch = true"
         )
 
 

@@ -60,6 +60,11 @@ Points_m = Annotated[
     BeforeValidator(_as_tuple),
     Field(min_length=4, max_length=1000),
 ]
+Gaps_s = Annotated[
+    tuple[Annotated[float, Field(gt=0.0, le=86_400.0)], ...],
+    BeforeValidator(_as_tuple),
+    Field(max_length=100),
+]
 _Angle_deg = Annotated[float, Field(gt=0.0, lt=170.0)]
 Outline_m = Annotated[
     tuple[tuple[Coordinate_m, Coordinate_m], ...],
@@ -175,6 +180,8 @@ class Waypoint(StrictModel):
             its centre among them; without it, from any [m].
         max_speed_mps: It is covered only by a UAS that is no faster, as its exposure allows;
             without it, at any speed [m/s].
+        again_after_s: It is asked for again so long after each time it was covered, once for each
+            number; without it, once covered is covered [s].
     """
 
     kind: Label | None = None
@@ -184,6 +191,16 @@ class Waypoint(StrictModel):
     sensor: Name | None = None
     heights_m: Annotated[tuple[Distance_m, Distance_m], BeforeValidator(_as_tuple)] | None = None
     max_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+    again_after_s: Gaps_s = ()
+
+    @property
+    def visits(self) -> int:
+        """How often it is to be covered."""
+        return 1 + len(self.again_after_s)
+
+    def again(self) -> Self:
+        """What is asked for once it has been covered and the time between has passed."""
+        return self.model_copy(update={"again_after_s": self.again_after_s[1:]})
 
     @model_validator(mode="after")
     def _lies_between_its_heights(self) -> Self:
@@ -204,6 +221,8 @@ class Waypoint(StrictModel):
         for name in ("sensor", "heights_m", "max_speed_mps"):
             if getattr(self, name) is None:
                 data.pop(name, None)
+        if not self.again_after_s:
+            data.pop("again_after_s", None)
         return data
 
 

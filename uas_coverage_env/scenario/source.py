@@ -32,7 +32,8 @@ class Room(NamedTuple):
     def of(cls, scenario: Scenario) -> "Room":
         """What a scenario has, or may have once all of its events have happened."""
         kinds = [event.kind for event in scenario.events]
-        n_waypoints = len(scenario.waypoints) + kinds.count("waypoint_added")
+        n_waypoints = sum(waypoint.visits for waypoint in scenario.waypoints)
+        n_waypoints += kinds.count("waypoint_added")
         n_moving = len(scenario.moving_obstacles) + kinds.count("moving_obstacle_added")
         return cls(len(scenario.uas), n_waypoints, n_moving)
 

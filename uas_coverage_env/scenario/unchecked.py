@@ -121,6 +121,19 @@ class UncheckedScenario(StrictModel):
         """
         return self._with(event.revised(self, time_s, uas))
 
+    @property
+    def asks_again(self) -> bool:
+        """Whether any waypoint is to be covered more than once."""
+        return any(waypoint.again_after_s for waypoint in self.waypoints)
+
+    def asked_again(self, w: int) -> Self:
+        """What the scenario is once a waypoint that was covered is asked for again: it comes last.
+
+        Args:
+            w: Its number; it is to be covered more than once.
+        """
+        return self._with({"waypoints": (*self.waypoints, self.waypoints[w].again())})
+
     def with_waypoints(self, kept: Iterable[int]) -> Self:
         """The scenario with these of its waypoints only.
 

@@ -69,4 +69,5 @@ class FlownWorld(World):
         x = np.ascontiguousarray(x, dtype=np.float64)
         judge_track(at, self._commands, x, np.ascontiguousarray(resting), outcome)
         outcome["limits_exceeded"] = 0
+        self.change_scene()
         return outcome

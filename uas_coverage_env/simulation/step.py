@@ -246,7 +246,7 @@ def judge(arena, state, nonlinear, outcome):
     check_separation(arena, state, outcome)
     check_fence_and_battery(arena, state, outcome)
     count_breaches(arena, state, outcome)
-    cover(arena, state, outcome)
+    cover(arena, state, state.step[0] + 1, outcome)
     land(arena, state, outcome)
     check_limits(arena, state, nonlinear, outcome)
     _mark_lost(state, outcome)
@@ -286,7 +286,7 @@ def advance(arena, state, commands, nonlinear, assistants, disturbances, outcome
 @kernel
 def begin_mission(arena, state, outcome):
     """Put the world at t = 0: what lies within reach of the starts is covered at once."""
-    cover(arena, state, outcome)
+    cover(arena, state, 0, outcome)
 
 
 MISSION = Layout(ARENA, STATE)

@@ -25,6 +25,7 @@ from uas_coverage_env.world.packs import packs_left, swap_steps_left, swaps_alon
 from uas_coverage_env.world.state import (
     FLYING,
     LANDED,
+    PACK_COVERED,
     STATE,
     SWAPPING,
     SwarmState,
@@ -42,7 +43,8 @@ def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
     n_uas = len(scenario.uas)
     sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": n_disturbances}
     sizes |= {"E": len(scenario.events), "S": n_uas if is_eventful(scenario) else 0}
-    sizes["B"] = n_uas if swaps_alone(scenario) else 0
+    sizes |= {"B": n_uas if swaps_alone(scenario) else 0}
+    sizes["repeats"] = len(scenario.waypoints) if scenario.asks_again else 0
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
     state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
@@ -240,21 +242,26 @@ class World:
     def change_scene(self) -> bool:
         """Let happen at this sample what changes the scene: it is another one from now on.
 
+        Events do, and waypoints that are asked for again.
+
         `step` does so itself. It is for those that step the arrays of the world by code of their
         own; `arena` and `state` are other arrays then, and again after `reset`.
 
         Returns:
             Whether anything changed.
         """
-        if not self._scene_events:
-            return False
         state = self.state
+        if not self._scene_events and not len(state.due_step):
+            return False
         now = [e for e in self._scene_events if state.event_step[e] == state.step[0]]
-        if not now:
+        again = np.flatnonzero((state.due_step == state.step[0]) & (state.due_step > 0)).tolist()
+        if not now and not again:
             return False
         for e in now:
             event = self.scenario.events[e]
             self.known = self.known.after(event, self.time_s, int(state.event_uas[e]))
+        for w in again:
+            self.known = self.known.asked_again(w)
         self.arena = self._arena_of(self.known)
         uncovered = np.ones(len(self.known.waypoints), dtype=np.bool_)
         uncovered[: len(state.uncovered)] = state.uncovered
@@ -265,7 +272,10 @@ class World:
         if len(uncovered) > len(state.uncovered):
             # one that was called home because nothing was left may have something to do now
             state.returning[:] = False
-        self._state = state._replace(uncovered=uncovered)
+            state.packs[:, PACK_COVERED] = 1
+        due_step = np.zeros(len(uncovered) if len(state.due_step) else 0, dtype=np.int64)
+        due_step[: len(state.due_step)] = state.due_step
+        self._state = state._replace(uncovered=uncovered, due_step=due_step)
         self.revisions += 1
         self._prepare()
         return True
@@ -314,6 +324,21 @@ class World:
         """Whether no UAS flies any more, nor swaps packs to fly again."""
         status = self.state.status
         return FLYING not in status and SWAPPING not in status
+
+    @property
+    def waits(self) -> bool:
+        """Whether a waypoint is going to be asked for again that was covered."""
+        return bool((self.state.due_step > self.state.step[0]).any())
+
+    @property
+    def visits_to_come(self) -> int:
+        """How often waypoints are still to be covered, now and when they are asked for again."""
+        state = self.state
+        later = 0
+        for w, due_step in enumerate(state.due_step):
+            if state.uncovered[w] or due_step > state.step[0]:
+                later += len(self.known.waypoints[w].again_after_s)
+        return int(state.uncovered.sum()) + later
 
     @property
     def time_s(self) -> float:

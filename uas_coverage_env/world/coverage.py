@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.outcome import NONE
@@ -69,11 +69,17 @@ def covering_samples(scenario: Scenario, w: int, x: NDArray[np.float64]) -> NDAr
 
 
 @inlined_kernel
-def cover(arena, state, outcome):
+def cover(arena, state, sample, outcome):
     """Cover the waypoints within reach of a flying UAS as it is now, see `_is_as_asked`.
 
     A lost UAS covers nothing at the sample of its loss. Where several UAS reach a waypoint at
     the same sample, it counts for the first of them.
+
+    Args:
+        arena: The arena.
+        state: The state; what is uncovered and due is written.
+        sample: Number of the sample.
+        outcome: (U,) of OUTCOME_DTYPE; what was covered is written.
     """
     for i in range(state.status.shape[0]):
         event = outcome[i]
@@ -93,6 +99,8 @@ def cover(arena, state, outcome):
                 if not _is_as_asked(arena, i, w, state.x[i]):
                     continue
                 state.uncovered[w] = False
+                if rarely(state.due_step.shape[0] > 0) and arena.waypoints[w].again_steps > 0:
+                    state.due_step[w] = sample + arena.waypoints[w].again_steps
                 event.newly_covered += 1
                 event.newly_covered_weight += columns[4, w]
 

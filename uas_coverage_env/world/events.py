@@ -236,7 +236,10 @@ def happen(arena, state, outcome):
         if state.event_step[e] != sample:
             continue
         if event.effect == DROP:
-            state.uncovered[int(event.values[0])] = False
+            dropped = int(event.values[0])
+            state.uncovered[dropped] = False
+            if state.due_step.shape[0] > 0:
+                state.due_step[dropped] = 0
         for i in range(state.status.shape[0]):
             if not concerns(state, e, i) or not outcome[i].flew:
                 continue

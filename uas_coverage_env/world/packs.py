@@ -27,6 +27,9 @@ from uas_coverage_env.world.state import (
 AHEAD_S = 5.0
 """No UAS takes off where another one, flying on as it does, would come too near within this [s]."""
 
+NOTHING, LATER, NOW = range(3)
+"""When there is something to do."""
+
 PACKS_DTYPE = np.dtype(
     (
         np.record,
@@ -139,19 +142,33 @@ def _has_something_to_do(arena, state, i):
     """Whether a waypoint is open that UAS i can cover, and time left to fly there and back.
 
     Straight and at full speed: what is too late so, is too late by any route.
+
+    Returns:
+        NOTHING, LATER or NOW: LATER where such a waypoint is only going to be asked for again.
     """
     rules = arena.rules[0]
     uas = arena.uas[i]
-    begins = max(state.step[0], state.packs[i, PACK_READY])
-    reach_m = 0.5 * uas.speed_mps * rules.dt_s * (rules.max_steps - begins)
+    step = state.step[0]
+    found = NOTHING
     for w in range(state.uncovered.shape[0]):
-        if state.uncovered[w] and can_cover(arena, i, w):
-            waypoint = arena.waypoints[w]
-            north_m = waypoint.position_m[0] - state.x[i, X]
-            east_m = waypoint.position_m[1] - state.x[i, Y]
-            if math.sqrt(north_m * north_m + east_m * east_m) - waypoint.radius_m < reach_m:
-                return True
-    return False
+        opens = step
+        if not state.uncovered[w]:
+            # at this sample it is asked for, but not yet among the waypoints
+            if state.due_step.shape[0] == 0 or state.due_step[w] < step:
+                continue
+            opens = state.due_step[w]
+        if not can_cover(arena, i, w):
+            continue
+        begins = max(opens, state.packs[i, PACK_READY])
+        reach_m = 0.5 * uas.speed_mps * rules.dt_s * (rules.max_steps - begins)
+        waypoint = arena.waypoints[w]
+        north_m = waypoint.position_m[0] - state.x[i, X]
+        east_m = waypoint.position_m[1] - state.x[i, Y]
+        if math.sqrt(north_m * north_m + east_m * east_m) - waypoint.radius_m < reach_m:
+            if state.uncovered[w]:
+                return NOW
+            found = LATER
+    return found
 
 
 @inlined_kernel
@@ -186,10 +203,11 @@ def swap_packs(arena, state, outcome):
     """Let UAS that have landed swap packs, and fly again when they have a fresh one.
 
     One that lands with a pack left swaps. It has landed for good where no waypoint is open any
-    more that it can cover in time, or where it will hear no command again. It takes off as soon as
-    its pack is in, it takes commands and `is_clear`; but where its last sortie has covered
-    nothing, only once another UAS was lost or has landed for good since: what it left to the others
-    may be its own then. Where none flies or is going to, all have landed for good.
+    more that it can cover in time, nor is going to be, or where it will hear no command again. It
+    takes off as soon as one is open, its pack is in, it takes commands and `is_clear`; but where
+    its last sortie has covered nothing, only once another UAS was lost or has landed for good
+    since: what it left to the others may be its own then. Where none flies or is going to, all have
+    landed for good.
 
     Args:
         arena: The arena.
@@ -212,7 +230,7 @@ def swap_packs(arena, state, outcome):
     for i in range(n_uas):
         if state.status[i] == SWAPPING and (
             over
-            or not _has_something_to_do(arena, state, i)
+            or _has_something_to_do(arena, state, i) == NOTHING
             or deaf_until(arena, state, i, step) == NEVER
         ):
             _end(state, i, outcome)
@@ -221,11 +239,15 @@ def swap_packs(arena, state, outcome):
     moving_m = arena.moving_path_m[min(step, arena.moving_path_m.shape[0] - 1)]
     for i in range(n_uas):
         kept = state.packs[i]
-        if state.status[i] != SWAPPING or (kept[PACK_COVERED] == 0 and out <= kept[PACK_OUT]):
+        if state.status[i] != SWAPPING:
             continue
-        works = True
+        waits = kept[PACK_COVERED] == 0 and out <= kept[PACK_OUT]
+        later = _has_something_to_do(arena, state, i) == LATER
+        works |= later or not waits
         if (
-            step >= kept[PACK_READY]
+            not later
+            and not waits
+            and step >= kept[PACK_READY]
             and deaf_until(arena, state, i, step) <= step
             and is_clear(arena, moving_m, state.x, state.status, i, AHEAD_S)
         ):

@@ -84,6 +84,9 @@ class WorldState(NamedTuple):
     """The latest command that reached each UAS."""
     packs: Annotated[NDArray[np.int64], "B", 4]
     """Of each UAS what is named beside `PACK_NUMBER`; of none where none swaps on its own."""
+    due_step: Annotated[NDArray[np.int64], "repeats", Values(0, 2**40)]
+    """The sample at which each waypoint that was covered is asked for again, 0 where it is not; of
+    none where no waypoint is to be covered more than once."""
 
     def copy(self) -> Self:
         """The same state in arrays of its own."""
@@ -128,7 +131,7 @@ def _with_x(state, x):
         state.uncovered, state.step, state.disturbance_memory, state.disturbance_random,
         state.event_step, state.event_uas, state.event_random, state.felt, state.sensed,
         state.told, state.delayed, state.bias, state.sensing_random, state.heard,
-        state.packs,
+        state.packs, state.due_step,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.scenario import Scenario, Uas
 from uas_coverage_env.scenario.payload import asks
+from uas_coverage_env.world.events import steps_until
 
 ALL_SHARES = 2.0**30
 """The weight of all waypoints, as a whole number. With it and positions of at most 2²², every sum
@@ -31,6 +32,8 @@ WAYPOINT_DTYPE = np.dtype(
                 ("lowest_m", "f8"),
                 ("highest_m", "f8"),
                 ("max_speed_mps", "f8"),
+                # steps from one covering to being asked for again; 0: it is not
+                ("again_steps", "i8"),
             ],
             align=True,
         ),
@@ -47,6 +50,7 @@ def waypoint_records(scenario: Scenario) -> NDArray[np.void]:
             0 if w.sensor is None else bits.get(w.sensor, _NOBODY_HAS),
             *(w.heights_m or (-math.inf, math.inf)),
             math.inf if w.max_speed_mps is None else w.max_speed_mps,
+            steps_until(w.again_after_s[0], scenario.dt_s) if w.again_after_s else 0,
         )
         for w in scenario.waypoints
     ]
