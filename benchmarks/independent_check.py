@@ -212,7 +212,7 @@ def _judge_coverage(record: FlightRecord, report: Report) -> None:
         asked_at = 0.0
         for gap_s in (0.0, *waypoint.get("again_after_s", ())):
             asked_at += np.ceil(round(gap_s / record.dt_s, 9))
-            asked_at = min((_reached(record, t, waypoint, asked_at) for t in record.tracks))
+            asked_at = min(_reached(record, t, waypoint, asked_at) for t in record.tracks)
             visits.append(asked_at)
     first = np.array(visits)
     report.coverage = float(np.isfinite(first).mean())

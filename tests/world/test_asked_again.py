@@ -173,7 +173,7 @@ def test_agents_see_it_open_again_and_their_episode_goes_on_while_they_swap():
 
 
 def test_batches_refuse_it_with_what_to_take_instead():
-    with pytest.raises(ValueError, match="again_after_s.*parallel_env"):
+    with pytest.raises(ValueError, match=r"again_after_s.*parallel_env"):
         CoverageBatch(2, mission(again(NEAR, 30.0)))
 
 

@@ -4,7 +4,7 @@ Needs the extra `ops`.
 """
 
 from uas_coverage_env.operations.cameras import Camera, camera_names, load_camera
-from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff, minutes_of
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.export import Export, ExportOptions, make_export
 from uas_coverage_env.operations.flown import Flown, flown_flight
 from uas_coverage_env.operations.formats import ENDINGS, FORMATS
@@ -14,6 +14,7 @@ from uas_coverage_env.operations.logs import Logged, read_log
 from uas_coverage_env.operations.make import Imported, ImportOptions, make_scenario
 from uas_coverage_env.operations.reading import read_drawings
 from uas_coverage_env.operations.tracks import Tolerances
+from uas_coverage_env.operations.wishes import minutes_of
 
 __all__ = [
     "ENDINGS",

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
+from uas_coverage_env.operations.wishes import NAMES, NOTHING, Wishes, wishes_of
 
 Role = Literal["search", "no_fly", "fence"]
 
 MOST_BYTES = 20_000_000
 MOST_CORNERS = 100_000
 _HEAVIEST = 1e6
-_MOST_TIMES, _LONGEST_MIN = 100, 1440.0
 
 _ROLES: dict[str, Role | Literal["home"]] = {
     **dict.fromkeys(("search", "survey", "area"), "search"),
@@ -40,8 +40,7 @@ class DrawnPolygon:
         outer: (N, 2) latitude and longitude of the corners [degrees].
         holes: The same of each hole.
         camera: Name of the one that is to see it; None: the usual one.
-        again_after_s: Times after which it is to be seen again, each from the time before; None:
-            as usual [s].
+        wishes: How it is to be looked at.
     """
 
     source: str
@@ -51,7 +50,7 @@ class DrawnPolygon:
     outer: NDArray[np.float64]
     holes: tuple[NDArray[np.float64], ...] = ()
     camera: str | None = None
-    again_after_s: tuple[float, ...] | None = None
+    wishes: Wishes = NOTHING
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,8 @@ def polygon(
     Args:
         source: The file.
         rings: Outer ring and holes, each a list of (longitude, latitude, ...).
-        attributes: `name`, `role`, `weight`, `camera` and `again_min`, where the file has them.
+        attributes: `name`, `role`, `weight`, `camera` and those of `wishes.NAMES`, where the file
+            has them.
         fallback_name: Where it has no name.
 
     Raises:
@@ -98,11 +98,11 @@ def polygon(
     camera = str(camera).strip()[:80] or None if camera is not None else None
     if camera and role != "search":
         raise InputError(f"{source} is no area to be seen, but names the camera {camera!r}")
-    again = attributes.get("again_min")
-    again_after_s = None if again in (None, "") else minutes_of(f"{source}: again_min", again)
-    if again_after_s and role != "search":
-        raise InputError(f"{source} is no area to be seen, but has again_min")
-    return DrawnPolygon(source, name, role, weight, outer, tuple(holes), camera, again_after_s)
+    wishes = wishes_of(source, attributes)
+    if wishes != NOTHING and role != "search":
+        said = ", ".join(name for name in NAMES if attributes.get(name) not in (None, ""))
+        raise InputError(f"{source} is no area to be seen, but has {said}")
+    return DrawnPolygon(source, name, role, weight, outer, tuple(holes), camera, wishes)
 
 
 def take_off(source: str, position: Any, attributes: Mapping[str, Any]) -> TakeOff:
@@ -188,28 +188,6 @@ def _weight(source: str, given: Any) -> float:
             f"{_HEAVIEST:g}"
         )
     return weight
-
-
-def minutes_of(source: str, given: Any) -> tuple[float, ...]:
-    """Times [s] from minutes: a number, or numbers with commas between them.
-
-    Args:
-        source: Where they are given, for messages.
-        given: What is given.
-
-    Raises:
-        InputError: It is something else.
-    """
-    try:
-        minutes = [float(part) for part in str(given).strip("[] ").split(",")]
-    except ValueError:
-        minutes = [math.nan]
-    if len(minutes) > _MOST_TIMES or not all(0.0 < each <= _LONGEST_MIN for each in minutes):
-        raise InputError(
-            f"{source} {str(given)[:40]!r} should be minutes, such as 10 or 10,20: at most "
-            f"{_MOST_TIMES}, each greater than 0, at most {_LONGEST_MIN:g}"
-        )
-    return tuple(60.0 * each for each in minutes)
 
 
 def _ring(source: str, positions: Any) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ _WGS_84 = re.compile(r"CRS84|EPSG:+4326")
 
 
 def read_geojson(path: Path) -> Iterator[Drawn]:
-    """Polygons, with `name`, `role`, `weight`, `camera`, `again_min` from their properties, and take-off points.
+    """Polygons, with attributes from their properties (see `polygon`), and take-off points.
 
     Raises:
         InputError: The file cannot be used.

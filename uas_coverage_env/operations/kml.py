@@ -19,7 +19,7 @@ from uas_coverage_env.operations.drawing import MOST_BYTES, Drawn, content, poly
 
 
 def read_kml(path: Path) -> Iterator[Drawn]:
-    """Polygons, with `role`, `weight`, `camera`, `again_min` from ExtendedData or a role in front of the name.
+    """Polygons, with attributes from ExtendedData (see `polygon`), or a role before the name.
 
     Raises:
         InputError: The file cannot be used.

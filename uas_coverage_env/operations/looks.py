@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.cameras import Camera, named_camera
+from uas_coverage_env.operations.wishes import Wishes
 
 _UNEVEN_M = 1.0
 """Ground that falls away by less than that under a waypoint is not worth a word."""
@@ -75,6 +76,25 @@ def look_of(
     if resolution_cm is not None:
         height_m = camera.height_m(resolution_cm, radius_m)
     return Look(name, camera, height_m, camera.pitch_m(height_m, radius_m, overlap))
+
+
+def look_as_wished(look: Look, wishes: Wishes, radius_m: float, overlap: float) -> Look:
+    """The look at an area whose drawing says how.
+
+    Args:
+        look: As at all areas.
+        wishes: What the drawing says.
+        radius_m: Of a waypoint's sphere [m].
+        overlap: As in all areas [-].
+
+    Raises:
+        InputError: It cannot be looked at so.
+    """
+    height_m = look.height_m if wishes.height_m is None else wishes.height_m
+    if wishes.pixel_cm is not None:
+        height_m = look.camera.height_m(wishes.pixel_cm, radius_m)
+    share = overlap if wishes.overlap is None else wishes.overlap
+    return replace(look, height_m=height_m, pitch_m=look.camera.pitch_m(height_m, radius_m, share))
 
 
 def look_at(looks: Sequence[Look], camera: str | None, source: str) -> Look:

@@ -1,7 +1,7 @@
 """A scenario from what was drawn: fence, obstacles, waypoints and fleet in local metres."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,9 @@ from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.flight.seen import SEARCH_AREA
 from uas_coverage_env.operations.cameras import named_camera
 from uas_coverage_env.operations.convex import polygons_of, without_holes
-from uas_coverage_env.operations.drawing import Drawn
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon
 from uas_coverage_env.operations.fleet import SPARE_M, Member, fleet_tables, parse_fleet
-from uas_coverage_env.operations.looks import Look, look_at, look_of
+from uas_coverage_env.operations.looks import Look, look_as_wished, look_at, look_of
 from uas_coverage_env.operations.relief import Relief, relief_of
 from uas_coverage_env.operations.site import (
     FENCE_MARGIN_M,
@@ -27,6 +27,7 @@ from uas_coverage_env.operations.site import (
 )
 from uas_coverage_env.operations.town import Building, Town, read_town
 from uas_coverage_env.operations.waypoints import Asked, make_waypoints
+from uas_coverage_env.operations.wishes import NOTHING
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.endurance import back_and_forth
 
@@ -114,20 +115,21 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     _check(options)
     fleet = parse_fleet(options.fleet)
     looks = _looks(fleet, options)
-    ceiling_m, relief = _ceiling_m(looks, options), Relief()
+    highest_m = _highest_m(things, looks, options)
+    ceiling_m, relief = _ceiling_m(highest_m, options), Relief()
     site = make_site(things, options.homes, ceiling_m)
     uas = _fleet_tables(fleet, looks, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0))
     if options.terrain is not None:
         starts_m = np.array([table["start_m"][1::-1] for table in uas])
         relief = relief_of(options.terrain, site, starts_m)
         rise_m = relief.highest_m([area.shape for area in site.areas])
-        ceiling_m = _ceiling_m(looks, options, rise_m)
+        ceiling_m = _ceiling_m(highest_m + rise_m, options)
         site = make_site(things, options.homes, ceiling_m, relief.start_m)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
     buildings = [_raised(building, relief) for building in town.buildings]
     higher = [building for building in buildings if building.height_m >= _LOWEST_ROOF_M]
     walls = [*site.no_fly, *relief.walls, *building_walls(higher, site.fence)]
-    seen = [(area, look_at(looks, area.camera, area.source)) for area in site.areas]
+    seen = [(area, _look(looks, area, options)) for area in site.areas]
     asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
     speed_mps, again_after_s = options.max_speed_mps, options.again_after_s
     asked = Asked(options.radius_m, speed_mps, options.min_height_m, asks, again_after_s)
@@ -164,7 +166,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     if scenario.asks_again:
         scenario = scenario.model_copy(update={"relaunch": True})
     notes = [
-        *_look_notes(looks, seen, waypoints.above_m, uneven=relief.ground is not None),
+        *_look_notes(seen, waypoints.above_m, uneven=relief.ground is not None),
         f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} "
         f"obstacle{'' if len(walls) == 1 else 's'}",
         *([relief.note(site)] if relief.ground else []),
@@ -201,8 +203,24 @@ def _raised(building: Building, relief: Relief) -> Building:
     return replace(building, height_m=building.height_m + ground_m) if ground_m else building
 
 
-def _ceiling_m(looks: Sequence[Look], options: ImportOptions, rise_m: float = 0.0) -> float:
-    highest_m = max(look.height_m for look in looks) + rise_m
+def _look(looks: Sequence[Look], drawn: DrawnPolygon | Area, options: ImportOptions) -> Look:
+    """How an area is looked at."""
+    look = look_at(looks, drawn.camera, drawn.source)
+    if drawn.wishes[:-1] == NOTHING[:-1]:
+        return look
+    try:
+        return look_as_wished(look, drawn.wishes, options.radius_m, options.overlap)
+    except InputError as error:
+        raise InputError(f"{drawn.source}: {error}") from error
+
+
+def _highest_m(things: Sequence[Drawn], looks: Sequence[Look], options: ImportOptions) -> float:
+    """Of the waypoints above the ground, roofs apart [m]."""
+    areas = [t for t in things if isinstance(t, DrawnPolygon) and t.role == "search"]
+    return max(look.height_m for look in (*looks, *(_look(looks, t, options) for t in areas)))
+
+
+def _ceiling_m(highest_m: float, options: ImportOptions) -> float:
     if options.ceiling_m is None:
         return highest_m + _ABOVE_WAYPOINTS_M
     _within("--ceiling", options.ceiling_m, highest_m + options.radius_m, 2_000.0)
@@ -223,17 +241,19 @@ def _fleet_tables(
 
 
 def _look_notes(
-    looks: Sequence[Look],
-    seen: Sequence[tuple[Area, Look]],
-    above_m: Mapping[str, Sequence[float]],
-    *,
-    uneven: bool,
+    seen: Sequence[tuple[Area, Look]], above_m: Sequence[Sequence[float]], *, uneven: bool
 ) -> list[str]:
     notes = []
+    looks = list(dict.fromkeys(look for _, look in seen))
     for look in looks:
-        hectares = sum(area.shape.area for area, by in seen if by is look) / 1e4
-        heights_m = above_m.get(look.name, ())
-        named = f"{look.name}: " if len(looks) > 1 else ""
+        hectares = sum(area.shape.area for area, by in seen if by == look) / 1e4
+        heights_m = [
+            each_m
+            for (_, by), heights_m in zip(seen, above_m, strict=True)
+            for each_m in heights_m
+            if by == look
+        ]
+        named = f"{look.name}, {look.height_m:g} m: " if len(looks) > 1 else ""
         notes.append(named + look.note(hectares, heights_m, uneven=uneven))
     return notes
 

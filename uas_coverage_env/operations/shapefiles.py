@@ -15,7 +15,7 @@ from uas_coverage_env.operations.drawing import MOST_CORNERS, Drawn, content, po
 
 
 def read_shapefile(path: Path) -> Iterator[Drawn]:
-    """Polygons, with `name`, `role`, `weight`, `camera`, `again_min` from the fields of the table, and points.
+    """Polygons, with attributes from the fields of the table (see `polygon`), and points.
 
     Raises:
         InputError: The file cannot be used.

@@ -14,6 +14,7 @@ from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.local import frame_around, local_place, local_polygon
 from uas_coverage_env.operations.town import Building, prisms
+from uas_coverage_env.operations.wishes import NOTHING, Wishes
 
 SAFE_DISTANCE_M = 3.0
 """Kept from buildings and no-fly zones: as much as satellite navigation may be off."""
@@ -56,14 +57,14 @@ class Area(NamedTuple):
         shape: Polygons (x east, y north) [m].
         camera: Name of the one that is to see it; None: the usual one.
         source: File and name, for messages.
-        again_after_s: See `DrawnPolygon`.
+        wishes: How it is to be looked at.
     """
 
     weight: float
     shape: BaseGeometry
     camera: str | None
     source: str
-    again_after_s: tuple[float, ...] | None = None
+    wishes: Wishes = NOTHING
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +109,7 @@ def make_site(
     ]
     homes_m = _homes_m(frame, things, homes)
     areas = _apart(
-        [
-            Area(t.weight, a, t.camera, t.source, t.again_after_s)
-            for t, a in polygons
-            if t.role == "search"
-        ]
+        [Area(t.weight, a, t.camera, t.source, t.wishes) for t, a in polygons if t.role == "search"]
     )
     drawn_fence = shapely.union_all([area for t, area in polygons if t.role == "fence"])
     fence = _fence(drawn_fence, areas, homes_m)

@@ -14,6 +14,7 @@ from uas_coverage_env.operations.layout import MOST_WAYPOINTS, lay_waypoints
 from uas_coverage_env.operations.looks import Look
 from uas_coverage_env.operations.relief import Relief
 from uas_coverage_env.operations.site import FENCE_MARGIN_M, LARGEST_UAS_M, Area, Site, Wall
+from uas_coverage_env.operations.wishes import Wishes
 
 KEEP_M = LARGEST_UAS_M + 1.0
 """Between a waypoint and what no UAS may come nearer to, beyond safe distances."""
@@ -46,13 +47,13 @@ class Waypoints:
 
     Attributes:
         tables: The tables `[[waypoints]]` of each camera.
-        above_m: How high they are above the lowest ground that they see [m].
+        above_m: Of each area, how high they are above the lowest ground that they see [m].
         left_out_m2: Area that is seen from no place which a UAS may take [m²].
         too_high: How many lie higher than asked, because the ground is below the take-off places.
     """
 
     tables: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
-    above_m: dict[str, list[float]] = field(default_factory=dict)
+    above_m: list[list[float]] = field(default_factory=list)
     left_out_m2: float = 0.0
     too_high: int = 0
 
@@ -96,7 +97,7 @@ def make_waypoints(
     for number, (area, look) in enumerate(seen):
         layout = lay_waypoints(area.shape, look.pitch_m, allowed, f"area {number + 1}")
         found.left_out_m2 += layout.left_out_m2
-        again_s = asked.again_after_s if area.again_after_s is None else area.again_after_s
+        found.above_m.append([])
         for east_m, north_m in layout.places_m:
             under = roofs.query(Point(east_m, north_m), "intersects")
             low_m, high_m = relief.range_m(*_seen_from(east_m, north_m, look))
@@ -109,7 +110,7 @@ def make_waypoints(
                     f"--ceiling {ceiling_m:g}: the ground asks for a waypoint {height_m:.0f} m "
                     f"above the take-off places; raise it, or leave it out"
                 )
-            found.above_m.setdefault(look.name, []).append(height_m - low_m)
+            found.above_m[-1].append(height_m - low_m)
             position_m = (north_m, east_m, -height_m)
             found.tables.setdefault(look.name, []).append(
                 {
@@ -117,8 +118,7 @@ def make_waypoints(
                     "position_m": [round(value, 3) for value in position_m],
                     "radius_m": asked.radius_m,
                     "weight": area.weight,
-                    **_demand(look, asked),
-                    **({"again_after_s": list(again_s)} if again_s else {}),
+                    **_demand(look, area.wishes, asked),
                 }
             )
     count = sum(map(len, found.tables.values()))
@@ -146,8 +146,13 @@ def _seen_from(east_m: float, north_m: float, look: Look) -> Iterator[float]:
         yield north_m + sign * halves[1]
 
 
-def _demand(look: Look, asked: Asked) -> dict[str, Any]:
+def _demand(look: Look, wishes: Wishes, asked: Asked) -> dict[str, Any]:
     """What a waypoint asks for."""
-    if asked.max_speed_mps is not None:
-        return {"sensor": look.name, "max_speed_mps": asked.max_speed_mps}
-    return {"sensor": look.name} if asked.camera else {}
+    speed_mps = asked.max_speed_mps if wishes.speed_mps is None else wishes.speed_mps
+    again_s = asked.again_after_s if wishes.again_after_s is None else wishes.again_after_s
+    camera = asked.camera or speed_mps is not None or wishes.pixel_cm is not None
+    return {
+        **({"sensor": look.name} if camera else {}),
+        **({"max_speed_mps": speed_mps} if speed_mps is not None else {}),
+        **({"again_after_s": list(again_s)} if again_s else {}),
+    }
