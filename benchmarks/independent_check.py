@@ -205,11 +205,11 @@ def _compare_smallest(summary: dict[str, Any], smallest: dict[str, float], repor
 def _judge_coverage(record: FlightRecord, report: Report) -> None:
     """Covered counts from the first sample at which a flying UAS is within the radius, as asked.
 
-    What is asked for again counts anew, from the first sample after so long a time.
+    What is asked for again at a sample counts anew from the next one on.
     """
     visits: list[float] = []
     for waypoint in record.scenario["waypoints"]:
-        asked_at = 0.0
+        asked_at = -1.0
         for gap_s in (0.0, *waypoint.get("again_after_s", ())):
             asked_at += np.ceil(round(gap_s / record.dt_s, 9))
             asked_at = min(_reached(record, t, waypoint, asked_at) for t in record.tracks)
@@ -230,13 +230,13 @@ def _judge_coverage(record: FlightRecord, report: Report) -> None:
 def _reached(
     record: FlightRecord, track: Track, waypoint: dict[str, Any], asked_at: float
 ) -> float:
-    """The first sample, not before `asked_at`, at which a UAS covers a waypoint; infinity: none."""
+    """The first sample after `asked_at` at which a UAS covers a waypoint; infinity: none."""
     flying = track.position_m[: track.steps if track.end == "lost" else None]
     away = np.linalg.norm(flying - np.array(waypoint["position_m"], float), axis=1)
     near = away <= waypoint["radius_m"] + _ROUNDING
     reached = np.flatnonzero(near & _as_asked(record, track, waypoint)[: len(near)])
     stands = np.concatenate([[False], track.rests[:-1]])  # in the step to a sample
-    reached = reached[(reached >= asked_at) & ~stands[reached]]
+    reached = reached[(reached > asked_at) & ~stands[reached]]
     return float(reached[0]) if len(reached) else np.inf
 
 

@@ -35,7 +35,7 @@ _MISSIONS = {
     "tour": (6, 300, 30),
     "trajectory": (4, 300, 10),
     "learned-waypoint": (1, 300, 10),
-    "milp-mpc-guided": (1, 30, 1),
+    "milp-mpc-guided": (1, 300, 1),
     "milp-mpc-guided in_wind=tube": (1, 30, 1),
 }
 _OTHERS = (30, 300, 300)

@@ -146,6 +146,17 @@ def test_gusts_lead_no_descent_and_no_climb_beyond_their_limits(level):
             assert outcome["limits_exceeded"][0] == 0
 
 
+def test_a_climb_into_wind_that_grows_with_height_ends_within_the_speed_limit():
+    strong = with_disturbances(meadow([(30.0, 100.0, -1.0)]), "strong", 4)
+    wind = strong.wind.model_copy(update={"mean_mps": 9.2, "from_deg": 180.0})
+    world = World(strong.model_copy(update={"wind": wind}))
+    for seed in range(100):
+        world.reset(seed)
+        for _ in range(9):
+            outcome = world.step({"uas_1": Velocity(12.0, 0.0, 14.0)})
+            assert outcome["limits_exceeded"][0] == 0, seed
+
+
 @pytest.mark.parametrize(("altitude_m", "limit_mps"), [(2.0, 1.5), (45.0, -3.0)])
 def test_a_part_of_the_wind_is_kept_of_the_limits_of_descent_and_climb(altitude_m, limit_mps):
     world = windy(7.0, 0.0)

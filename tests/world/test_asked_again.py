@@ -1,5 +1,7 @@
 """A waypoint that is to be covered more than once: when it is asked for again, and who flies."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -59,7 +61,7 @@ def test_it_is_asked_for_again_so_long_after_it_was_covered_and_comes_last():
     world.step({"uas_1": HOVERS, "uas_2": HOVERS})
     assert int(world.state.step[0]) == covered_at + 8  # the first sample from then on
     assert world.state.uncovered.tolist() == [False, True, True]
-    last = world.known.waypoints[2]
+    last = world.known.waypoints[-1]
     assert last.position_m == scenario.waypoints[0].position_m
     assert last.again_after_s == (30.0,)
     assert world.visits_to_come == 3
@@ -159,7 +161,7 @@ def test_only_a_uas_that_can_cover_it_waits_for_it():
 
 def test_agents_see_it_open_again_and_their_episode_goes_on_while_they_swap():
     scenario = mission(again(NEAR, 30.0), starts_m=STARTS_M[:1], packs=3)
-    env = parallel_env(scenario, action="waypoint")
+    env: Any = parallel_env(scenario, action="waypoint")
     env.reset(seed=0)
     steps = 0
     while env.agents:

@@ -42,6 +42,11 @@ MOST_WIND = 0.95
 _GUSTS = 0.1
 """What is kept of the speed limit for gusts, of the wind believed in."""
 
+_SHEAR_S = 0.7
+"""What is kept of it while climbing, for wind that grows with height: so long a climb at the wind
+believed in over the height. By the logarithmic law wind grows over a metre by a fifth of that, and
+the belief and the vehicle together take 3.5 s to follow."""
+
 _VERTICAL_GUSTS = 0.04
 """What is kept of the limits of climb and descent for gusts, of the wind believed in."""
 
@@ -92,7 +97,8 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
             )  # fmt: skip
             # over ground a gust must not lead far beyond the limit either
             wind_mps = math.sqrt(wind_north_mps**2 + wind_east_mps**2)
-            within_mps = vehicle.reference_max_mps - _GUSTS * wind_mps
+            growth = _SHEAR_S * max(-x[VZ], 0.0) / max(-x[Z], 1.0)
+            within_mps = vehicle.reference_max_mps - (_GUSTS + min(growth, 0.5)) * wind_mps
             share = min(speed_mps, within_mps, max(most_mps, 0.0)) / speed_mps
         command.values[0] = share * first - wind_north_mps
         command.values[1] = share * second - wind_east_mps

@@ -204,10 +204,12 @@ def covered_since(flight: FlightRecord, known: Scenario, since: IntArray) -> Int
 def _covered_at(
     x: NDArray[np.float64], flying: NDArray[np.bool_], known: Scenario, w: int, since: int
 ) -> int:
-    """The sample in which a waypoint was covered, not before `since`; T: never."""
-    covers = covering_samples(known, w, x[since:]) & flying[since:]
+    """The sample in which a waypoint was covered that is there since a sample; T: never."""
+    # what comes at a sample comes after that sample was judged
+    first = since + 1 if since else 0
+    covers = covering_samples(known, w, x[first:]) & flying[first:]
     found = covers.any(axis=1)
-    return since + int(found.argmax()) if found.any() else len(x)
+    return first + int(found.argmax()) if found.any() else len(x)
 
 
 def _flying(flight: FlightRecord) -> NDArray[np.bool_]:
