@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from uas_coverage_baselines.by_legs import LegMission
-from uas_coverage_baselines.routing import SearchEffort
+from uas_coverage_baselines.routing import Routes, SearchEffort
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
@@ -65,6 +65,7 @@ class Tour:
         self.options = options or TourOptions()
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
+        self._has_acted = False
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -73,7 +74,11 @@ class Tour:
         quick.act(first_sight(brief))
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Search the order from the starts."""
+        """Search the order from the starts; that of a mission under way, when it goes on."""
+        self._flown: Routes | None = None
+        if may_go_on := self._has_acted and self._by_legs is None:
+            self._flown = self._schedule.order
+        self._has_acted, self._seed = False, seed
         self._by_legs: LegMission | None = None
         if brief.execution is not None:
             effort = SearchEffort(self.options.moves)
@@ -96,14 +101,19 @@ class Tour:
         self._returns = np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(brief, self._arena, self.options.moves)
-        self._find_order(self._view(first_sight(brief)), seed)
+        self._brief, self._has_order = brief, not may_go_on
+        if self._has_order:
+            self._find_order(self._view(first_sight(brief)), seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Plan for each flying UAS, in order, and fly the first command of each plan."""
+        self._has_acted = True
         if self._by_legs is not None:
             self.last_decision = None
             return self._by_legs.commands(swarm)
         view = self._view(swarm)
+        if not self._has_order:
+            self._go_on(view, swarm.step)
         self._schedule.update(view)
         others_m = self._where_others_go(view)
         commands: dict[str, Command] = {}
@@ -117,6 +127,14 @@ class Tour:
 
     def _find_order(self, view: View, seed: int) -> None:
         self._schedule.begin(view, seed)
+
+    def _go_on(self, view: View, step: int) -> None:
+        """Have an order for a mission whose scene is another, or for a new one."""
+        self._has_order = True
+        if step > 0 and self._flown is not None:
+            self._schedule.go_on(view, self._flown)
+        else:
+            self._find_order(self._view(first_sight(self._brief)), self._seed)
 
     def _fly(self, i: int, view: View, others_m: FloatArray) -> Command:
         task = self._task(i, view)

@@ -74,7 +74,6 @@ class Schedule:
         self.order = empty_routes(len(brief.uas))
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
-        self._is_new = True
 
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
@@ -89,27 +88,36 @@ class Schedule:
         ]
         self.take(min(orders, key=lambda order: order.cost_s), view)
 
+    def go_on(self, view: View, order: Routes) -> None:
+        """Search from an order that was flown until the scene became another."""
+        self.order = order
+        self._drop_covered(view)
+        kept, better = self._searched_again(view)
+        self.take(min(better, kept, key=lambda order: order.cost_s), view)
+
     def update(self, view: View) -> None:
         """Drop what is covered, and search again where something has happened."""
+        self._drop_covered(view)
+        self._time_legs(view)
+        if self._has_changed(view):
+            kept, better = self._searched_again(view)
+            worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
+            self.take(better if worthwhile else kept, view)
+
+    def _drop_covered(self, view: View) -> None:
         open_ = view.uncovered
         routes = tuple(route[open_[route]] for route in self.order.routes)
         left_out = self.order.left_out[open_[self.order.left_out]]
         trips = tuple(tuple(trip[open_[trip]] for trip in trips) for trips in self.order.trips)
         self.order = replace(self.order, routes=routes, left_out=left_out, trips=trips)
-        if self._is_new and self._packs is not None:  # planned in mid-mission, as if at the start
-            self._seen, self._legs_left_s = view, self._legs_left(view)
-        self._is_new = False
-        self._time_legs(view)
-        if self._has_changed(view):
-            task, fresh = self.task(view), self._fresh_packs(view)
-            kept = improve_trips(task, self.order, SearchEffort(0), 0, fresh)
-            efforts = (SearchEffort(_MOVES_AGAIN, hottest_s=1.5), SearchEffort(_MOVES_AGAIN))
-            found = [
-                improve_trips(task, kept, effort, round(view.time_s), fresh) for effort in efforts
-            ]
-            better = min(found, key=lambda order: order.cost_s)
-            worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
-            self.take(better if worthwhile else kept, view)
+
+    def _searched_again(self, view: View) -> tuple[Routes, Routes]:
+        """The present order with all that is open, and the best that was found from it."""
+        task, fresh = self.task(view), self._fresh_packs(view)
+        kept = improve_trips(task, self.order, SearchEffort(0), 0, fresh)
+        efforts = (SearchEffort(_MOVES_AGAIN, hottest_s=1.5), SearchEffort(_MOVES_AGAIN))
+        found = [improve_trips(task, kept, effort, round(view.time_s), fresh) for effort in efforts]
+        return kept, min(found, key=lambda order: order.cost_s)
 
     def take(self, order: Routes, view: View) -> None:
         """Fly an order from now on."""

@@ -28,6 +28,7 @@ from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work, done
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -115,6 +116,22 @@ class MissionPlan:
     order: Routes
     cost_s: float
     troubles: Mapping[int, str]
+
+    def thought_of(self, swarm: SwarmState, planned: Mapping[int, Planned]) -> NDArray[np.bool_]:
+        """(W,) waypoints that are visited, now or with a later pack, or were left out.
+
+        Args:
+            swarm: As it is now.
+            planned: What is flown of the plan.
+        """
+        known = np.zeros(len(swarm.uncovered), np.bool_)
+        known[self.order.left_out] = True
+        for u, trips in enumerate(self.order.trips):
+            if swarm.packs_left[u]:
+                known[np.concatenate([*trips, np.zeros(0, np.int64)])] = True
+        for each in planned.values():
+            known[each.route[each.open_visits(swarm.step, swarm.uncovered)]] = True
+        return known
 
 
 def plan_mission(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
-from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
+from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
@@ -26,7 +26,8 @@ from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
-from uas_coverage_baselines.trajectory.waiting import who_waits
+from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
+from uas_coverage_baselines.trajectory.waiting import opens_again, opens_first, who_waits
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
     Handover,
@@ -46,9 +47,6 @@ _AS_PLANNED = 1e-6  # of states
 _AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
 _HOME_AFTER_S = 30.0  # without a plan for so long a UAS flies home
 _PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is flown has to
-_OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first
-_OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
-_OPENS_AGAIN_S = 26.0  # and at least so long
 _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _SOON_S = BRAKING_S  # a visit to what is still blocked so soon is put off,
@@ -72,6 +70,7 @@ class Trajectory:
         self.options = options or TrajectoryOptions()
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
+        self._has_acted = False
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -84,7 +83,9 @@ class Trajectory:
         quick._safeguard.evade([0], {}, [0])
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Plan the mission from the starts."""
+        """Plan the mission from the starts; one that may be under way, when it goes on."""
+        self._under_way = self._kept(brief) if self._has_acted else None
+        self._has_acted = False
         self._brief, self._seed = brief, seed
         self._by_legs: LegMission | None = None
         self.mission_plan = None
@@ -106,20 +107,41 @@ class Trajectory:
         self._is_handed_over = False
         self._without_plan_since = np.full(len(brief.uas), -1)
         self._flown_as_planned = set(range(len(brief.uas)))
-        swarm = first_sight(brief)
-        self._world.update(swarm)
         self._silent = self._silent_then = np.zeros(len(brief.uas), np.bool_)
         self._down = np.zeros(len(brief.uas), np.bool_)
-        self._back = self._down
+        self._back, self._blocked = self._down, np.zeros(len(brief.waypoints), np.bool_)
+        if self._under_way is None:
+            self._begin(first_sight(brief))
+
+    def _kept(self, brief: MissionBrief) -> UnderWay:
+        """What was flown, if it may be flown on in this scene."""
+        if self._by_legs is not None or self.mission_plan is None:
+            return UnderWay()
+        order = self.mission_plan.order
+        if not still_clear(self._brief, brief):
+            return UnderWay(order)
+        return UnderWay(order, self._planned, self._safeguard.backups)
+
+    def _begin(self, swarm: SwarmState) -> None:
+        """Make the first plan of a mission, or of one under way since its scene is another."""
+        before = (self._under_way or UnderWay()).at(swarm)
+        if swarm.step == 0:
+            swarm = first_sight(self._brief)
+        self._world.update(swarm)
+        self._planned, self._order = dict(before.planned), before.order
+        self._safeguard.backups.update(before.backups)
         self._make_plan(swarm, self._seen_movers(swarm))
-        if brief.conditions is not None and brief.conditions.mean_mps > 0.0:
+        if (said := self._brief.conditions) is not None and said.mean_mps > 0.0:
             self._steering = self._steer()  # no flight that is planned in still air is flown
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
+        self._has_acted = True
         if self._by_legs is not None:
             self.last_decision = None
             return self._by_legs.commands(swarm)
+        if self.mission_plan is None:
+            self._begin(swarm)
         self._world.update(swarm)
         self._silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
         movers = self._seen_movers(swarm)
@@ -277,8 +299,11 @@ class Trajectory:
             return "a UAS is lost"
         if (flying & self._silent_then).any() or self._back.any():
             return "a UAS is back"
-        if waited and (swarm.uncovered & ~self._thought_of(swarm)).any() and self._planned:
-            return "missed a waypoint"
+        if waited and self._planned:
+            beyond = self._latest_visit < self._planned_at  # no battery reaches them
+            known = self.mission_plan.thought_of(swarm, self._planned) | beyond
+            if (swarm.uncovered & ~known).any():
+                return "missed a waypoint"
         if not len(movers):
             return None
         if len(movers) != len(self._seen) or movers.has_turned(self._seen):
@@ -311,21 +336,8 @@ class Trajectory:
             ends[u] = swarm.step < end
         return ends
 
-    def _thought_of(self, swarm: SwarmState) -> BoolArray:
-        """(W,) waypoints that a plan visits, or that no battery reaches."""
-        assert self.mission_plan is not None
-        known = np.zeros(len(swarm.uncovered), np.bool_)
-        known[self.mission_plan.order.left_out] = True
-        known |= self._latest_visit < self._planned_at
-        for u, trips in enumerate(self.mission_plan.order.trips):
-            if swarm.packs_left[u]:
-                known[np.concatenate([*trips, np.zeros(0, np.int64)])] = True
-        for planned in self._planned.values():
-            known[planned.route[planned.open_visits(swarm.step, swarm.uncovered)]] = True
-        return known
-
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
-        first, self._step = self.mission_plan is None, swarm.step
+        first, self._step = self.mission_plan is None and self._order is None, swarm.step
         flying = swarm.status == FLYING
         opens = self._opens(movers)
         earliest = np.where(opens > 0, opens, 0)
@@ -342,23 +354,22 @@ class Trajectory:
             orders = options.orders if n_uas <= _ONE_SEARCH else 1
             planned = options.planned_orders
         larger = min(max(n_uas * len(unknown) / _SMALL, 1.0), _LARGER)
-        effort = Effort(
-            orders,
-            planned,
-            round(larger * options.moves),
-            options.programs,
-            self.total_weight,
-            options.threads,
-        )
+        moves, weight = round(larger * options.moves), self.total_weight
+        effort = Effort(orders, planned, moves, options.programs, weight, options.threads)
         self._latest_visit = np.full(len(unknown), NEVER)
         self._waiting = who_waits(self._fleet, self._way_home, moment, unknown)
         if unknown.any():
             latest = self._waiting.latest
             self._latest_visit[unknown] = swarm.step + latest[unknown]
-            visit = np.minimum(latest, self._guess(moment, unknown, effort))
+            if self.mission_plan is None:
+                opens_at = opens_first(self._fleet, moment, unknown, moves, self._seed)
+            else:
+                steps_left = [len(p.course.rest(swarm.step).u) for p in self._planned.values()]
+                opens_at = opens_again(steps_left, self._brief.dt_s)
+            visit = np.minimum(latest, opens_at)
             moment.earliest[unknown] = visit[unknown]
             moment = replace(moment, uncovered=moment.uncovered & ~(unknown & (latest < 0)))
-        kept = None
+        kept = self._order if self.mission_plan is None else None
         # changes of an order in which one that is back has no part rarely give it one
         back = (flying & self._silent_then).any() or self._back.any()
         if self.mission_plan is not None and (self.mission_plan.order.trips or not back):
@@ -425,16 +436,3 @@ class Trajectory:
             self.mission_plan = replace(better, order=order)
             self._planned |= better.planned
             self._ends |= {u: p.course.end for u, p in better.planned.items()}
-
-    def _guess(self, moment: Moment, unknown: BoolArray, effort: Effort) -> int:
-        """Steps after which a visit to what is blocked is planned, until more is known."""
-        dt_s = self._brief.dt_s
-        if self.mission_plan is not None:
-            rest_s = [dt_s * len(p.course.rest(self._step).u) for p in self._planned.values()]
-            later_s = _OPENS_AGAIN_SHARE * float(np.mean(rest_s or [0.0]))
-            return round(max(_OPENS_AGAIN_S, later_s) / dt_s)
-        others = moment.uncovered & ~unknown
-        task = self._fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
-        search = SearchEffort(effort.moves)
-        order = improve_routes(task, empty_routes(task.n_uas), search, self._seed)
-        return round(max(_OPENS_AGAIN_S, _OPENS_SHARE * float(order.seconds.mean())) / dt_s)

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_env.mission import Range
 from uas_coverage_env.vehicle import DOD
 
 _AS_LONG_S = 10.0  # a UAS that can wait nearly as long as another may do so, too
+_OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first
+_OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
+_OPENS_AGAIN_S = 26.0  # and at least so long
 _TOO_LATE_S = 12.0  # before a UAS has to set off home: then it no longer waits
 
 
@@ -72,3 +77,33 @@ def who_waits(fleet: Fleet, way_home: Range, moment: Moment, blocked: NDArray[np
     keeps |= may_cover & (battery_s >= mission_s)[:, None]
     latest = np.where(longest_s >= _TOO_LATE_S, np.round(longest_s / brief.dt_s), -1.0)
     return Waiting(blocked & ~keeps, latest.astype(np.int64))
+
+
+def opens_first(
+    fleet: Fleet, moment: Moment, unknown: NDArray[np.bool_], moves: int, seed: int
+) -> int:
+    """Steps after which a visit to what is blocked is planned at first: at the end of other work.
+
+    Args:
+        fleet: The mission.
+        moment: From where.
+        unknown: (W,) what is blocked.
+        moves: Of the search for the other work's order.
+        seed: Likewise.
+    """
+    others = moment.uncovered & ~unknown
+    task = fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
+    order = improve_routes(task, empty_routes(task.n_uas), SearchEffort(moves), seed)
+    late_s = _OPENS_SHARE * float(order.seconds.mean())
+    return round(max(_OPENS_AGAIN_S, late_s) / fleet.brief.dt_s)
+
+
+def opens_again(left_steps: Sequence[int], dt_s: float) -> int:
+    """Steps after which such a visit is planned later.
+
+    Args:
+        left_steps: What is left of each flight.
+        dt_s: Length of a step [s].
+    """
+    later_s = _OPENS_AGAIN_SHARE * float(np.mean([dt_s * n for n in left_steps] or [0.0]))
+    return round(max(_OPENS_AGAIN_S, later_s) / dt_s)

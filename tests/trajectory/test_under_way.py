@@ -1,0 +1,79 @@
+"""A mission whose scene changes in flight: planned from where it is, flown as planned."""
+
+import pytest
+from uas_coverage_baselines.tour import Tour, TourOptions
+from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
+from uas_coverage_baselines.trajectory.under_way import still_clear
+
+from uas_coverage_env import generate_scenario, load_planner, rollout
+from uas_coverage_env.flight import accomplished
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.world import GoTo
+
+GAPS_S = (15.0, 15.0)
+
+
+def patrol(seed):
+    """A small town whose waypoints are all asked for three times."""
+    town = generate_scenario(seed=seed, n_uas=1, n_waypoints=10, n_obstacles=3)
+    every = {"again_after_s": GAPS_S}
+    waypoints = tuple(waypoint.model_copy(update=every) for waypoint in town.waypoints)
+    return town.model_copy(update={"waypoints": waypoints, "relaunch": True})
+
+
+class Watched(Trajectory):
+    """Keeps the kinds of its commands."""
+
+    def __init__(self):
+        super().__init__(TrajectoryOptions(orders=1, moves=20_000, programs=40))
+        self.commands = []
+
+    def act(self, swarm):
+        commands = super().act(swarm)
+        self.commands += commands.values()
+        return commands
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_what_is_asked_for_again_in_flight_is_flown_as_planned_and_within_the_limits(seed):
+    planner = Watched()
+    flight = rollout(patrol(seed), planner)
+    assert accomplished(flight)
+    assert flight.breaches == 0
+    assert sum(decision.fallback for decision in flight.decisions) == 0
+    # nothing but a landing is left to guidance
+    assert all(each.mode == "return" for each in planner.commands if isinstance(each, GoTo))
+
+
+def test_a_planner_of_a_mission_under_way_begins_a_new_one_as_a_fresh_planner_does():
+    town = generate_scenario(seed=4, n_uas=1, n_waypoints=6, n_obstacles=2)
+    for name in ("trajectory", "tour"):
+        used = load_planner(name, {"moves": "20000"})
+        rollout(patrol(4), used, max_steps=40)
+        again = rollout(town, used, seed=3)
+        assert (again.x == rollout(town, load_planner(name, {"moves": "20000"}), seed=3).x).all()
+
+
+def test_tour_goes_on_from_its_order_without_a_long_search():
+    searches = []
+
+    class Counted(Tour):
+        def _find_order(self, view, seed):
+            searches.append(view.time_s)
+            super()._find_order(view, seed)
+
+    flight = rollout(patrol(4), Counted(TourOptions(moves=20_000)))
+    assert accomplished(flight)
+    assert searches == [0.0]
+
+
+def test_only_a_scene_with_at_most_more_waypoints_is_as_clear_as_it_was():
+    town = generate_scenario(seed=4, n_uas=1, n_waypoints=6, n_obstacles=2)
+    brief = MissionBrief.of(town)
+    more = town.model_copy(update={"waypoints": (*town.waypoints, town.waypoints[0])})
+    less = town.model_copy(update={"waypoints": town.waypoints[1:]})
+    other = town.model_copy(update={"obstacles": town.obstacles[1:]})
+    assert still_clear(brief, brief)
+    assert still_clear(brief, MissionBrief.of(more))
+    assert not still_clear(brief, MissionBrief.of(less))
+    assert not still_clear(brief, MissionBrief.of(other))
