@@ -98,6 +98,11 @@ MISTAKES = {
         "tilt_max_rad = 0.3",
         r"tilt_max_rad 0\.3.*v_xy_max_mps",
     ),
+    "next to no tilt": (
+        "tilt_max_rad",
+        "tilt_max_rad = 1e-308",
+        r"tilt_max_rad 1e-308.*v_xy_max_mps",
+    ),
     "rotors too weak": ("speed_max_radps", "speed_max_radps = 600", r"speed_max_radps"),
     "lift beyond free fall": ("lift_min_N", "lift_min_N = -16", r"lift_min_N -16.*weight"),
     "tangent beyond empty": (

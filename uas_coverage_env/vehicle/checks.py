@@ -102,6 +102,7 @@ def completed_thrust_correction(vehicle: Parts) -> ThrustCorrection:
 
     A slope is judged by the power that it adds at its limit, as a share of hover power.
     """
+    _check_trim(vehicle)
     given, limits, power = vehicle.thrust_correction, vehicle.limits, vehicle.power
     computed = fit_thrust_correction(vehicle, _FIT_SAMPLES).model_dump()
     for name, reach, at in (
@@ -144,14 +145,19 @@ def check_limits(vehicle: Parts) -> None:
                 f"{vehicle.rotor.speed_max_radps:.4g}; limits.{name} {getattr(limits, name)} takes "
                 f"{needed_N:.4g} N, lower it"
             )
+    _check_torques(vehicle)
+    _check_supply(vehicle)
+
+
+def _check_trim(vehicle: Parts) -> None:
+    """The tilt of the highest speed, without which no thrust correction can be fitted."""
+    limits = vehicle.limits
     trim_rad = vehicle.trim_tilt_rad_per_mps * limits.v_xy_max_mps
     if trim_rad >= limits.tilt_max_rad:
         raise ValueError(
             f"limits.tilt_max_rad {limits.tilt_max_rad} does not hold v_xy_max_mps, "
             f"which needs {trim_rad:.4g} rad; raise it"
         )
-    _check_torques(vehicle)
-    _check_supply(vehicle)
 
 
 def _check_torques(vehicle: Parts) -> None:
