@@ -159,6 +159,28 @@ def test_only_a_uas_that_can_cover_it_waits_for_it():
     assert world.state.status[0] == SWAPPING or len(world.known.waypoints) == 3
 
 
+@pytest.mark.parametrize(("other_flies", "packs_used"), [(True, 2), (False, 3)])
+def test_one_whose_last_sortie_covered_nothing_waits_while_another_flies(other_flies, packs_used):
+    beside = waypoint((46.0, 30.0, -10.0), 4.0)
+    world = World(mission(again(NEAR, 60.0), again(beside, 170.0), packs=5))
+    home = GoTo(None, mode="return")
+    for w in range(2):
+        while world.state.uncovered[w]:
+            world.step({"uas_1": GoTo(w), "uas_2": HOVERS})
+    used = 1
+    for _ in range(250):
+        flies = world.state.status[0] == FLYING
+        away = flies and used == 2 and not world.state.departed[0]
+        commands = {
+            "uas_1": Velocity(0.0, -3.0, 30.0) if away else home,
+            "uas_2": HOVERS if other_flies else home,
+        }
+        world.step({name: commands[name] for name in world.active})
+        used += not flies and world.state.status[0] == FLYING
+    assert world.state.uncovered.tolist() == [False, False, True, True]
+    assert used == packs_used
+
+
 def test_agents_see_it_open_again_and_their_episode_goes_on_while_they_swap():
     scenario = mission(again(NEAR, 30.0), starts_m=STARTS_M[:1], packs=3)
     env: Any = parallel_env(scenario, action="waypoint")

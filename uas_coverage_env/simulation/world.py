@@ -272,7 +272,9 @@ class World:
         if len(uncovered) > len(state.uncovered):
             # one that was called home because nothing was left may have something to do now
             state.returning[:] = False
-            state.packs[:, PACK_COVERED] = 1
+            if not (state.status == FLYING).any():
+                # likewise one whose last sortie has covered nothing
+                state.packs[:, PACK_COVERED] = 1
         due_step = np.zeros(len(uncovered) if len(state.due_step) else 0, dtype=np.int64)
         due_step[: len(state.due_step)] = state.due_step
         self._state = state._replace(uncovered=uncovered, due_step=due_step)

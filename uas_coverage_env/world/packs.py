@@ -27,8 +27,8 @@ from uas_coverage_env.world.state import (
 AHEAD_S = 5.0
 """No UAS takes off where another one, flying on as it does, would come too near within this [s]."""
 
-NOTHING, LATER, NOW = range(3)
-"""When there is something to do."""
+NOTHING, NOW, LATER = 0, 1, 2
+"""When there is something to do; now and later add up."""
 
 PACKS_DTYPE = np.dtype(
     (
@@ -138,13 +138,13 @@ def is_clear(arena, moving_m, x, status, i, ahead_s):
 
 
 @inlined_kernel
-def _has_something_to_do(arena, state, i):
+def _to_do(arena, state, i):
     """Whether a waypoint is open that UAS i can cover, and time left to fly there and back.
 
     Straight and at full speed: what is too late so, is too late by any route.
 
     Returns:
-        NOTHING, LATER or NOW: LATER where such a waypoint is only going to be asked for again.
+        NOTHING, or the sum of NOW and LATER: such a waypoint is going to be asked for again.
     """
     rules = arena.rules[0]
     uas = arena.uas[i]
@@ -165,9 +165,7 @@ def _has_something_to_do(arena, state, i):
         north_m = waypoint.position_m[0] - state.x[i, X]
         east_m = waypoint.position_m[1] - state.x[i, Y]
         if math.sqrt(north_m * north_m + east_m * east_m) - waypoint.radius_m < reach_m:
-            if state.uncovered[w]:
-                return NOW
-            found = LATER
+            found |= NOW if state.uncovered[w] else LATER
     return found
 
 
@@ -230,7 +228,7 @@ def swap_packs(arena, state, outcome):
     for i in range(n_uas):
         if state.status[i] == SWAPPING and (
             over
-            or _has_something_to_do(arena, state, i) == NOTHING
+            or _to_do(arena, state, i) == NOTHING
             or deaf_until(arena, state, i, step) == NEVER
         ):
             _end(state, i, outcome)
@@ -242,10 +240,10 @@ def swap_packs(arena, state, outcome):
         if state.status[i] != SWAPPING:
             continue
         waits = kept[PACK_COVERED] == 0 and out <= kept[PACK_OUT]
-        later = _has_something_to_do(arena, state, i) == LATER
-        works |= later or not waits
+        to_do = _to_do(arena, state, i)
+        works |= not waits or to_do & LATER > 0
         if (
-            not later
+            to_do & NOW > 0
             and not waits
             and step >= kept[PACK_READY]
             and deaf_until(arena, state, i, step) <= step

@@ -7,6 +7,7 @@ from matplotlib.patches import Patch
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.replay.figures.style import columns_of, printed, rows, shade
 
 _PAINT = {
@@ -25,10 +26,9 @@ def modes_figure(flight: Flight) -> Figure:
     with printed():
         figure, (coverage, bars) = rows(2.2 + 0.24 * len(names), [2.0, 0.5 + 0.5 * len(names)])
         coverage.step(flight.time_s, flight.covered, where="post", color=shade(colours.GREEN))
-        coverage.axhline(
-            len(flight.scenario.waypoints), color=shade(colours.FAINT), linewidth=0.8, ls=":"
-        )
-        coverage.set(ylabel="Covered", ylim=(0, 1.08 * len(flight.scenario.waypoints)))
+        asked = int(flight.covered[-1]) + open_waypoints(flight)
+        coverage.axhline(asked, color=shade(colours.FAINT), linewidth=0.8, ls=":")
+        coverage.set(ylabel="Covered", ylim=(0, 1.08 * max(asked, 1)))
         for i, mode, start_s, end_s in _runs(flight):
             colour, hatch = _PAINT[mode]
             bars.barh(
