@@ -227,9 +227,7 @@ def swap_packs(arena, state, outcome):
     works = False
     for i in range(n_uas):
         if state.status[i] == SWAPPING and (
-            over
-            or _to_do(arena, state, i) == NOTHING
-            or deaf_until(arena, state, i, step) == NEVER
+            over or _to_do(arena, state, i) == NOTHING or deaf_until(arena, state, i, step) == NEVER
         ):
             _end(state, i, outcome)
         out += state.status[i] == LANDED or state.status[i] == LOST
