@@ -54,7 +54,7 @@ PUBLIC = {
     Uas: {"name", "vehicle", "start_m", "soc_0", "radius_m", "dod_max", "sensors", "heading"},
     Waypoint: {
         *("kind", "position_m", "radius_m", "weight"),
-        *("sensor", "heights_m", "max_speed_mps"),
+        *("sensor", "heights_m", "max_speed_mps", "again_after_s"),
     },
     Decoration: {"name", "kind", "polygon_m"},
     Place: {"latitude_deg", "longitude_deg", "height_m"},
