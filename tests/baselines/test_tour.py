@@ -6,7 +6,7 @@ from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import load_scenario, rollout
-from uas_coverage_env.flight import Assistants, accomplished
+from uas_coverage_env.flight import Assistants, accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario
 from uas_coverage_env.simulation import World
@@ -133,6 +133,15 @@ def test_a_short_clock_leaves_out_what_nobody_comes_home_from_in_time(village):
     schedule = schedule_of(short, view_of(short))
     assert len(schedule.order.left_out) > 0
     assert schedule.order.seconds.max() < 120.0
+
+
+def test_charge_that_does_not_suffice_for_all_is_used():
+    scenario = load_scenario("low-charge:5")
+    flight = rollout(scenario, Tour(TourOptions(**QUICK)))
+    nearest = rollout(scenario, "nearest-waypoint")
+    assert not flight.violations
+    assert home(flight).all()
+    assert 0.9 * coverage(nearest) < coverage(flight) < 1.0
 
 
 def test_a_lost_uas_gets_no_command_and_the_other_goes_on(small_town):

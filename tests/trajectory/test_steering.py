@@ -7,7 +7,7 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_baselines.trajectory.steering import FAILURES, Failures
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import MODES, accomplished
+from uas_coverage_env.flight import MODES, accomplished, coverage, home
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.levels import LEVELS
 
@@ -37,6 +37,15 @@ def test_the_waypoints_of_a_uas_that_is_lost_in_wind_are_covered_by_the_other():
     lost = {"kind": "uas_lost", "at_s": 20.0, "uas": "uas_1"}
     flight = rollout(windy(4.0, events=(lost,)), planner(), seed=1)
     assert accomplished(flight)
+
+
+def test_a_uas_flies_home_in_time_where_no_return_mode_calls_it():
+    uas = tuple(one.model_copy(update={"soc_0": 0.3}) for one in windy(2.0).uas)
+    scenario = windy(2.0, uas=uas, uncertainty=LEVELS["moderate"].uncertainty)
+    flight = rollout(scenario, planner(), seed=3, return_mode=False, safety_filter=False)
+    assert not flight.violations
+    assert home(flight).all()
+    assert 0.0 < coverage(flight) < 1.0
 
 
 def test_in_still_air_nothing_is_steered():

@@ -7,6 +7,7 @@ from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
+from uas_coverage_env.mission.recall import Recall
 from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.mission.views import WorldView, first_sight
@@ -20,6 +21,7 @@ __all__ = [
     "MissionBrief",
     "MovingObstacleBrief",
     "Range",
+    "Recall",
     "Relaunch",
     "ReturnEstimate",
     "Way",

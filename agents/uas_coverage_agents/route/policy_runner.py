@@ -15,19 +15,18 @@ from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_netw
 from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, desk, no_record
-from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import (
     Approach,
     Attempts,
     Handover,
     MissionBrief,
+    Recall,
     WorldView,
     first_sight,
 )
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
-    FLYING,
     LANDED,
     Command,
     GoTo,
@@ -93,7 +92,7 @@ class RouteRunner:
         self._built_at = -_AGAIN_STEPS
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
         self._ahead = np.full(AHEAD, -1)
-        self._returns = np.zeros(n_uas, np.bool_)
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._act_on(first_sight(brief))
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
@@ -114,9 +113,8 @@ class RouteRunner:
         wanted = self._attempts.wanted(swarm.uncovered)
         if swarm.uncovered.any():
             # the rule of return mode, which need not be on
-            for u in np.flatnonzero((swarm.status == FLYING) & ~self._returns):
-                self._returns[u] = has_to_return(self._view.arena, self._view.state, u)
-        works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
+            self._returns = self._recall.update(swarm, self._view)
+        works = self._handover.workers(swarm) & ~self._returns
         self._forget_covered(swarm.uncovered, works)
         if self._has_to_build(swarm, wanted, blocked, works):
             self._build(swarm, wanted, blocked, works)

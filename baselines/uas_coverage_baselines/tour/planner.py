@@ -14,10 +14,16 @@ from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
 from uas_coverage_baselines.tour.schedule import Schedule, View
-from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import Handover, MissionBrief, WorldView, first_sight, without
+from uas_coverage_env.mission import (
+    Handover,
+    MissionBrief,
+    Recall,
+    WorldView,
+    first_sight,
+    without,
+)
 from uas_coverage_env.vehicle import VX, VY, VZ
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
 
@@ -98,7 +104,7 @@ class Tour:
         self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
         self._reference_mps = np.zeros((n_uas, 2))
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
-        self._returns = np.zeros(n_uas, np.bool_)
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(brief, self._arena, self.options.moves)
         self._brief, self._has_order = brief, not may_go_on
@@ -211,10 +217,7 @@ class Tour:
     def _view(self, swarm: SwarmState) -> View:
         self._world.update(swarm)
         flies = swarm.status == FLYING
-        for i in np.flatnonzero(flies & ~self._returns):
-            self._returns[i] = swarm.returning[i] or has_to_return(
-                self._arena, self._world.state, i
-            )
+        self._returns = self._recall.update(swarm, self._world)
         works = self._handover.workers(swarm)
         return View(
             x=swarm.x,

@@ -26,6 +26,7 @@ FloatArray = NDArray[np.float64]
 
 _RESERVE_S = 30.0  # what the return rule asks for beyond the way home at full speed
 _SPARE_S = 10.0  # left beside it in a new order, so that not every delay upsets the order
+_SCARCE_RESERVE_S, _SCARCE_SPARE_S = 20.0, 3.0  # the same once charge does not suffice for all
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
 _AGAIN_S = 5.0  # what a search could not mend is searched again after so long
 _PACE = 1.2  # flights take so much longer than their legs, until it is known better
@@ -72,6 +73,7 @@ class Schedule:
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
+        self._reserve_s, self._spare_s = _RESERVE_S, _SPARE_S
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
@@ -81,12 +83,24 @@ class Schedule:
             self.take(
                 improve_routes(self.task(view), self.order, SearchEffort(self._moves), seed), view
             )
+        order = self._searched(view, seed)
+        if len(order.left_out):
+            self._keep_less()
+            order = self._searched(view, seed)
+        self.take(order, view)
+
+    def _searched(self, view: View, seed: int) -> Routes:
+        """The best of several long searches that begin with nothing."""
         task, fresh, effort = self.task(view), self._fresh_packs(view), SearchEffort(self._moves)
         orders = [
             improve_trips(task, empty_routes(task.n_uas), effort, seed + attempt, fresh)
             for attempt in range(_FIRST_SEARCHES)
         ]
-        self.take(min(orders, key=lambda order: order.cost_s), view)
+        return min(orders, key=lambda order: order.cost_s)
+
+    def _keep_less(self) -> None:
+        """Use more of the charge: what is left at the end would have covered something."""
+        self._reserve_s, self._spare_s = _SCARCE_RESERVE_S, _SCARCE_SPARE_S
 
     def go_on(self, view: View, order: Routes) -> None:
         """Search from an order that was flown until the scene became another."""
@@ -122,6 +136,8 @@ class Schedule:
     def take(self, order: Routes, view: View) -> None:
         """Fly an order from now on."""
         self.order = order
+        if len(order.left_out):
+            self._keep_less()
         self._taken_under = self._seen = view
         self._legs_left_s = self._legs_left(view)
         self._expected_s = view.time_s + self._legs_left_s
@@ -142,7 +158,7 @@ class Schedule:
             return True
         if view.time_s < before.time_s + _AGAIN_S:
             return False
-        spare_s = self._budget_s(view) + _SPARE_S / self.pace - self._legs_left_s
+        spare_s = self._budget_s(view) + self._spare_s / self.pace - self._legs_left_s
         too_long = [len(route) and spare_s[u] < 0.0 for u, route in enumerate(self.order.routes)]
         return bool(len(self.order.left_out) or any(too_long))
 
@@ -166,7 +182,7 @@ class Schedule:
         uas = self._arena.uas
         left_s = self._charge_share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
         left_s = np.minimum(left_s, self._until_s - view.time_s)
-        return (left_s - _RESERVE_S - _SPARE_S) / self.pace
+        return (left_s - self._reserve_s - self._spare_s) / self.pace
 
     def _legs_left(self, view: View) -> FloatArray:
         """(U,) seconds of legs along each route and home, turns not counted."""

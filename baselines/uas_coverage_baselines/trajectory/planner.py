@@ -154,7 +154,7 @@ class Trajectory:
             self._steering = self._steer()
         if self._steering is not None:
             self.last_decision = Decision({})
-            return {**self._steering.commands(swarm, self._world.blocked()), **home}
+            return {**self._steering.commands(swarm, self._world), **home}
         flying = swarm.status == FLYING
         self._planned = {u: planned for u, planned in self._planned.items() if flying[u]}
         self._follow(swarm, movers)

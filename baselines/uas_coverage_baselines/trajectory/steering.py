@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import Routes, SearchEffort, improve_routes
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
-from uas_coverage_env.mission import Approach, Attempts, MissionBrief
+from uas_coverage_env.mission import Approach, Attempts, MissionBrief, Recall, WorldView
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]
@@ -83,19 +83,21 @@ class Steering:
         self._effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
         self._again = max(round(_AGAIN_S / brief.dt_s), 1)
         self._attempts, self._approach = Attempts(brief), Approach(brief)
+        self._recall = Recall(len(brief.uas))
         self._worked = np.zeros(len(brief.uas), np.bool_)
 
-    def commands(self, swarm: SwarmState, blocked: BoolArray) -> Mapping[str, Command]:
+    def commands(self, swarm: SwarmState, world: WorldView) -> Mapping[str, Command]:
         """A command for each UAS that flies.
 
         Args:
             swarm: What is seen, of UAS that take commands.
-            blocked: (W,) waypoints that something moving keeps all UAS from.
+            world: The same, updated.
         """
+        blocked = world.blocked()
         wanted = self._attempts.wanted(swarm.uncovered)
         free = wanted & ~blocked
         target = free if free.any() else wanted
-        works = np.isin(swarm.names, swarm.active) & ~swarm.returning
+        works = np.isin(swarm.names, swarm.active) & ~self._recall.update(swarm, world)
         self._search(swarm, works, target)
         flown_to = {
             swarm.names[u]: int(route[0])
