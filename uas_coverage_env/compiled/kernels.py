@@ -67,10 +67,6 @@ _LINE = 64
 """Bytes of a line of the cache."""
 
 
-class Constant(int):
-    """A whole number that `machine_code` compiles into a kernel: one for each value."""
-
-
 def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """A kernel compiled for arguments of these types, which the caller has to keep to.
 
@@ -78,12 +74,7 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return function
-    return function.compile(
-        tuple(
-            types.literal(int(argument)) if isinstance(argument, Constant) else typeof(argument)
-            for argument in arguments
-        )
-    )
+    return function.compile(tuple(map(typeof, arguments)))
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numba import prange
+from numba import prange, types
 from numba.np.ufunc import get_thread_id
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import rows_view
+from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
     inlined_kernel,
@@ -291,9 +292,77 @@ def _keep_end(missions, lane, observation, width):
         final.swarm[lane, column] = missions.lanes.swarm[lane, column]
 
 
-@inlined_kernel
-def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, observation, width):
-    """One lane of `step_batch`."""
+@kernel
+def _all_finite(numbers):
+    finite = True
+    for k in range(numbers.shape[0]):
+        # no early end: so it is a few vector instructions
+        finite &= math.isfinite(numbers[k])
+    return finite
+
+
+@kernel
+def _first_refused(pool, missions, orders):
+    """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
+    asked = missions.learners.asked
+    if _all_finite(rows_view(asked, 0, (asked.size,))):
+        return ACCEPTED
+    for lane in range(asked.shape[0]):
+        if orders[lane] != FLY:
+            continue
+        s = missions.lanes.scenario[lane]
+        i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
+        if i != ACCEPTED:
+            return lane * asked.shape[1] + i
+    return ACCEPTED
+
+
+class BatchRules(NamedTuple):
+    """What holds for all steps of all lanes."""
+
+    rules: Rules
+    autoreset: int
+    """NEXT_STEP, SAME_STEP or DISABLED."""
+    step_lane: int
+    """Address of `step_lane`, see `lane_code`."""
+
+
+class _Given(NamedTuple):
+    """What the lanes are given, in one piece."""
+
+    pool: MissionPool
+    missions: Missions
+    rules: Rules
+
+
+def _example() -> _Given:
+    pool = ScenarioPool("open_field")
+    paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
+    acting = acting_of(VELOCITY)
+    none = np.zeros(0, np.int64)
+    rules = Rules(acting, False, none, none, paying, observing_of(OBSERVATION))
+    return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
+
+
+_HANDOVER = Handover(_example)
+_keep, _take = _HANDOVER.keep, _HANDOVER.take
+
+
+@kernel
+def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
+    """One lane of `step_batch`.
+
+    Args:
+        kept: `_Given`, handed over.
+        lane: Which.
+        order: What it does.
+        thread: Which thread flies it, from 0 on.
+        autoreset: As in `BatchRules`.
+        before: See `step_batch`.
+        observation: See `step_batch`; written.
+        width: V. To know it when this is compiled makes a step a tenth faster.
+    """
+    pool, missions, rules = _take(kept)
     lanes = missions.lanes
     if rarely(order == REST):
         whole = (observation.shape[1], width)
@@ -330,44 +399,29 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
         _begin_lane(pool, missions, lane, order, observation, width)
 
 
-@kernel
-def _all_finite(numbers):
-    finite = True
-    for k in range(numbers.shape[0]):
-        # no early end: so it is a few vector instructions
-        finite &= math.isfinite(numbers[k])
-    return finite
+def _lane_types() -> tuple[types.Type, ...]:
+    number, observations = types.int64, types.Array(types.float32, 3, "C")
+    return number, number, number, number, number, observations, observations, number
+
+
+_LANE = Signature("kept lane order thread autoreset before observation width", _lane_types)
+_step_lane_at = _LANE.call
+
+
+def lane_code(width: int) -> int:
+    """Compile `step_lane`, or load it from the cache.
+
+    It takes ten seconds to compile, and is called at its address: once for all kernels below.
+
+    Args:
+        width: Numbers of an observation.
+    """
+    return _LANE.address_of(step_lane, width=width)
 
 
 @kernel
-def _first_refused(pool, missions, orders):
-    """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
-    asked = missions.learners.asked
-    if _all_finite(rows_view(asked, 0, (asked.size,))):
-        return ACCEPTED
-    for lane in range(asked.shape[0]):
-        if orders[lane] != FLY:
-            continue
-        s = missions.lanes.scenario[lane]
-        i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
-        if i != ACCEPTED:
-            return lane * asked.shape[1] + i
-    return ACCEPTED
-
-
-class BatchRules(NamedTuple):
-    """What holds for all steps of all lanes."""
-
-    rules: Rules
-    autoreset: int
-    """NEXT_STEP, SAME_STEP or DISABLED."""
-
-
-@kernel
-def step_batch(pool, missions, orders, rules, before, observation, width):
+def step_batch(pool, missions, orders, rules, before, observation):
     """Fly all lanes for one step, or begin missions in them.
-
-    One kernel for both: each takes ten seconds to compile.
 
     Args:
         pool: `MissionPool`.
@@ -376,7 +430,6 @@ def step_batch(pool, missions, orders, rules, before, observation, width):
         rules: `BatchRules`.
         before: (L, U, V) float32, the observations of the step before.
         observation: (L, U, V) float32, another array; written.
-        width: V. To know it when this is compiled makes a step a tenth faster.
 
     Returns:
         ACCEPTED, or lane · U + i of the first UAS whose action is not finite; then nothing has
@@ -384,37 +437,17 @@ def step_batch(pool, missions, orders, rules, before, observation, width):
     """
     refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
+        kept = _keep(_Given(pool, missions, rules.rules))
         for lane in range(orders.shape[0]):
-            step_lane(
-                pool, missions, lane, orders[lane], 0, rules.rules, rules.autoreset, before,
-                observation, width,
+            _step_lane_at(
+                rules.step_lane, kept, lane, orders[lane], 0, rules.autoreset, before, observation,
+                observation.shape[2],
             )  # fmt: skip
     return refused
 
 
-class _Given(NamedTuple):
-    """What the lanes are given, in one piece."""
-
-    pool: MissionPool
-    missions: Missions
-    rules: Rules
-
-
-def _example() -> _Given:
-    pool = ScenarioPool("open_field")
-    paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
-    acting = acting_of(VELOCITY)
-    none = np.zeros(0, np.int64)
-    rules = Rules(acting, False, none, none, paying, observing_of(OBSERVATION))
-    return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
-
-
-_HANDOVER = Handover(_example)
-_keep, _take = _HANDOVER.keep, _HANDOVER.take
-
-
 @allocating_kernel(parallel=True)
-def step_batch_in_threads(pool, missions, orders, rules, before, observation, width):
+def step_batch_in_threads(pool, missions, orders, rules, before, observation):
     """`step_batch`, the lanes shared among numba's threads.
 
     A function of its own: to start threads takes longer than to fly a few lanes, and numba's cache
@@ -423,11 +456,10 @@ def step_batch_in_threads(pool, missions, orders, rules, before, observation, wi
     refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
         kept = _keep(_Given(pool, missions, rules.rules))
-        autoreset = rules.autoreset
+        step_lane_at, autoreset = rules.step_lane, rules.autoreset
         for lane in prange(orders.shape[0]):
-            given = _take(kept)
-            step_lane(
-                given.pool, given.missions, lane, orders[lane], get_thread_id(), given.rules,
-                autoreset, before, observation, width,
+            _step_lane_at(
+                step_lane_at, kept, np.int64(lane), orders[lane], np.int64(get_thread_id()),
+                autoreset, before, observation, observation.shape[2],
             )  # fmt: skip
     return refused
