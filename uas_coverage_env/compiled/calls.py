@@ -85,7 +85,7 @@ def _address_of(kernel: Any, arguments: tuple[types.Type, ...], result: types.Ty
             f"{name} is no compiled function; decorate it with compiled.kernels.kernel"
         )
     try:
-        compiled = kernel.get_compile_result(result(*arguments))
+        compiled = getattr(kernel, "at_address", kernel).get_compile_result(result(*arguments))
     except errors.NumbaError as error:
         reason = " ".join(str(error).split())
         raise ValueError(f"{name} cannot be compiled: {reason[:400]}") from error
