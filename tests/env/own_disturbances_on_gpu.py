@@ -66,6 +66,6 @@ def compare(**settings):
     }
 
 
-def all():
+def compare_all():
     """In both plants; with one tuple of disturbances, which is compiled into the step."""
     return [compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]

@@ -114,5 +114,8 @@ if __name__ == "__main__":
     high = with_roles(still.model_copy(update={"min_height_m": 6.0}))
     flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}
     flown["packs"] = compare(swapping_ground(), out_and_back)
-    own = {"actions": own_actions_on_gpu.compare(), "disturbances": own_disturbances_on_gpu.all()}
+    own = {
+        "actions": own_actions_on_gpu.compare(),
+        "disturbances": own_disturbances_on_gpu.compare_all(),
+    }
     print(json.dumps({"missions": flown, **own}))
