@@ -16,17 +16,19 @@ from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
+    BatchRules,
+    lane_code,
+    step_batch,
+    step_batch_in_threads,
+)
+from uas_coverage_env.env.batch_memory import (
     DISABLED,
     DRAW,
     NEXT_STEP,
     REST,
     SAME_STEP,
-    BatchRules,
     SubEnvironments,
-    lane_code,
     new_missions,
-    step_batch,
-    step_batch_in_threads,
 )
 from uas_coverage_env.env.checkpoint import checked
 from uas_coverage_env.env.drawn import DrawnPool, pool_of
@@ -76,7 +78,7 @@ class CoverageBatch:
         n_uas: U, of the largest scenario.
         pool: The scenarios.
         missions: What happened, see `Missions`; the arrays are written by every step.
-        autoreset: As in `batch_kernel`.
+        autoreset: As in `batch_memory`.
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
