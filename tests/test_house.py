@@ -1,4 +1,4 @@
-"""What the whole repository keeps: the walls between rooms, types, form, the wheel."""
+"""What the whole repository keeps: what may import what, types, form, the wheel."""
 
 import ast
 import os
@@ -46,7 +46,7 @@ def ours() -> list[Path]:
     return [path for name in names if (path := ROOT / name).is_file()]
 
 
-def test_no_room_imports_a_room_above_it():
+def test_no_package_imports_a_package_above_it():
     tool = Path(sys.executable).with_name("lint-imports")
     output = checked(str(tool), "--no-cache", PYTHONPATH=os.pathsep.join(_source_folders()))
     assert "0 broken" in output
@@ -58,14 +58,14 @@ def test_no_imports_run_in_a_circle():
     imports = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
     assert len(imports) > 200
     TopologicalSorter(imports).prepare()  # raises a CycleError that names them
-    rooms: dict[str, set[str]] = {}
+    packages: dict[str, set[str]] = {}
     for name, imported in imports.items():
         if "." in name:
-            rooms.setdefault(_room(name), set()).update(map(_room, imported))
-    TopologicalSorter({name: used - {name} for name, used in rooms.items()}).prepare()
+            packages.setdefault(_package(name), set()).update(map(_package, imported))
+    TopologicalSorter({name: used - {name} for name, used in packages.items()}).prepare()
 
 
-def _room(module: str) -> str:
+def _package(module: str) -> str:
     return ".".join(module.split(".")[:2])
 
 

@@ -8,7 +8,7 @@ from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import layers_of, value_of
 from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.mission import MissionMaker
-from uas_coverage_agents.route.order import build, desk, no_record
+from uas_coverage_agents.route.order import build, no_record, route_workspace
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
 
 from uas_coverage_env import generate_scenario, rollout
@@ -39,7 +39,7 @@ def _built(scenario, wanted, late=None, works=None):
     lengths = np.zeros(len(brief.uas), np.int64)
     rng = np.random.default_rng(0)
     cost_s = build(
-        mission, score, home_score, wanted, 0.0, rng, desk(), no_record(), routes,
+        mission, score, home_score, wanted, 0.0, rng, route_workspace(), no_record(), routes,
         lengths,
     )  # fmt: skip
     return [routes[u, :n].tolist() for u, n in enumerate(lengths)], cost_s

@@ -1,9 +1,4 @@
-"""An own kind of action on numba's simulated GPU, and the same as an episode; prints JSON.
-
-Run as a program, with NUMBA_ENABLE_CUDASIM=1.
-"""
-
-import json
+"""An own kind of action on numba's simulated GPU, and the same as an episode: `simulated_gpu`."""
 
 import numpy as np
 from own_actions import CLIMB_RATE, faulty
@@ -37,7 +32,3 @@ def compare():
         "moved": bool((np.abs(episode.positions_m - start_m) > 1.0).any()),
         "refused": wrong.missions.refused.tolist(),
     }
-
-
-if __name__ == "__main__":
-    print(json.dumps(compare()))

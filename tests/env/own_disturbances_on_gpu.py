@@ -1,13 +1,8 @@
-"""Own disturbances on numba's simulated GPU, and the same as episodes; prints JSON.
-
-Run as a program, with NUMBA_ENABLE_CUDASIM=1.
-"""
-
-import json
-import sys
-from pathlib import Path
+"""Own disturbances on numba's simulated GPU, and the same as episodes: see `simulated_gpu`."""
 
 import numpy as np
+from own_actions import CLIMB_RATE
+from own_disturbances import deviating, drained, gusts, push, weak_rotors
 from practice_grounds import practice_ground
 
 from uas_coverage_env.disturbances import disturbances_of
@@ -16,23 +11,8 @@ from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import with_disturbances
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
-
-from own_actions import CLIMB_RATE
-from own_disturbances import deviating, drained, gusts, push, weak_rotors
-
 SEED, N_LANES, N_STEPS = 7, 2, 11
 GROUND = practice_ground(n_uas=2, max_steps=5)
-OWN = (
-    *disturbances_of(with_disturbances(GROUND, "moderate", 1)),
-    gusts(),
-    push(0.2, 0.0, 0.0),
-    weak_rotors(0.05),
-    deviating(mass=0.05, drag=0.2, power=0.1),
-    drained(0.01),
-)
-
-
 EVENTS = (
     {"kind": "uas_lost", "rate_per_h": 600.0},
     {"kind": "radio_lost", "rate_per_h": 1200.0, "for_s": 2.0, "then": "go_on"},
@@ -43,13 +23,22 @@ EVENTS = (
 EVENTFUL = GROUND.model_copy(
     update={"events": EVENTS, "sensing": {"position_noise_m": 0.5, "delay_steps": 1}}
 )
+OWN = (
+    *disturbances_of(with_disturbances(GROUND, "moderate", 1)),
+    gusts(),
+    push(0.2, 0.0, 0.0),
+    weak_rotors(0.05),
+    deviating(mass=0.05, drag=0.2, power=0.1),
+    drained(0.01),
+    *disturbances_of(EVENTFUL),  # its motor
+)
 
 
-def compare(ground=GROUND, disturbances=OWN, **settings):
+def compare(**settings):
     """Fly both ways past the end of missions; lanes have seeds of their own."""
-    settings = {"disturbances": disturbances, **settings}
-    missions = CudaMissions(N_LANES, ground, seed=SEED, **settings)
-    episodes = [Episode(ground, MissionSettings(**settings)) for _ in range(N_LANES)]
+    settings = {"disturbances": OWN, **settings}
+    missions = CudaMissions(N_LANES, EVENTFUL, seed=SEED, **settings)
+    episodes = [Episode(EVENTFUL, MissionSettings(**settings)) for _ in range(N_LANES)]
     flown = [0] * N_LANES
     for lane, episode in enumerate(episodes):
         episode.reset(SEED + lane)
@@ -77,6 +66,6 @@ def compare(ground=GROUND, disturbances=OWN, **settings):
     }
 
 
-if __name__ == "__main__":
-    own = [compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]
-    print(json.dumps([*own, compare(EVENTFUL, None)]))
+def compare_all():
+    """In both plants; with one tuple of disturbances, which is compiled into the step."""
+    return [compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]

@@ -1,13 +1,21 @@
 """Missions on numba's simulated GPU, and the same as episodes; prints how they compare, as JSON.
 
-Run as a program, with NUMBA_ENABLE_CUDASIM=1.
+Run as a program, with NUMBA_ENABLE_CUDASIM=1: see the fixture `flown_on_gpu`.
 """
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 from practice_grounds import practice_ground, with_roles
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
+
+import own_actions_on_gpu
+import own_disturbances_on_gpu
+
+from uas_coverage_env.env import cuda
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.memory import LIMITS, REWARD
@@ -98,9 +106,16 @@ def swapping_ground():
 
 
 if __name__ == "__main__":
+    # the simulator starts a thread of the processor for each of a block, whether it flies a lane or
+    # not: one that flies none is enough
+    cuda.THREADS_PER_BLOCK = N_LANES + 1
     still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=5)
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
     high = with_roles(still.model_copy(update={"min_height_m": 6.0}))
     flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}
     flown["packs"] = compare(swapping_ground(), out_and_back)
-    print(json.dumps(flown))
+    own = {
+        "actions": own_actions_on_gpu.compare(),
+        "disturbances": own_disturbances_on_gpu.compare_all(),
+    }
+    print(json.dumps({"missions": flown, **own}))

@@ -1,15 +1,10 @@
 """The same disturbances, from outside of the package, in single and batched environments."""
 
-import json
-import os
 import pickle
-import subprocess
-import sys
 
 import gymnasium
 import numba
 import numpy as np
-import own_disturbances_on_gpu
 import pytest
 from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
 from practice_grounds import practice_ground
@@ -200,18 +195,12 @@ def test_what_does_not_fit_is_refused():
             case()
 
 
-def test_they_run_on_a_simulated_gpu():
-    done = subprocess.run(
-        [sys.executable, own_disturbances_on_gpu.__file__],
-        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    for flown_on_gpu in json.loads(done.stdout):
-        assert flown_on_gpu["different"] == 0
-        assert flown_on_gpu["restarts"] >= 2
-        assert flown_on_gpu["apart"]
+def test_they_run_on_a_simulated_gpu(flown_on_gpu):
+    assert len(flown_on_gpu["disturbances"]) == 2
+    for row in flown_on_gpu["disturbances"]:
+        assert row["different"] == 0
+        assert row["restarts"] >= 2
+        assert row["apart"]
 
 
 def test_threads_draw_what_one_thread_draws():

@@ -1,16 +1,11 @@
 """Kinds of action from outside of the package, in every environment."""
 
-import json
 import math
-import os
 import pickle
-import subprocess
-import sys
 from typing import Any
 
 import gymnasium
 import numpy as np
-import own_actions_on_gpu
 import pytest
 from gymnasium import spaces
 from own_actions import (
@@ -138,15 +133,8 @@ def test_a_kind_that_goes_to_places_has_guidance():
     assert {info["status"] for info in infos.values()} == {UasStatus.LANDED}
 
 
-def test_it_runs_on_a_simulated_gpu():
-    done = subprocess.run(
-        [sys.executable, own_actions_on_gpu.__file__],
-        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {"different": 0, "moved": True, "refused": [True, False]}
+def test_it_runs_on_a_simulated_gpu(flown_on_gpu):
+    assert flown_on_gpu["actions"] == {"different": 0, "moved": True, "refused": [True, False]}
 
 
 @pytest.mark.parametrize("fault", [0, 1, 2], ids=["not finite", "no guidance", "no kind"])

@@ -35,12 +35,18 @@ class Signature:
         arguments: Callable[[], tuple[types.Type, ...]],
         result: types.Type = types.none,
     ) -> None:
+        self._names = names.split()
         self._arguments = arguments
         self._result = result
-        self.call: Any = _made(names.split(), arguments, result) if COMPILED else _call_plain
+        self.call: Any = _made(self._names, arguments, result) if COMPILED else _call_plain
 
-    def address_of(self, kernel: Any) -> int:
+    def address_of(self, kernel: Any, **constants: int) -> int:
         """Compile a kernel, or load it from the cache, and say where it lies.
+
+        Args:
+            kernel: Takes what is named.
+            **constants: Whole numbers among the arguments for whose values alone it is compiled;
+                they are handed over all the same.
 
         Returns:
             Its address, for one process: it must not be kept in what travels to another. With
@@ -51,7 +57,11 @@ class Signature:
         """
         if not COMPILED:
             return _kept(kernel)
-        return _address_of(kernel, self._arguments(), self._result)
+        arguments = tuple(
+            types.literal(constants[name]) if name in constants else kind
+            for name, kind in zip(self._names, self._arguments(), strict=True)
+        )
+        return _address_of(kernel, arguments, self._result)
 
 
 _PLAIN: list[Callable[..., Any]] = []
@@ -75,7 +85,7 @@ def _address_of(kernel: Any, arguments: tuple[types.Type, ...], result: types.Ty
             f"{name} is no compiled function; decorate it with compiled.kernels.kernel"
         )
     try:
-        compiled = kernel.get_compile_result(result(*arguments))
+        compiled = getattr(kernel, "at_address", kernel).get_compile_result(result(*arguments))
     except errors.NumbaError as error:
         reason = " ".join(str(error).split())
         raise ValueError(f"{name} cannot be compiled: {reason[:400]}") from error

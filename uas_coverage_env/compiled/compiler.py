@@ -20,11 +20,29 @@ from numba.core.registry import CPUDispatcher
 from uas_coverage_env.compiled.progress import COMPILATIONS
 
 
-class KernelDispatcher(CPUDispatcher):
+class _Dispatcher(CPUDispatcher):
+    """Numba's, with a notice to who waits for a compilation."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile, or load from the disk."""
+        # a compilation keeps most of what it makes: to look for garbage takes a fifth of its time
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            with COMPILATIONS.one(lambda: len(called_by(self))):
+                return super().compile(sig)
+        finally:
+            if collecting:
+                gc.enable()
+
+
+class KernelDispatcher(_Dispatcher):
     """A kernel: compiled for Python where Python calls it, and as a part where a kernel calls it.
 
     Attributes:
         part: What other kernels call.
+        at_address: What they call at its address (`calls.py`). Python cannot: to take a hundred
+            arrays out of Python's objects is more machine code than most of these kernels.
     """
 
     def __init__(
@@ -35,26 +53,13 @@ class KernelDispatcher(CPUDispatcher):
         pipeline_class: type[Compiler] | None = None,
     ) -> None:
         options = dict(targetoptions or {})
-        super().__init__(py_func, locals, options, pipeline_class or _KernelCompiler)
-        self.part = CPUDispatcher(
-            py_func,
-            locals,
-            {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
-            # threads call machine code
-            _KernelCompiler if options.get("parallel") else _PartCompiler,
-        )
-
-    def compile(self, sig: Any) -> Any:
-        """Compile for Python, or load from the disk."""
-        # a compilation keeps most of what it makes: to look for garbage takes a fifth of its time
-        collecting = gc.isenabled()
-        gc.disable()
-        try:
-            with COMPILATIONS.one(lambda: len(called_by(self))):
-                return super().compile(sig)
-        finally:
-            if collecting:
-                gc.enable()
+        compiler = pipeline_class or _KernelCompiler
+        super().__init__(py_func, locals, options, compiler)
+        options = {**options, "no_cpython_wrapper": True}
+        self.at_address = _Dispatcher(py_func, locals, options, compiler)
+        # threads call machine code
+        part_compiler = _KernelCompiler if options.get("parallel") else _PartCompiler
+        self.part = CPUDispatcher(py_func, locals, options, part_compiler)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What numba asks for where a kernel calls this one."""
@@ -72,10 +77,10 @@ class KernelDispatcher(CPUDispatcher):
         return self.part.is_compiling
 
 
-def called_by(kernel: KernelDispatcher) -> set[KernelDispatcher]:
+def called_by(kernel: CPUDispatcher) -> set[KernelDispatcher]:
     """All kernels that a kernel calls by their names, directly or not."""
     reached: set[KernelDispatcher] = set()
-    found = [kernel]
+    found: list[CPUDispatcher] = [kernel]
     while found:
         function = found.pop().py_func
         cells = (cell.cell_contents for cell in function.__closure__ or ())
@@ -105,6 +110,7 @@ class _Flags(Flags):
 class _KernelCompiler(Compiler):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
+        self.state.flags.no_cfunc_wrapper = True  # nothing is called from C
         self.state.flags = _Flags(self.state.flags)
         COMPILATIONS.begun()
 
@@ -174,6 +180,10 @@ class _PartLibrary(JITCodeLibrary):
         library._final_module = library._shared_module = binding.parse_bitcode(bitcode)
         library._make_known()
         return library
+
+
+class AddressCacheImpl(CompileResultCacheImpl):
+    """As numba's: how kernels that are called at their address are kept, apart from others."""
 
 
 class PartCacheImpl(CompileResultCacheImpl):

@@ -21,7 +21,7 @@ from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.cache import keep_on_disk
-from uas_coverage_env.compiled.compiler import KernelDispatcher, PartCacheImpl
+from uas_coverage_env.compiled.compiler import AddressCacheImpl, KernelDispatcher, PartCacheImpl
 
 
 def _decorator(**options: Any) -> Any:
@@ -34,6 +34,7 @@ def _decorator(**options: Any) -> Any:
             return function
         compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
         keep_on_disk(compiled)
+        keep_on_disk(compiled.at_address, AddressCacheImpl)
         keep_on_disk(compiled.part, PartCacheImpl)
         return compiled
 
@@ -67,10 +68,6 @@ _LINE = 64
 """Bytes of a line of the cache."""
 
 
-class Constant(int):
-    """A whole number that `machine_code` compiles into a kernel: one for each value."""
-
-
 def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """A kernel compiled for arguments of these types, which the caller has to keep to.
 
@@ -78,12 +75,7 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return function
-    return function.compile(
-        tuple(
-            types.literal(int(argument)) if isinstance(argument, Constant) else typeof(argument)
-            for argument in arguments
-        )
-    )
+    return function.compile(tuple(map(typeof, arguments)))
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:

@@ -10,22 +10,25 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.compiled.kernels import Constant, machine_code
+from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
+    BatchRules,
+    lane_code,
+    step_batch,
+    step_batch_in_threads,
+)
+from uas_coverage_env.env.batch_memory import (
     DISABLED,
     DRAW,
     NEXT_STEP,
     REST,
     SAME_STEP,
-    BatchRules,
     SubEnvironments,
     new_missions,
-    step_batch,
-    step_batch_in_threads,
 )
 from uas_coverage_env.env.checkpoint import checked
 from uas_coverage_env.env.drawn import DrawnPool, pool_of
@@ -75,7 +78,7 @@ class CoverageBatch:
         n_uas: U, of the largest scenario.
         pool: The scenarios.
         missions: What happened, see `Missions`; the arrays are written by every step.
-        autoreset: As in `batch_kernel`.
+        autoreset: As in `batch_memory`.
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
@@ -368,8 +371,7 @@ class CoverageBatch:
         before, free = self._observations
         if in_place:
             free = before
-        width = Constant(self.settings.observation_size)
-        given = (self.pool.arrays, self.missions, orders, rules, before, free, width)
+        given = (self.pool.arrays, self.missions, orders, rules, before, free)
         if self._kernel is None:
             kernel = step_batch if self._threads == 1 else step_batch_in_threads
             self._kernel = machine_code(kernel, given)
@@ -401,7 +403,7 @@ class CoverageBatch:
         rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, observing)
         # `_draw_next` comes between the end of a drawn mission and the next
         autoreset = DISABLED if self.draws and self.autoreset == SAME_STEP else self.autoreset
-        return BatchRules(rules, autoreset)
+        return BatchRules(rules, autoreset, lane_code(settings.observation_size))
 
     def _ask(self, actions: Any) -> None:
         actions = as_array("the swarms", actions)

@@ -1,15 +1,14 @@
 """One step of many missions, compiled: every lane is flown by `step_learners`, as a single one."""
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import prange
+from numba import prange, types
 from numba.np.ufunc import get_thread_id
-from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import rows_view
+from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
     inlined_kernel,
@@ -18,25 +17,34 @@ from uas_coverage_env.compiled.kernels import (
     rare_kernel,
     rarely,
 )
-from uas_coverage_env.compiled.memory import Memory, Values
-from uas_coverage_env.compiled.random import SEEDS, counted
+from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
 from uas_coverage_env.disturbances.act import begin_random
 from uas_coverage_env.env.act import acting_of, first_not_finite
 from uas_coverage_env.env.actions.velocity import VELOCITY
+from uas_coverage_env.env.batch_memory import (
+    DRAW,
+    FLY,
+    NEXT_STEP,
+    REST,
+    SAME_STEP,
+    SWARM_COVERED,
+    SWARM_ENERGY,
+    SWARM_FIRST_TERM,
+    SWARM_REWARD,
+    Missions,
+    new_missions,
+)
 from uas_coverage_env.env.kernel import ACCEPTED, Rules, step_learners
 from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
     ENERGY,
     FIRST_TERM,
-    LEARNERS,
     REPORT_SIZE,
     REWARD,
     SCRATCH,
     STATUS,
-    Learners,
-    Scratch,
 )
 from uas_coverage_env.env.observation import K_WAYPOINTS, OBSERVATION
 from uas_coverage_env.env.observation.nearest import NO_TARGET
@@ -52,103 +60,9 @@ from uas_coverage_env.env.pool import (
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
-from uas_coverage_env.world import ABSENT, FLYING, SWAPPING, WorldState
+from uas_coverage_env.world import ABSENT, FLYING, SWAPPING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
-from uas_coverage_env.world.state import STATE
-
-NEXT_STEP, SAME_STEP, DISABLED = range(3)
-"""When a mission that has ended begins anew: in the next step, in the same, or never by itself."""
-
-FLY, REST, DRAW = -3, -2, -1
-"""What a lane does in the coming step: fly, nothing, or begin a mission that is drawn; a number
-from 0 on begins a mission of that scenario."""
-
-SWARM_ENERGY, SWARM_COVERED, SWARM_REWARD, SWARM_FIRST_TERM = range(4)
-"""Columns of a swarm's report: sum of ENERGY, waypoints covered, the reward, and from
-SWARM_FIRST_TERM on the sums of its terms."""
-
-
-class SubEnvironments(NamedTuple):
-    """What L lanes are doing, with room for U UAS."""
-
-    seed: Annotated[NDArray[np.uint64], "L"]
-    """From which the scenarios are drawn."""
-    mission: Annotated[NDArray[np.int64], "L", Values(-1, np.iinfo(np.int64).max - 1)]
-    """Number of the mission since the lane was seeded, from 0 on."""
-    scenario: Annotated[NDArray[np.int64], "L", Values(0, "S")]
-    """Index in the pool."""
-    orders: Annotated[NDArray[np.int64], "L", Values(FLY, DRAW)]
-    """What it does in the coming step: FLY, or DRAW after an end (NEXT_STEP)."""
-    rewards: Annotated[NDArray[np.float64], "L", "U"]
-    """Of each UAS for the latest step."""
-    swarm: Annotated[NDArray[np.float64], "L", "Q"]
-    """Sums over the UAS, see SWARM_COVERED."""
-    terminated: Annotated[NDArray[np.bool_], "L"]
-    """No UAS flies any more, nor swaps packs."""
-    truncated: Annotated[NDArray[np.bool_], "L"]
-    """One still flies after the last step allowed."""
-
-
-LANES = Memory(SubEnvironments)
-
-
-class Final(NamedTuple):
-    """The end of the last mission that ended in a lane; SAME_STEP only."""
-
-    observation: Annotated[NDArray[np.float32], "L", "U", "V"]
-    report: Annotated[NDArray[np.int64], "L", "U", REPORT_SIZE]
-    swarm: Annotated[NDArray[np.float64], "L", "Q"]
-    candidates: Annotated[NDArray[np.int64], "L", "U", K_WAYPOINTS]
-
-
-FINAL = Memory(Final)
-
-
-class Missions(NamedTuple):
-    """All missions, a lane each.
-
-    The arrays are as large as the largest scenario needs. Rows of UAS that a lane's scenario does
-    not have are zero, with status ABSENT.
-    """
-
-    worlds: WorldState
-    """With an axis of lanes in front."""
-    learners: Learners
-    """Likewise."""
-    lanes: SubEnvironments
-    final: Final
-    scratch: Scratch
-    """With an axis of threads in front: all lanes that a thread flies share them, so they stay in
-    its cache."""
-    settled: NDArray[np.bool_]
-    """(L, U) it does not fly, and what it saw last lies in both arrays of observations."""
-
-
-def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missions:
-    """Missions of which none has begun, seeded with numbers of no meaning.
-
-    Args:
-        sizes: The largest of every named size, as `ScenarioPool.sizes`.
-        num_envs: L.
-        threads: How many share the lanes.
-    """
-    sizes = {**sizes, "L": num_envs, "Q": SWARM_FIRST_TERM + sizes["R"]}
-    missions = Missions(
-        STATE.zeros(sizes, lanes=num_envs),
-        LEARNERS.zeros(sizes, lanes=num_envs),
-        LANES.zeros(sizes),
-        FINAL.zeros(sizes),
-        SCRATCH.zeros(sizes, lanes=threads),
-        np.zeros((num_envs, sizes["U"]), dtype=np.bool_),
-    )
-    seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
-    missions.worlds.status[:] = FLYING
-    missions.lanes.seed[:] = seeds
-    missions.lanes.mission[:] = -1
-    missions.lanes.orders[:] = FLY
-    return missions
-
 
 _scratch_of = lane_view(SCRATCH, sized_by=ARENA)
 
@@ -291,9 +205,77 @@ def _keep_end(missions, lane, observation, width):
         final.swarm[lane, column] = missions.lanes.swarm[lane, column]
 
 
-@inlined_kernel
-def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, observation, width):
-    """One lane of `step_batch`."""
+@kernel
+def _all_finite(numbers):
+    finite = True
+    for k in range(numbers.shape[0]):
+        # no early end: so it is a few vector instructions
+        finite &= math.isfinite(numbers[k])
+    return finite
+
+
+@kernel
+def _first_refused(pool, missions, orders):
+    """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
+    asked = missions.learners.asked
+    if _all_finite(rows_view(asked, 0, (asked.size,))):
+        return ACCEPTED
+    for lane in range(asked.shape[0]):
+        if orders[lane] != FLY:
+            continue
+        s = missions.lanes.scenario[lane]
+        i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
+        if i != ACCEPTED:
+            return lane * asked.shape[1] + i
+    return ACCEPTED
+
+
+class BatchRules(NamedTuple):
+    """What holds for all steps of all lanes."""
+
+    rules: Rules
+    autoreset: int
+    """NEXT_STEP, SAME_STEP or DISABLED."""
+    step_lane: int
+    """Address of `step_lane`, see `lane_code`."""
+
+
+class _Given(NamedTuple):
+    """What the lanes are given, in one piece."""
+
+    pool: MissionPool
+    missions: Missions
+    rules: Rules
+
+
+def _example() -> _Given:
+    pool = ScenarioPool("open_field")
+    paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
+    acting = acting_of(VELOCITY)
+    none = np.zeros(0, np.int64)
+    rules = Rules(acting, False, none, none, paying, observing_of(OBSERVATION))
+    return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
+
+
+_HANDOVER = Handover(_example)
+_keep, _take = _HANDOVER.keep, _HANDOVER.take
+
+
+@kernel
+def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
+    """One lane of `step_batch`.
+
+    Args:
+        kept: `_Given`, handed over.
+        lane: Which.
+        order: What it does.
+        thread: Which thread flies it, from 0 on.
+        autoreset: As in `BatchRules`.
+        before: See `step_batch`.
+        observation: See `step_batch`; written.
+        width: V. To know it when this is compiled makes a step a tenth faster.
+    """
+    pool, missions, rules = _take(kept)
     lanes = missions.lanes
     if rarely(order == REST):
         whole = (observation.shape[1], width)
@@ -330,44 +312,29 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
         _begin_lane(pool, missions, lane, order, observation, width)
 
 
-@kernel
-def _all_finite(numbers):
-    finite = True
-    for k in range(numbers.shape[0]):
-        # no early end: so it is a few vector instructions
-        finite &= math.isfinite(numbers[k])
-    return finite
+def _lane_types() -> tuple[types.Type, ...]:
+    number, observations = types.int64, types.Array(types.float32, 3, "C")
+    return number, number, number, number, number, observations, observations, number
+
+
+_LANE = Signature("kept lane order thread autoreset before observation width", _lane_types)
+_step_lane_at = _LANE.call
+
+
+def lane_code(width: int) -> int:
+    """Compile `step_lane`, or load it from the cache.
+
+    It takes ten seconds to compile, and is called at its address: once for all kernels below.
+
+    Args:
+        width: Numbers of an observation.
+    """
+    return _LANE.address_of(step_lane, width=width)
 
 
 @kernel
-def _first_refused(pool, missions, orders):
-    """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
-    asked = missions.learners.asked
-    if _all_finite(rows_view(asked, 0, (asked.size,))):
-        return ACCEPTED
-    for lane in range(asked.shape[0]):
-        if orders[lane] != FLY:
-            continue
-        s = missions.lanes.scenario[lane]
-        i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
-        if i != ACCEPTED:
-            return lane * asked.shape[1] + i
-    return ACCEPTED
-
-
-class BatchRules(NamedTuple):
-    """What holds for all steps of all lanes."""
-
-    rules: Rules
-    autoreset: int
-    """NEXT_STEP, SAME_STEP or DISABLED."""
-
-
-@kernel
-def step_batch(pool, missions, orders, rules, before, observation, width):
+def step_batch(pool, missions, orders, rules, before, observation):
     """Fly all lanes for one step, or begin missions in them.
-
-    One kernel for both: each takes ten seconds to compile.
 
     Args:
         pool: `MissionPool`.
@@ -376,7 +343,6 @@ def step_batch(pool, missions, orders, rules, before, observation, width):
         rules: `BatchRules`.
         before: (L, U, V) float32, the observations of the step before.
         observation: (L, U, V) float32, another array; written.
-        width: V. To know it when this is compiled makes a step a tenth faster.
 
     Returns:
         ACCEPTED, or lane · U + i of the first UAS whose action is not finite; then nothing has
@@ -384,37 +350,17 @@ def step_batch(pool, missions, orders, rules, before, observation, width):
     """
     refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
+        kept = _keep(_Given(pool, missions, rules.rules))
         for lane in range(orders.shape[0]):
-            step_lane(
-                pool, missions, lane, orders[lane], 0, rules.rules, rules.autoreset, before,
-                observation, width,
+            _step_lane_at(
+                rules.step_lane, kept, lane, orders[lane], 0, rules.autoreset, before, observation,
+                observation.shape[2],
             )  # fmt: skip
     return refused
 
 
-class _Given(NamedTuple):
-    """What the lanes are given, in one piece."""
-
-    pool: MissionPool
-    missions: Missions
-    rules: Rules
-
-
-def _example() -> _Given:
-    pool = ScenarioPool("open_field")
-    paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
-    acting = acting_of(VELOCITY)
-    none = np.zeros(0, np.int64)
-    rules = Rules(acting, False, none, none, paying, observing_of(OBSERVATION))
-    return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
-
-
-_HANDOVER = Handover(_example)
-_keep, _take = _HANDOVER.keep, _HANDOVER.take
-
-
 @allocating_kernel(parallel=True)
-def step_batch_in_threads(pool, missions, orders, rules, before, observation, width):
+def step_batch_in_threads(pool, missions, orders, rules, before, observation):
     """`step_batch`, the lanes shared among numba's threads.
 
     A function of its own: to start threads takes longer than to fly a few lanes, and numba's cache
@@ -423,11 +369,10 @@ def step_batch_in_threads(pool, missions, orders, rules, before, observation, wi
     refused = _first_refused(pool, missions, orders)
     if refused == ACCEPTED:
         kept = _keep(_Given(pool, missions, rules.rules))
-        autoreset = rules.autoreset
+        step_lane_at, autoreset = rules.step_lane, rules.autoreset
         for lane in prange(orders.shape[0]):
-            given = _take(kept)
-            step_lane(
-                given.pool, given.missions, lane, orders[lane], get_thread_id(), given.rules,
-                autoreset, before, observation, width,
+            _step_lane_at(
+                step_lane_at, kept, np.int64(lane), orders[lane], np.int64(get_thread_id()),
+                autoreset, before, observation, observation.shape[2],
             )  # fmt: skip
     return refused

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.batch_kernel import LANES
+from uas_coverage_env.env.batch_memory import LANES
 from uas_coverage_env.env.drawn import DrawnMission, DrawnPool
 from uas_coverage_env.env.memory import LEARNERS
 from uas_coverage_env.env.pool import ScenarioPool

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.batch import CoverageBatch
-from uas_coverage_env.env.batch_kernel import (
+from uas_coverage_env.env.batch_memory import (
     SWARM_COVERED,
     SWARM_ENERGY,
     SWARM_FIRST_TERM,

@@ -22,7 +22,14 @@ from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, ROUND_CORNER, crossing, route
 
-N_FLIGHT = 21
+(
+    WAY, FIRST_RADIUS, ALONG, ACROSS, TILT_ALONG, TILT_ACROSS, LOOP_ALONG, LOOP_ACROSS,
+    SECOND_ALONG, SECOND_ACROSS, SECOND_RADIUS, THIRD_ALONG, THIRD_ACROSS, THIRD_RADIUS,
+    FIRST_DOWN, SECOND_DOWN, DESCENT, FIRST_IS_HOME, SECOND_IS_HOME, THIRD_IS_HOME, WAY_ON,
+) = range(21)  # fmt: skip
+"""Columns of what the network reads; `layout` says what they mean."""
+
+N_FLIGHT = WAY_ON + 1
 """Numbers that the network reads about a state and the next three places."""
 
 HORIZON = 12
@@ -103,27 +110,27 @@ def look_ahead(x, reference, speed_mps, first, second, third, row):
     bx, by = third[NORTH] - second[NORTH], third[EAST] - second[EAST]
     side = 1.0 if ex * ay - ey * ax >= 0.0 else -1.0
     px, py = -side * ey, side * ex
-    row[0] = way_m / _LENGTH_M
-    row[1] = first[RADIUS] / _RADIUS_M
-    row[2] = (x[VX] * ex + x[VY] * ey) / _SPEED_MPS
-    row[3] = (x[VX] * px + x[VY] * py) / _SPEED_MPS
-    row[4] = (-x[THETA] * ex + x[PHI] * ey) / _TILT_RAD
-    row[5] = (-x[THETA] * px + x[PHI] * py) / _TILT_RAD
-    row[6] = (reference[0] * ex + reference[1] * ey) / _SPEED_MPS
-    row[7] = (reference[0] * px + reference[1] * py) / _SPEED_MPS
-    row[8] = (ax * ex + ay * ey) / _LENGTH_M
-    row[9] = (ax * px + ay * py) / _LENGTH_M
-    row[10] = second[RADIUS] / _RADIUS_M
-    row[11] = (bx * ex + by * ey) / _LENGTH_M
-    row[12] = (bx * px + by * py) / _LENGTH_M
-    row[13] = third[RADIUS] / _RADIUS_M
-    row[14] = (first[DOWN] - x[Z]) / _RISE_M
-    row[15] = (second[DOWN] - first[DOWN]) / _RISE_M
-    row[16] = x[VZ] / _CLIMB_MPS
-    row[17] = first[IS_HOME]
-    row[18] = second[IS_HOME]
-    row[19] = third[IS_HOME]
-    row[20] = math.hypot(ax, ay) / _LENGTH_M
+    row[WAY] = way_m / _LENGTH_M
+    row[FIRST_RADIUS] = first[RADIUS] / _RADIUS_M
+    row[ALONG] = (x[VX] * ex + x[VY] * ey) / _SPEED_MPS
+    row[ACROSS] = (x[VX] * px + x[VY] * py) / _SPEED_MPS
+    row[TILT_ALONG] = (-x[THETA] * ex + x[PHI] * ey) / _TILT_RAD
+    row[TILT_ACROSS] = (-x[THETA] * px + x[PHI] * py) / _TILT_RAD
+    row[LOOP_ALONG] = (reference[0] * ex + reference[1] * ey) / _SPEED_MPS
+    row[LOOP_ACROSS] = (reference[0] * px + reference[1] * py) / _SPEED_MPS
+    row[SECOND_ALONG] = (ax * ex + ay * ey) / _LENGTH_M
+    row[SECOND_ACROSS] = (ax * px + ay * py) / _LENGTH_M
+    row[SECOND_RADIUS] = second[RADIUS] / _RADIUS_M
+    row[THIRD_ALONG] = (bx * ex + by * ey) / _LENGTH_M
+    row[THIRD_ACROSS] = (bx * px + by * py) / _LENGTH_M
+    row[THIRD_RADIUS] = third[RADIUS] / _RADIUS_M
+    row[FIRST_DOWN] = (first[DOWN] - x[Z]) / _RISE_M
+    row[SECOND_DOWN] = (second[DOWN] - first[DOWN]) / _RISE_M
+    row[DESCENT] = x[VZ] / _CLIMB_MPS
+    row[FIRST_IS_HOME] = first[IS_HOME]
+    row[SECOND_IS_HOME] = second[IS_HOME]
+    row[THIRD_IS_HOME] = third[IS_HOME]
+    row[WAY_ON] = math.hypot(ax, ay) / _LENGTH_M
     for f in range(N_FLIGHT):
         row[f] = min(max(row[f], -3.0), 3.0)
     return (way_m + math.hypot(ax, ay) + math.hypot(bx, by)) / speed_mps

@@ -20,7 +20,24 @@ K = 12
 """Nearest open waypoints that are scored; the last choice is home."""
 
 HOME_CHOICE = K
-N_ORDER = 30
+
+(
+    N_OPEN, PER_UAS, MATES, ALONE, OTHERS_FREE, IN_AIR, MORE_TOTAL, MORE_LONGEST, FIRST_LEG,
+    OFF_CENTRE,
+) = range(10)  # fmt: skip
+"""Columns of what is read about each choice; `layout` says what they mean."""
+
+(
+    LEG, MORE_LEG, COSINE, SINE, LEG_HOME, MATE_LATER, NEAREST, SECOND_NEAREST, NEAR, AROUND,
+    ONE_SIDED, FROM_CENTRE, BEHIND, IS_NEAREST, IS_BEST, RANK, TWO_LEGS, MATE_SOONER,
+    MORE_LEFT, CLOSER_HOME,
+) = range(10, 30)  # fmt: skip
+"""The others of a waypoint."""
+
+WAY_HOME, MATE_FREE, TIME_LEFT, ENOUGH_MATES = range(10, 14)
+"""The others of home, where the rest is 0."""
+
+N_ORDER = CLOSER_HOME + 1
 """Numbers that are read about each choice."""
 
 _SPARE_S = 8.0
@@ -107,7 +124,7 @@ def _nearest(mission, u, place, before_m, open_, candidates, leg_s):
     return n
 
 
-class Desk(NamedTuple):
+class RouteWorkspace(NamedTuple):
     """Room for building routes.
 
     Attributes:
@@ -121,19 +138,19 @@ class Desk(NamedTuple):
     legal: NDArray[np.bool_]
 
 
-def desk() -> Desk:
+def route_workspace() -> RouteWorkspace:
     """An empty one."""
-    return Desk(np.full(K, -1), np.zeros((K + 1, N_ORDER)), np.zeros(K + 1, np.bool_))
+    return RouteWorkspace(np.full(K, -1), np.zeros((K + 1, N_ORDER)), np.zeros(K + 1, np.bool_))
 
 
 @allocating_kernel
-def look(mission, u, ready_s, place, before_m, open_, desk):
+def observe_choices(mission, u, ready_s, place, before_m, open_, workspace):
     """Write what UAS u may choose and what is read about each choice.
 
     Returns:
         How many waypoints there are to choose from.
     """
-    candidates, rows, legal = desk.candidates, desk.rows, desk.legal
+    candidates, rows, legal = workspace.candidates, workspace.rows, workspace.legal
     n_uas, unit = ready_s.shape[0], mission.unit_s
     leg_s = np.empty(K)
     n = _nearest(mission, u, place[u], before_m[u], open_, candidates, leg_s)
@@ -184,36 +201,40 @@ def look(mission, u, ready_s, place, before_m, open_, desk):
     for k in range(n + 1):
         r = rows[k] if k < n else rows[K]
         c = k if k < n else K
-        r[0] = n_open / 25.0
-        r[1] = share / 15.0
-        r[2] = min(mates, 4) / 4.0
-        r[3] = mates == 0
-        r[4] = (others_s / max(mates, 1) - ready_s[u]) / (5.0 * unit) if mates > 0 else 0.0
-        r[5] = place[u] == IN_THE_AIR
-        r[6] = (total_s[c] - total_s[best]) / (2.0 * unit) if best >= 0 else 0.0
-        r[7] = (longest_s[c] - longest_s[best]) / (2.0 * unit) if best >= 0 else 0.0
-        r[8] = (leg_s[0] if n > 0 else 0.0) / (2.0 * unit)
-        r[9] = math.hypot(px - cx, py - cy) / 100.0
+        r[N_OPEN] = n_open / 25.0
+        r[PER_UAS] = share / 15.0
+        r[MATES] = min(mates, 4) / 4.0
+        r[ALONE] = mates == 0
+        r[OTHERS_FREE] = (
+            (others_s / max(mates, 1) - ready_s[u]) / (5.0 * unit) if mates > 0 else 0.0
+        )
+        r[IN_AIR] = place[u] == IN_THE_AIR
+        r[MORE_TOTAL] = (total_s[c] - total_s[best]) / (2.0 * unit) if best >= 0 else 0.0
+        r[MORE_LONGEST] = (longest_s[c] - longest_s[best]) / (2.0 * unit) if best >= 0 else 0.0
+        r[FIRST_LEG] = (leg_s[0] if n > 0 else 0.0) / (2.0 * unit)
+        r[OFF_CENTRE] = math.hypot(px - cx, py - cy) / 100.0
     home = rows[K]
-    home[10] = home_seconds(mission, u, place[u], before_m[u]) / (10.0 * unit)
-    home[11] = min(ahead_s, 1e3) / (20.0 * unit) if mates > 0 else 0.0
-    home[12] = (mission.budget_s[u] - ready_s[u]) / 300.0
-    home[13] = n_open <= mates
+    home[WAY_HOME] = home_seconds(mission, u, place[u], before_m[u]) / (10.0 * unit)
+    home[MATE_FREE] = min(ahead_s, 1e3) / (20.0 * unit) if mates > 0 else 0.0
+    home[TIME_LEFT] = (mission.budget_s[u] - ready_s[u]) / 300.0
+    home[ENOUGH_MATES] = n_open <= mates
     for k in range(n):
         r, w = rows[k], candidates[k]
-        r[10] = leg_s[k] / (2.0 * unit)
-        r[11] = (leg_s[k] - leg_s[0]) / unit
+        r[LEG] = leg_s[k] / (2.0 * unit)
+        r[MORE_LEG] = (leg_s[k] - leg_s[0]) / unit
         dx, dy = mission.place_m[w, 0] - px, mission.place_m[w, 1] - py
         length = math.hypot(dx, dy) + 1e-9
-        r[12] = (vx * dx + vy * dy) / length
-        r[13] = abs(vx * dy - vy * dx) / length
-        r[14] = mission.home_s[u, w] / (10.0 * unit)
+        r[COSINE] = (vx * dx + vy * dy) / length
+        r[SINE] = abs(vx * dy - vy * dx) / length
+        r[LEG_HOME] = mission.home_s[u, w] / (10.0 * unit)
         lead_s = 1e6
         for j in range(n_uas):
             if j != u and place[j] != DONE:
                 row = mission.from_s[j] if place[j] == IN_THE_AIR else mission.between_s[place[j]]
                 lead_s = min(lead_s, ready_s[j] + row[w])
-        r[15] = (min(lead_s, 1e4) - ready_s[u] - leg_s[k]) / (3.0 * unit) if mates > 0 else 3.0
+        r[MATE_LATER] = (
+            (min(lead_s, 1e4) - ready_s[u] - leg_s[k]) / (3.0 * unit) if mates > 0 else 3.0
+        )
         nearest, second = 1e3, 1e3
         near, around, side, sides, behind = 0, 0, 0.0, 0.0, 0
         for v in range(open_.shape[0]):
@@ -231,21 +252,21 @@ def look(mission, u, ready_s, place, before_m, open_, desk):
                 side += 1.0 if dx * ey - dy * ex > 0.0 else -1.0
                 sides += 1.0
                 behind += (ex - dx) * dx + (ey - dy) * dy < 0.0
-        r[16] = nearest / unit
-        r[17] = second / unit
-        r[18] = near / 6.0
-        r[19] = around / 15.0
-        r[20] = abs(side) / max(sides, 1.0)
-        r[21] = math.hypot(mission.place_m[w, 0] - cx, mission.place_m[w, 1] - cy) / 100.0
-        r[22] = behind / max(sides, 1.0)
-        r[23] = k == 0
-        r[24] = k == best
-        r[25] = k / K
+        r[NEAREST] = nearest / unit
+        r[SECOND_NEAREST] = second / unit
+        r[NEAR] = near / 6.0
+        r[AROUND] = around / 15.0
+        r[ONE_SIDED] = abs(side) / max(sides, 1.0)
+        r[FROM_CENTRE] = math.hypot(mission.place_m[w, 0] - cx, mission.place_m[w, 1] - cy) / 100.0
+        r[BEHIND] = behind / max(sides, 1.0)
+        r[IS_NEAREST] = k == 0
+        r[IS_BEST] = k == best
+        r[RANK] = k / K
         # is it nearest to where it would be taken from, and by whom
-        r[26] = (leg_s[k] + nearest) / (3.0 * unit)
-        r[27] = lead_s < ready_s[u] + leg_s[k]
-        r[28] = left[k] - (left[best] if best >= 0 else 0.0)
-        r[29] = home[10] - r[14]
+        r[TWO_LEGS] = (leg_s[k] + nearest) / (3.0 * unit)
+        r[MATE_SOONER] = lead_s < ready_s[u] + leg_s[k]
+        r[MORE_LEFT] = left[k] - (left[best] if best >= 0 else 0.0)
+        r[CLOSER_HOME] = home[WAY_HOME] - r[LEG_HOME]
     for k in range(K + 1):
         for f in range(N_ORDER):
             rows[k, f] = min(max(rows[k, f], -3.0), 3.0)
@@ -307,18 +328,18 @@ def no_record(size: int = 0) -> Record:
 
 
 @allocating_kernel
-def note(record, desk, choice):
+def note(record, workspace, choice):
     """Note a decision, if there is room and there was a choice."""
     n = record.n[0]
-    if n < record.choice.shape[0] and desk.legal.sum() > 1:
-        record.rows[n] = desk.rows
-        record.legal[n] = desk.legal
+    if n < record.choice.shape[0] and workspace.legal.sum() > 1:
+        record.rows[n] = workspace.rows
+        record.legal[n] = workspace.legal
         record.choice[n] = choice
         record.n[0] = n + 1
 
 
 @allocating_kernel
-def build(mission, score, home_score, wanted, noise, rng, desk, record, routes, lengths):
+def build(mission, score, home_score, wanted, noise, rng, workspace, record, routes, lengths):
     """Build the routes of all UAS.
 
     Args:
@@ -328,7 +349,7 @@ def build(mission, score, home_score, wanted, noise, rng, desk, record, routes, 
         wanted: (W,) waypoints to be visited.
         noise: Scale of Gumbel noise on scores; 0: always the best.
         rng: Of the noise.
-        desk: `Desk`.
+        workspace: `RouteWorkspace`.
         record: `Record`, written.
         routes: (U, W) written.
         lengths: (U,) written.
@@ -350,24 +371,24 @@ def build(mission, score, home_score, wanted, noise, rng, desk, record, routes, 
             u = next_free(place, ready_s)
             if u < 0:
                 break
-            look(mission, u, ready_s, place, before_m, open_, desk)
+            observe_choices(mission, u, ready_s, place, before_m, open_, workspace)
             best, best_score = -1, -np.inf
             for k in range(K + 1):
-                if not desk.legal[k]:
+                if not workspace.legal[k]:
                     continue
                 if k < K:
-                    value = value_of(score, desk.rows[k])
+                    value = value_of(score, workspace.rows[k])
                 else:
-                    value = value_of(home_score, desk.rows[K])
+                    value = value_of(home_score, workspace.rows[K])
                 if noise > 0.0:
                     value -= noise * math.log(-math.log(rng.random() + 1e-300) + 1e-300)
                 if value > best_score:
                     best, best_score = k, value
-            note(record, desk, best)
+            note(record, workspace, best)
             if best == K or best < 0:
                 move(mission, u, -1, ready_s, place, before_m, open_)
                 continue
-            w = desk.candidates[best]
+            w = workspace.candidates[best]
             routes[u, lengths[u]] = w
             lengths[u] += 1
             move(mission, u, w, ready_s, place, before_m, open_)

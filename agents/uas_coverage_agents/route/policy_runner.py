@@ -14,7 +14,7 @@ from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.mission import MissionMaker
-from uas_coverage_agents.route.order import build, desk, no_record
+from uas_coverage_agents.route.order import build, no_record, route_workspace
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import (
     Approach,
@@ -84,7 +84,7 @@ class RouteRunner:
         self._attempts, self._approach = Attempts(brief), Approach(brief)
         self._handover = Handover(brief)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
-        self._desk, self._record = desk(), no_record()
+        self._workspace, self._record = route_workspace(), no_record()
         self._routes = np.full((n_uas, n_waypoints), -1)
         self._lengths = np.zeros(n_uas, np.int64)
         self._rng = np.random.default_rng(seed)
@@ -154,7 +154,7 @@ class RouteRunner:
         for sample in range(max(self._samples, 1)):
             cost_s = build(
                 mission, self._score, self._home_score, wanted, _NOISE if sample else 0.0,
-                self._rng, self._desk, self._record, routes, lengths,
+                self._rng, self._workspace, self._record, routes, lengths,
             )  # fmt: skip
             if cost_s < best_s:
                 best_s = cost_s

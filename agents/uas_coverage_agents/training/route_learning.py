@@ -31,12 +31,12 @@ from uas_coverage_agents.route.leg_flight import N_FLIGHT
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import (
     N_ORDER,
-    Desk,
     K,
-    desk,
-    look,
+    RouteWorkspace,
     move,
     next_free,
+    observe_choices,
+    route_workspace,
 )
 from uas_coverage_agents.route.policy_runner import observation
 from uas_coverage_agents.training.route_flights import courses_of, flown
@@ -76,7 +76,7 @@ def _tensors(name: str, network: nn.Sequential) -> dict[str, NDArray[np.float64]
 
 
 def _choices(
-    mission: Mission, routes: list[list[int]], room: Desk
+    mission: Mission, routes: list[list[int]], room: RouteWorkspace
 ) -> list[tuple[NDArray, NDArray, int]]:
     """What is read, may be chosen and was chosen, when labelled routes are built again."""
     n_uas, n_waypoints = mission.from_s.shape
@@ -88,7 +88,7 @@ def _choices(
         u = next_free(place, ready_s)
         if u == -1 or place[u] == DONE:
             break
-        look(mission, u, ready_s, place, before_m, open_, room)
+        observe_choices(mission, u, ready_s, place, before_m, open_, room)
         w = left[u].pop(0) if left[u] else -1
         where = np.flatnonzero(room.candidates == w) if w >= 0 else np.array([K])
         if len(where) and room.legal[where[0]] and room.legal.sum() > 1:
@@ -99,7 +99,7 @@ def _choices(
 
 def choices_of(labels: list[Label]) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """All decisions of labelled towns: (N, K+1, N_ORDER), (N, K+1), (N,)."""
-    room, found = desk(), []
+    room, found = route_workspace(), []
     for label in labels:
         brief = MissionBrief.of(town_of(label.seed))
         swarm = first_sight(brief)

@@ -75,8 +75,8 @@ class WaypointVecEnv(VecEnv):
         self._lanes, self._states = make_lanes(n_lanes, self._worlds)
         self._settings = settings
         self._prices = prices_of(settings)
-        aboard = assistants(settings.return_mode, settings.safety_filter)
-        self._assistants = (settings.return_mode, aboard)
+        called = assistants(settings.return_mode, settings.safety_filter)
+        self._assistants = (settings.return_mode, called)
         self._seed = seed
         self._missions = np.zeros(n_lanes, dtype=np.int64)
         self._choices = np.zeros(n_lanes, dtype=np.int64)

@@ -175,7 +175,7 @@ class WaypointRunner:
         self._returning[:] = state.returning & (~silent | self._returning | swarm.returning)
 
     def _look_ahead(self, state: WorldState) -> None:
-        """Make the plan better; the observation on the desk is lost."""
+        """Make the plan better; the observation in the workspace is lost."""
         choices = self._workspace.choices
         kept = choices.candidates.copy(), choices.legal.copy()
         return_mode = self._assistants.return_mode

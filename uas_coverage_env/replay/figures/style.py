@@ -137,7 +137,7 @@ def rows(height_in: float, heights: list[float]) -> tuple[Figure, list[Axes]]:
 
 
 def shade(colour: colours.Colour) -> tuple[float, float, float]:
-    """A colour of the draw room as matplotlib counts it."""
+    """A colour of the draw package as matplotlib counts it."""
     red, green, blue = colour
     return red / 255, green / 255, blue / 255
 
