@@ -89,6 +89,15 @@ def test_the_page_counts_failures_with_their_exact_bound(tmp_path):
     assert "- `broken`: RuntimeError: gone" in page(stores, True)[0]
 
 
+def test_the_page_says_how_many_trials_each_source_has_made(tmp_path):
+    stores = {name: Store(tmp_path, name) for name in ROWS}
+    for number, source in enumerate(("bcd", "abc", "bcd")):
+        result = {"what": "tour", "hashes": {"here": "a"}}
+        stores["R5"].add(str(number), result, source, "2026-01-01")
+    text, _ = page(stores, True)
+    assert " 2026-01-01, source abc (1), bcd (2). " in text
+
+
 def test_a_row_of_which_nothing_is_kept_stays_as_the_page_has_it(tmp_path):
     stores = {name: Store(tmp_path / "first", name) for name in ROWS}
     stores["R5"].add("1", {"what": "tour", "hashes": {"here": "a"}}, "abc", "2026-01-01")
