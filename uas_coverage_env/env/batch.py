@@ -18,6 +18,7 @@ from uas_coverage_env.env.actions.given import as_array
 from uas_coverage_env.env.batch_kernel import (
     DISABLED,
     DRAW,
+    FLY,
     NEXT_STEP,
     REST,
     SAME_STEP,
@@ -34,6 +35,7 @@ from uas_coverage_env.env.kernel import ACCEPTED, Rules
 from uas_coverage_env.env.memory import Learners
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
+from uas_coverage_env.env.scenes import change_scenes, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like
 from uas_coverage_env.mission import MissionBrief
@@ -108,6 +110,10 @@ class CoverageBatch:
         shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
+        self._observing = observing_of(self.settings.observation)
+        # else kernels do, which know nothing of what changes scenes or draws
+        same_step = self.autoreset == SAME_STEP
+        self._begins_here = self.draws or (self.pool.changes and same_step)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
         self._rules: BatchRules | None = None
@@ -236,19 +242,21 @@ class CoverageBatch:
                     f"have ended before the next step, or choose another autoreset mode"
                 )
         self._ask(actions)
+        drawing, flew = lanes.orders == DRAW, lanes.orders == FLY
         if self.draws:
             # what is drawn begins after the step of the others, which may still be refused
-            drawing = lanes.orders == DRAW
             refused = self._run(np.where(drawing, REST, lanes.orders))
         else:
-            drawing, refused = None, self._run(lanes.orders)
+            refused = self._run(lanes.orders)
         if refused != ACCEPTED:
             lane, i = divmod(refused, self.n_uas)
             raise ValueError(
                 f"action of UAS {i} in lane {lane} is {self.learners.asked[lane, i].tolist()}; "
                 f"give finite numbers"
             )
-        if drawing is not None:
+        if self.pool.changes:
+            change_scenes(self.pool, self.missions, flew, self._observing, self.observation)
+        if self._begins_here:
             self._draw_next(drawing)
         if self._rules is not None and is_own(self._rules.rules.acting):
             names = [f"UAS {i}" for i in range(self.n_uas)]
@@ -276,11 +284,12 @@ class CoverageBatch:
         """
         own = self._changing()
         check_like(state, own)
-        drawn = checked(self.pool, state)
+        drawn, changed = checked(self.pool, state)
         if isinstance(self.pool, DrawnPool):
             self.pool.install(drawn)
         for name, array in own.items():
             array[...] = state[name]
+        install_scenes(self.pool, self.lanes, changed)
         # the other array of observations is not what it was
         self.missions.settled[:] = False
         self._begun = bool((self.lanes.mission >= 0).all())
@@ -288,6 +297,10 @@ class CoverageBatch:
     def _changing(self) -> dict[str, NDArray[Any]]:
         parts = (self.worlds, self.learners, self.lanes)
         arrays = {k: v for part in parts for k, v in part._asdict().items()}
+        # it follows from the others
+        del arrays["scene"]
+        if not self.pool.changes:
+            del arrays["changes"]
         arrays["observation"] = self.observation
         if isinstance(self.pool, DrawnPool):
             arrays["drawn_from"] = self.pool.drawn_from
@@ -295,7 +308,7 @@ class CoverageBatch:
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a player of this lane sees now, in arrays of their own."""
-        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scenario[lane]))
+        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
         state = STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
         return swarm_state(self.scenario_of(lane), arena, state)
 
@@ -319,7 +332,7 @@ class CoverageBatch:
             raise ValueError(f"commands for {len(commands)} of {self.num_envs} lanes")
         rows = []
         for lane, given in enumerate(commands):
-            s = int(self.lanes.scenario[lane])
+            s = int(self.lanes.scene[lane])
             moment = moment_of(self.pool, s, self.worlds, self.learners, lane)
             rows.append(joint_action_of(self.actions, moment, given, clip, n_uas=self.n_uas))
         return np.stack(rows)
@@ -329,8 +342,8 @@ class CoverageBatch:
         return MissionBrief.of(self.scenario_of(lane))
 
     def scenario_of(self, lane: int) -> Scenario:
-        """The scenario that a lane flies now."""
-        return self.pool.scenarios[self.lanes.scenario[lane]]
+        """The scenario that a lane flies; where events have changed the scene, as it is now."""
+        return self.pool.scene_of(int(self.lanes.scene[lane]))
 
     def _orders(self, begins: NDArray[np.bool_], chosen: Any = None) -> NDArray[np.int64]:
         """Begin missions in some lanes: those chosen, or drawn."""
@@ -395,12 +408,12 @@ class CoverageBatch:
         goes_to = kind.goes_to or self.pool.goes_home
         called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
         paying = paying_of(settings.reward, settings.weights)
-        observing = observing_of(settings.observation)
         nonlinear = settings.dynamics == "nonlinear"
         pushed = disturbance_code(self.pool.disturbances)
-        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, observing)
-        # `_draw_next` comes between the end of a drawn mission and the next
-        autoreset = DISABLED if self.draws and self.autoreset == SAME_STEP else self.autoreset
+        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, self._observing)
+        # `_draw_next` comes between the end of a mission and the next
+        ends_here = self._begins_here and self.autoreset == SAME_STEP
+        autoreset = DISABLED if ends_here else self.autoreset
         return BatchRules(rules, autoreset)
 
     def _ask(self, actions: Any) -> None:

@@ -77,7 +77,11 @@ class SubEnvironments(NamedTuple):
     mission: Annotated[NDArray[np.int64], "L", Values(-1, np.iinfo(np.int64).max - 1)]
     """Number of the mission since the lane was seeded, from 0 on."""
     scenario: Annotated[NDArray[np.int64], "L", Values(0, "S")]
-    """Index in the pool."""
+    """Index in the pool of the mission."""
+    scene: Annotated[NDArray[np.int64], "L"]
+    """Index in the pool of what it flies now: the mission, or its scene since that has changed."""
+    changes: Annotated[NDArray[np.int64], "L", "changes"]
+    """What has changed the scene of the mission, in order, see `simulation.scenes`; then -1."""
     orders: Annotated[NDArray[np.int64], "L", Values(FLY, DRAW)]
     """What it does in the coming step: FLY, or DRAW after an end (NEXT_STEP)."""
     rewards: Annotated[NDArray[np.float64], "L", "U"]
@@ -146,6 +150,7 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
     missions.worlds.status[:] = FLYING
     missions.lanes.seed[:] = seeds
     missions.lanes.mission[:] = -1
+    missions.lanes.changes[:] = -1
     missions.lanes.orders[:] = FLY
     return missions
 
@@ -181,8 +186,11 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     lanes = missions.lanes
     s = order
     if order == DRAW:
-        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.arenas.sizes.shape[0])
+        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.starts.sizes.shape[0])
     lanes.scenario[lane] = s
+    lanes.scene[lane] = s
+    for k in range(lanes.changes.shape[1]):
+        lanes.changes[lane, k] = -1
     lanes.mission[lane] += 1
     lanes.orders[lane] = FLY
     state = state_of(missions.worlds, lane, pool.arenas, s)
@@ -306,7 +314,7 @@ def step_lane(pool, missions, lane, order, thread, rules, autoreset, before, obs
         for i in range(lanes.rewards.shape[1]):
             lanes.rewards[lane, i] = 0.0
     else:
-        s = lanes.scenario[lane]
+        s = lanes.scene[lane]
         arena = arena_of(pool.arenas, s)
         max_steps = arena.rules[0].max_steps
         state = state_of(missions.worlds, lane, pool.arenas, s)
@@ -348,7 +356,7 @@ def _first_refused(pool, missions, orders):
     for lane in range(asked.shape[0]):
         if orders[lane] != FLY:
             continue
-        s = missions.lanes.scenario[lane]
+        s = missions.lanes.scene[lane]
         i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
         if i != ACCEPTED:
             return lane * asked.shape[1] + i
