@@ -120,9 +120,13 @@ def test_waypoints_that_are_asked_for_again_are_so_in_a_batch(action):
 
 @pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
 def test_all_that_may_happen_happens_at_once_and_beside_missions_without_it(dynamics):
-    quiet = mission(n_uas=1)
-    pool = [EVERYTHING, quiet, mission(EVENTS[0], n_uas=2)]
-    seeds = [20, 21, 22, 23]
+    # time enough for return mode not to call them home at once
+    pool = [
+        mission(*EVENTS, relaunch=True, max_steps=70, **AGAIN),
+        mission(n_uas=1, max_steps=70),
+        mission(EVENTS[0], max_steps=70),
+    ]
+    seeds = [24, 25, 26, 21]  # of which two draw the first, and one each of the others
     batch = CoverageBatch(4, pool)
     batch.reset(seeds)
     drawn = batch.lanes.scenario.tolist()
