@@ -121,6 +121,21 @@ def test_a_fault_is_drawn_with_its_seed_and_happens_in_the_mission(kind):
         assert [event.kind for event in drawn.events] == [kind]
 
 
+def test_several_events_of_one_mission_are_of_different_kinds_and_come_in_wind():
+    for seed in range(faults.FIRST_SEED, faults.FIRST_SEED + 8):
+        drawn = faults.mission(faults.SEVERAL, seed)
+        assert drawn == faults.mission(faults.SEVERAL, seed)
+        kinds = {event.kind for event in drawn.events}
+        assert len(kinds) == len(drawn.events) in (2, 3)
+        assert drawn.wind is not None
+    for seed in (7001, 7009):  # the planner is lost too; and one UAS and the planner
+        result = faults.fly(faults.SEVERAL, "nearest-waypoint", seed)
+        assert result["as_defined"]
+    found = faults.ROW.finding({"a": result, "b": {**result, "as_defined": False}})
+    assert (found.trials, found.failures) == (2, 1)
+    assert f"| {faults.SEVERAL} | all land that no event takes | 1 of 2 |" in found.table
+
+
 def test_a_mission_is_counted_by_what_happened_in_it():
     result = missions.fly("nearest-waypoint", "light", 3001, True)
     assert result["accomplished"]
