@@ -242,10 +242,10 @@ class CoverageBatch:
                     f"have ended before the next step, or choose another autoreset mode"
                 )
         self._ask(actions)
-        drawing, flew = lanes.orders == DRAW, lanes.orders == FLY
+        orders = lanes.orders.copy()
         if self.draws:
             # what is drawn begins after the step of the others, which may still be refused
-            refused = self._run(np.where(drawing, REST, lanes.orders))
+            refused = self._run(np.where(orders == DRAW, REST, orders))
         else:
             refused = self._run(lanes.orders)
         if refused != ACCEPTED:
@@ -255,9 +255,10 @@ class CoverageBatch:
                 f"give finite numbers"
             )
         if self.pool.changes:
+            flew = orders == FLY
             change_scenes(self.pool, self.missions, flew, self._observing, self.observation)
         if self._begins_here:
-            self._draw_next(drawing)
+            self._draw_next(orders == DRAW)
         if self._rules is not None and is_own(self._rules.rules.acting):
             names = [f"UAS {i}" for i in range(self.n_uas)]
             refuse_what_it_wrote(self.actions.kind, self.learners.asked, names)
