@@ -1,5 +1,7 @@
 """Scenes that change in a batch: what single missions of the same seeds fly, to the last bit."""
 
+from typing import Any, get_args
+
 import gymnasium
 import numpy as np
 import pytest
@@ -56,11 +58,13 @@ def fly_beside_single_missions(scenario, singles, seeds, n_steps=2 * STEPS + 4, 
     Returns:
         The most changes that the scenes of its missions had behind them.
     """
-    envs = gymnasium.make_vec(
+    envs: Any = gymnasium.make_vec(
         "UASCoverage-v0", num_envs=len(seeds), vectorization_mode="vector_entry_point",
         scenario=scenario, **settings,
     )  # fmt: skip
-    single = [gymnasium.make("UASCoverage-v0", scenario=each, **settings) for each in singles]
+    single: list[Any] = [
+        gymnasium.make("UASCoverage-v0", scenario=each, **settings) for each in singles
+    ]
     seen, _ = envs.reset(seed=seeds)
     alone = [env.reset(seed=seed)[0] for env, seed in zip(single, seeds, strict=True)]
     over, n_changes = np.zeros(len(seeds), bool), 0
@@ -98,9 +102,8 @@ def fly_beside_single_missions(scenario, singles, seeds, n_steps=2 * STEPS + 4, 
 
 
 def test_all_kinds_are_flown_here():
-    assert {kind.model_fields["kind"].annotation.__args__[0] for kind in EVENT_KINDS} == {
-        event["kind"] for event in EVENTS
-    }
+    kinds = {get_args(kind.model_fields["kind"].annotation)[0] for kind in EVENT_KINDS}
+    assert kinds == {event["kind"] for event in EVENTS}
 
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: event["kind"])
