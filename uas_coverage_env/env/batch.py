@@ -111,9 +111,8 @@ class CoverageBatch:
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
         self._observing = observing_of(self.settings.observation)
-        # else kernels do, which know nothing of what changes scenes or draws
-        same_step = self.autoreset == SAME_STEP
-        self._begins_here = self.draws or (self.pool.changes and same_step)
+        # else kernels do, which neither draw nor change scenes
+        self._begins_here = self.draws or (self.pool.changes and self.autoreset == SAME_STEP)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
         self._rules: BatchRules | None = None
@@ -298,8 +297,7 @@ class CoverageBatch:
     def _changing(self) -> dict[str, NDArray[Any]]:
         parts = (self.worlds, self.learners, self.lanes)
         arrays = {k: v for part in parts for k, v in part._asdict().items()}
-        # it follows from the others
-        del arrays["scene"]
+        del arrays["scene"]  # it follows from the others
         if not self.pool.changes:
             del arrays["changes"]
         arrays["observation"] = self.observation
@@ -413,9 +411,8 @@ class CoverageBatch:
         pushed = disturbance_code(self.pool.disturbances)
         rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, self._observing)
         # `_draw_next` comes between the end of a mission and the next
-        ends_here = self._begins_here and self.autoreset == SAME_STEP
-        autoreset = DISABLED if ends_here else self.autoreset
-        return BatchRules(rules, autoreset)
+        apart = self._begins_here and self.autoreset == SAME_STEP
+        return BatchRules(rules, DISABLED if apart else self.autoreset)
 
     def _ask(self, actions: Any) -> None:
         actions = as_array("the swarms", actions)

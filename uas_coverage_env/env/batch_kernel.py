@@ -149,8 +149,7 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
     missions.worlds.status[:] = FLYING
     missions.lanes.seed[:] = seeds
-    missions.lanes.mission[:] = -1
-    missions.lanes.changes[:] = -1
+    missions.lanes.mission[:] = missions.lanes.changes[:] = -1
     missions.lanes.orders[:] = FLY
     return missions
 
