@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from importlib.metadata import version
 
@@ -17,7 +18,8 @@ What was tried to make the software fail, and how often it did. This page is gen
 python benchmarks/robustness.py --quick
 ```
 
-Without `--quick` far more is tried; each row names the command that it is from, and the source.
+Without `--quick` far more is tried. Each row names the command that it is from, and the source \
+code: its hash, and how many trials were made with it.
 
 Each bound is the exact one-sided 95 % bound (Clopper and Pearson) of the share that fails, of the \
 trials as they are drawn here: missions of other kinds may fail more often. Version {version}.
@@ -76,7 +78,8 @@ def _made_before(text: str) -> dict[str, tuple[tuple[str, ...], str]]:
 def _section(row: Row, store: Store, finding: Finding, quick: bool) -> str:
     entries = store.entries.values()
     dates = sorted({entry["date"] for entry in entries})
-    sources = sorted({entry["source"] for entry in entries})
+    sources = Counter(entry["source"] for entry in entries)
+    made_by = ", ".join(f"{source} ({n:,})" for source, n in sorted(sources.items()))
     when = dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
     planned = len(row.trials(quick))
     made = f"{len(entries)} of {planned} trials" if len(entries) < planned else "all trials"
@@ -86,7 +89,7 @@ def _section(row: Row, store: Store, finding: Finding, quick: bool) -> str:
         f"Claim: {row.claim}. {finding.failures:,} of {finding.trials:,} {row.unit} failed, a "
         f"share of at most {finding.at_most:.2%}.",
         "",
-        f"Seeds: {row.seeds(quick)}. Made: {made}, {when}, source {', '.join(sources)}. Command: "
+        f"Seeds: {row.seeds(quick)}. Made: {made}, {when}, source {made_by}. Command: "
         f"`python benchmarks/robustness.py{' --quick' if quick else ''} --rows {row.name}`.",
         "",
     ]

@@ -89,6 +89,15 @@ def test_the_page_counts_failures_with_their_exact_bound(tmp_path):
     assert "- `broken`: RuntimeError: gone" in page(stores, True)[0]
 
 
+def test_the_page_says_how_many_trials_each_source_has_made(tmp_path):
+    stores = {name: Store(tmp_path, name) for name in ROWS}
+    for number, source in enumerate(("bcd", "abc", "bcd")):
+        result = {"what": "tour", "hashes": {"here": "a"}}
+        stores["R5"].add(str(number), result, source, "2026-01-01")
+    text, _ = page(stores, True)
+    assert " 2026-01-01, source abc (1), bcd (2). " in text
+
+
 def test_a_row_of_which_nothing_is_kept_stays_as_the_page_has_it(tmp_path):
     stores = {name: Store(tmp_path / "first", name) for name in ROWS}
     stores["R5"].add("1", {"what": "tour", "hashes": {"here": "a"}}, "abc", "2026-01-01")
@@ -110,6 +119,21 @@ def test_a_fault_is_drawn_with_its_seed_and_happens_in_the_mission(kind):
         drawn = faults.mission(kind, seed)
         assert drawn == faults.mission(kind, seed)
         assert [event.kind for event in drawn.events] == [kind]
+
+
+def test_several_events_of_one_mission_are_of_different_kinds_and_come_in_wind():
+    for seed in range(faults.FIRST_SEED, faults.FIRST_SEED + 8):
+        drawn = faults.mission(faults.SEVERAL, seed)
+        assert drawn == faults.mission(faults.SEVERAL, seed)
+        kinds = {event.kind for event in drawn.events}
+        assert len(kinds) == len(drawn.events) in (2, 3)
+        assert drawn.wind is not None
+    for seed in (7001, 7009):  # the planner is lost too; and one UAS and the planner
+        result = faults.fly(faults.SEVERAL, "nearest-waypoint", seed)
+        assert result["as_defined"]
+    found = faults.ROW.finding({"a": result, "b": {**result, "as_defined": False}})
+    assert (found.trials, found.failures) == (2, 1)
+    assert f"| {faults.SEVERAL} | all land that no event takes | 1 of 2 |" in found.table
 
 
 def test_a_mission_is_counted_by_what_happened_in_it():

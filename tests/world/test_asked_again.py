@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import World, load_planner, rollout
-from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight import (
     Flight,
@@ -194,11 +193,6 @@ def test_agents_see_it_open_again_and_their_episode_goes_on_while_they_swap():
     assert infos["uas_1"]["covered"] == 2
     assert 30 < steps < 200
     assert Room.of(scenario).n_waypoints == 2
-
-
-def test_batches_refuse_it_with_what_to_take_instead():
-    with pytest.raises(ValueError, match=r"again_after_s.*parallel_env"):
-        CoverageBatch(2, mission(again(NEAR, 30.0)))
 
 
 def test_it_does_not_go_with_sorties_one_after_the_other():

@@ -6,6 +6,7 @@ import numpy as np
 
 from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
+from uas_coverage_env.autopilot.low_way import beside_roofs, makes_little_headway
 from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
@@ -143,7 +144,8 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
     The wish (fly along the route, in time over low roofs) is flown as far as it leaves room to
-    brake: slower, without descending, up or down in place, to one side, or not at all.
+    brake: slower, without descending, up or down in place, to one side, or not at all. On the way
+    home in a wind that it hardly gets ahead against, a UAS flies low.
 
     Args:
         arena: The arena.
@@ -167,6 +169,15 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
             if first == TARGET_IS_PLACE:
                 end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
             stop = True
+    low = False
+    if belief is not None and arena.rules[0].disturbed and target < 0:
+        needed_m, _ = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
+        altitude_m = _altitude(arena, i, x, -z1, way_m, needed_m)
+        low = makes_little_headway(arena, i, x, belief, end_x, end_y, altitude_m)
+        if low and needed_m > -math.inf:
+            beside_x, beside_y = beside_roofs(arena, i, x, belief, end_x, end_y)
+            if beside_x != end_x or beside_y != end_y:
+                end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
     lead_s = LEAD_S
     if not stop or leg == ROUND_CORNER:
         # to look beyond what is flown by would turn the UAS round before it gets there
@@ -178,7 +189,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
     approach_mps = _approach_speed(arena, i, x, target, stop, distance_m, leg, -z1)
     speed_mps = min(speed_mps, approach_mps)
-    altitude_m = _altitude(arena, i, x, -z1, way_m, needed_m)
+    altitude_m = _altitude(arena, i, x, -z1, 0.0 if low else way_m, needed_m)
     north_mps = 0.0
     east_mps = 0.0
     if distance_m > 1e-9:

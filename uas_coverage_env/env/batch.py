@@ -24,6 +24,7 @@ from uas_coverage_env.env.batch_kernel import (
 from uas_coverage_env.env.batch_memory import (
     DISABLED,
     DRAW,
+    FLY,
     NEXT_STEP,
     REST,
     SAME_STEP,
@@ -37,6 +38,7 @@ from uas_coverage_env.env.kernel import ACCEPTED, Rules
 from uas_coverage_env.env.memory import Learners
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
+from uas_coverage_env.env.scenes import change_scenes, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like
 from uas_coverage_env.mission import MissionBrief
@@ -111,6 +113,9 @@ class CoverageBatch:
         shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
+        self._observing = observing_of(self.settings.observation)
+        # else kernels do, which neither draw nor change scenes
+        self._begins_here = self.draws or (self.pool.changes and self.autoreset == SAME_STEP)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
         self._rules: BatchRules | None = None
@@ -239,20 +244,23 @@ class CoverageBatch:
                     f"have ended before the next step, or choose another autoreset mode"
                 )
         self._ask(actions)
+        orders = lanes.orders.copy()
         if self.draws:
             # what is drawn begins after the step of the others, which may still be refused
-            drawing = lanes.orders == DRAW
-            refused = self._run(np.where(drawing, REST, lanes.orders))
+            refused = self._run(np.where(orders == DRAW, REST, orders))
         else:
-            drawing, refused = None, self._run(lanes.orders)
+            refused = self._run(lanes.orders)
         if refused != ACCEPTED:
             lane, i = divmod(refused, self.n_uas)
             raise ValueError(
                 f"action of UAS {i} in lane {lane} is {self.learners.asked[lane, i].tolist()}; "
                 f"give finite numbers"
             )
-        if drawing is not None:
-            self._draw_next(drawing)
+        if self.pool.changes:
+            flew = orders == FLY
+            change_scenes(self.pool, self.missions, flew, self._observing, self.observation)
+        if self._begins_here:
+            self._draw_next(orders == DRAW)
         if self._rules is not None and is_own(self._rules.rules.acting):
             names = [f"UAS {i}" for i in range(self.n_uas)]
             refuse_what_it_wrote(self.actions.kind, self.learners.asked, names)
@@ -279,11 +287,12 @@ class CoverageBatch:
         """
         own = self._changing()
         check_like(state, own)
-        drawn = checked(self.pool, state)
+        drawn, changed = checked(self.pool, state)
         if isinstance(self.pool, DrawnPool):
             self.pool.install(drawn)
         for name, array in own.items():
             array[...] = state[name]
+        install_scenes(self.pool, self.lanes, changed)
         # the other array of observations is not what it was
         self.missions.settled[:] = False
         self._begun = bool((self.lanes.mission >= 0).all())
@@ -291,6 +300,9 @@ class CoverageBatch:
     def _changing(self) -> dict[str, NDArray[Any]]:
         parts = (self.worlds, self.learners, self.lanes)
         arrays = {k: v for part in parts for k, v in part._asdict().items()}
+        del arrays["scene"]  # it follows from the others
+        if not self.pool.changes:
+            del arrays["changes"]
         arrays["observation"] = self.observation
         if isinstance(self.pool, DrawnPool):
             arrays["drawn_from"] = self.pool.drawn_from
@@ -298,7 +310,7 @@ class CoverageBatch:
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a player of this lane sees now, in arrays of their own."""
-        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scenario[lane]))
+        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
         state = STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
         return swarm_state(self.scenario_of(lane), arena, state)
 
@@ -322,7 +334,7 @@ class CoverageBatch:
             raise ValueError(f"commands for {len(commands)} of {self.num_envs} lanes")
         rows = []
         for lane, given in enumerate(commands):
-            s = int(self.lanes.scenario[lane])
+            s = int(self.lanes.scene[lane])
             moment = moment_of(self.pool, s, self.worlds, self.learners, lane)
             rows.append(joint_action_of(self.actions, moment, given, clip, n_uas=self.n_uas))
         return np.stack(rows)
@@ -332,8 +344,8 @@ class CoverageBatch:
         return MissionBrief.of(self.scenario_of(lane))
 
     def scenario_of(self, lane: int) -> Scenario:
-        """The scenario that a lane flies now."""
-        return self.pool.scenarios[self.lanes.scenario[lane]]
+        """The scenario that a lane flies; where events have changed the scene, as it is now."""
+        return self.pool.scene_of(int(self.lanes.scene[lane]))
 
     def _orders(self, begins: NDArray[np.bool_], chosen: Any = None) -> NDArray[np.int64]:
         """Begin missions in some lanes: those chosen, or drawn."""
@@ -392,17 +404,18 @@ class CoverageBatch:
         return refused
 
     def _compiled_rules(self) -> BatchRules:
-        settings = self.settings
-        kind = self.actions.kind
+        settings, kind = self.settings, self.actions.kind
         goes_to = kind.goes_to or self.pool.goes_home
         called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
         paying = paying_of(settings.reward, settings.weights)
-        observing = observing_of(settings.observation)
-        nonlinear = settings.dynamics == "nonlinear"
-        pushed = disturbance_code(self.pool.disturbances)
-        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, observing)
-        # `_draw_next` comes between the end of a drawn mission and the next
-        autoreset = DISABLED if self.draws and self.autoreset == SAME_STEP else self.autoreset
+        nonlinear, pushed = (
+            settings.dynamics == "nonlinear",
+            disturbance_code(self.pool.disturbances),
+        )
+        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, self._observing)
+        # `_draw_next` comes between the end of a mission and the next
+        begins_later = self._begins_here and self.autoreset == SAME_STEP
+        autoreset = DISABLED if begins_later else self.autoreset
         return BatchRules(rules, autoreset, lane_code(settings.observation_size))
 
     def _ask(self, actions: Any) -> None:
@@ -414,8 +427,8 @@ class CoverageBatch:
                 f"{self.n_uas} UAS in each of {self.num_envs} lanes"
             )
         if actions.dtype.kind not in ("iu" if self.chooses else "fiu"):
-            kind = "whole numbers" if self.chooses else "real numbers"
-            raise ValueError(f"actions have dtype {actions.dtype}; give {kind}")
+            numbers = "whole" if self.chooses else "real"
+            raise ValueError(f"actions have dtype {actions.dtype}; give {numbers} numbers")
         choices = self.actions.kind.choices
         if self.chooses and (actions.min() < 0 or actions.max() >= choices):
             raise ValueError(
@@ -426,6 +439,5 @@ class CoverageBatch:
 
 
 def _check_count(name: str, count: Any, most: int) -> None:
-    whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
-    if not whole or not 1 <= count <= most:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= most:
         raise ValueError(f"{name} is {count!r}; give a whole number from 1 to {most}")

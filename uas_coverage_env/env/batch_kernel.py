@@ -95,8 +95,11 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     lanes = missions.lanes
     s = order
     if order == DRAW:
-        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.arenas.sizes.shape[0])
+        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.starts.sizes.shape[0])
     lanes.scenario[lane] = s
+    lanes.scene[lane] = s
+    for k in range(lanes.changes.shape[1]):
+        lanes.changes[lane, k] = -1
     lanes.mission[lane] += 1
     lanes.orders[lane] = FLY
     state = state_of(missions.worlds, lane, pool.arenas, s)
@@ -223,7 +226,7 @@ def _first_refused(pool, missions, orders):
     for lane in range(asked.shape[0]):
         if orders[lane] != FLY:
             continue
-        s = missions.lanes.scenario[lane]
+        s = missions.lanes.scene[lane]
         i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
         if i != ACCEPTED:
             return lane * asked.shape[1] + i
@@ -288,7 +291,7 @@ def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
         for i in range(lanes.rewards.shape[1]):
             lanes.rewards[lane, i] = 0.0
     else:
-        s = lanes.scenario[lane]
+        s = lanes.scene[lane]
         arena = arena_of(pool.arenas, s)
         max_steps = arena.rules[0].max_steps
         state = state_of(missions.worlds, lane, pool.arenas, s)

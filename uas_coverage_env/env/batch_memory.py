@@ -33,7 +33,11 @@ class SubEnvironments(NamedTuple):
     mission: Annotated[NDArray[np.int64], "L", Values(-1, np.iinfo(np.int64).max - 1)]
     """Number of the mission since the lane was seeded, from 0 on."""
     scenario: Annotated[NDArray[np.int64], "L", Values(0, "S")]
-    """Index in the pool."""
+    """Index in the pool of the mission."""
+    scene: Annotated[NDArray[np.int64], "L"]
+    """Index in the pool of what it flies now: the mission, or its scene since that has changed."""
+    changes: Annotated[NDArray[np.int64], "L", "changes"]
+    """What has changed the scene of the mission, in order, see `simulation.scenes`; then -1."""
     orders: Annotated[NDArray[np.int64], "L", Values(FLY, DRAW)]
     """What it does in the coming step: FLY, or DRAW after an end (NEXT_STEP)."""
     rewards: Annotated[NDArray[np.float64], "L", "U"]
@@ -101,6 +105,6 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
     missions.worlds.status[:] = FLYING
     missions.lanes.seed[:] = seeds
-    missions.lanes.mission[:] = -1
+    missions.lanes.mission[:] = missions.lanes.changes[:] = -1
     missions.lanes.orders[:] = FLY
     return missions

@@ -10,13 +10,15 @@ from uas_coverage_env.env.batch_memory import LANES
 from uas_coverage_env.env.drawn import DrawnMission, DrawnPool
 from uas_coverage_env.env.memory import LEARNERS
 from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.scenes import scenes_in
 from uas_coverage_env.env.state_dict import check_values
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world.state import STATE
 
 
 def checked(
     pool: ScenarioPool | DrawnPool, state: Mapping[str, NDArray[Any]]
-) -> list[DrawnMission]:
+) -> tuple[list[DrawnMission], dict[int, Scenario]]:
     """Look for values that no mission of a batch can have.
 
     Args:
@@ -24,7 +26,8 @@ def checked(
         state: Its arrays by name, of the right shapes and dtypes.
 
     Returns:
-        The missions that were drawn, for `DrawnPool.install`.
+        The missions that were drawn, for `DrawnPool.install`; and the scenes that have changed,
+        for `install_scenes`.
 
     Raises:
         ValueError: There are such values.
@@ -36,8 +39,14 @@ def checked(
         for mission in drawn:
             scenarios[mission.lane] = mission.scenario
     longest = max(pool.settings.limited(scenario).max_steps for scenario in scenarios)
-    of_scenario = np.array([len(scenario.waypoints) for scenario in scenarios])
-    n_waypoints = of_scenario[state["scenario"].clip(0, len(scenarios) - 1)]
+    flown = state["scenario"].clip(0, len(scenarios) - 1)
+    changed = {}
+    if pool.changes:
+        missions = {lane: scenarios[flown[lane]] for lane in np.flatnonzero(begun).tolist()}
+        changed = scenes_in(state, {k: pool.settings.limited(v) for k, v in missions.items()})
+    n_waypoints = np.array([len(scenario.waypoints) for scenario in scenarios])[flown]
+    for lane, known in changed.items():
+        n_waypoints[lane] = len(known.waypoints)
     check_values(
         state,
         {
@@ -48,4 +57,4 @@ def checked(
     )
     if isinstance(pool, DrawnPool):
         check_values(state, {"scenario": pool.slots_of(begun)})
-    return drawn
+    return drawn, changed

@@ -42,7 +42,7 @@ class Cockpit:
         self._view = WorldView(brief)
         self._settings = settings
         self.actions = actions_of(settings.action, scenario)
-        self._tables = tables_of(scenario, self.actions)
+        self._tables = tables_of(scenario, self.actions.ranges)
         sizes = ARENA.sizes_of(self._view.arena, learners_sizes(settings, self.actions.size))
         self._learners = LEARNERS.zeros(sizes)
         self._learners.targets[:] = NO_TARGET

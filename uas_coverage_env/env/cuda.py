@@ -283,6 +283,11 @@ class CudaMissions:
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
         pool = ScenarioPool(scenario, given)
+        if pool.changes:
+            raise ValueError(
+                f"scenario {pool.scenarios[0].name!r} has events or again_after_s by which the "
+                f"scene changes, which does not run on a GPU; take make_vec"
+            )
         if goes_home(pool.scenarios[0]):
             raise ValueError(
                 f"scenario {pool.scenarios[0].name!r} has an event that sends UAS home, which does "

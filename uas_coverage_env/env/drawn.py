@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES
-from uas_coverage_env.env.pool import MissionPool, ScenarioPool, check_scene
+from uas_coverage_env.env.pool import MissionPool, ScenarioPool, scene_arrays
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
+from uas_coverage_env.simulation.scenes import changes_scene
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import fitted_to, in_slots
 from uas_coverage_env.world.events import goes_home, is_eventful
@@ -39,11 +40,12 @@ class DrawnPool:
 
     Attributes:
         settings: As given.
-        scenarios: (L,) what the lanes fly; before their first missions an example.
+        scenarios: (L,) what the lanes fly, as it is now; before their first missions an example.
         actions: The kind of action.
         sizes: The largest that the arrays of a lane may need.
         disturbances: One of each kind that may act: of those in `source.examples`.
         goes_home: Whether an event may send a UAS home, in any of `source.examples`.
+        changes: Whether the scene of any of `source.examples` may change.
         drawn_from: (L, 6) states of the generators from which the missions now flown were drawn;
             zero where none was drawn.
     """
@@ -63,7 +65,10 @@ class DrawnPool:
         self.sizes["S"] = source.room.n_uas if eventful else 0
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
-        self.sizes["repeats"] = 0
+        repeats = any(scenario.asks_again for scenario in source.examples)
+        self.sizes["repeats"] = self.sizes["W"] if repeats else 0
+        self.changes = any(changes_scene(scenario) for scenario in source.examples)
+        self.sizes["changes"] = self.sizes["E"] + self.sizes["repeats"] if self.changes else 0
         self._slots: list[Slots[Any]] = [Slots(memory, num_envs) for memory in _MEMORIES]
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self.drawn_from = np.zeros((num_envs, _WORDS), dtype=np.uint64)
@@ -127,17 +132,32 @@ class DrawnPool:
     def _check_events(self, scenario: Scenario) -> None:
         """Refuse more events, or others, than there is room for."""
         n_events, n_sensed = len(scenario.events), len(scenario.uas) * is_eventful(scenario)
-        check_scene(scenario)
         if (
             n_events > self.sizes["E"]
             or n_sensed > self.sizes["S"]
             or goes_home(scenario) > self.goes_home
             or swaps_alone(scenario) > (self.sizes["B"] > 0)
+            or scenario.asks_again > (self.sizes["repeats"] > 0)
+            or changes_scene(scenario) > self.changes
         ):
             raise ValueError(
-                f"scenario {scenario.name!r} has more events, [sensing] or [sorties] than the "
-                f"{len(self._source.examples)} examples that this batch was made for"
+                f"scenario {scenario.name!r} has more events, [sensing], [sorties] or "
+                f"again_after_s than the {len(self._source.examples)} examples that this batch "
+                f"was made for"
             )
+
+    def scene_of(self, scene: int) -> Scenario:
+        """The scenario that is flown now where `lanes.scene` is this."""
+        return self.scenarios[scene]
+
+    def put_scene(self, lane: int, scene: int, known: Scenario) -> int:
+        """Lay out what the scene of a lane has become, see `ScenarioPool`: in its own slot."""
+        before = TABLES.mission(self.arrays.tables, scene)
+        arena, tables = scene_arrays(known, self.settings, self.disturbances, before)
+        self._slots[_MEMORIES.index(ARENA)].put(lane, arena)
+        self._slots[_MEMORIES.index(TABLES)].put(lane, tables)
+        self.scenarios[lane] = known
+        return lane
 
     def check_drawn(self) -> None:
         """Refuse to put missions aside that cannot be drawn again.
@@ -198,10 +218,10 @@ def pool_of(
         ValueError: `scenario` is none of what is allowed.
     """
     if isinstance(scenario, Sequence) and not isinstance(scenario, str):
-        return ScenarioPool(scenario, settings)
+        return ScenarioPool(scenario, settings, lanes=num_envs)
     source = MissionSource.of(scenario)
     if source.fixed:
-        return ScenarioPool(source.example, settings)
+        return ScenarioPool(source.example, settings, lanes=num_envs)
     return DrawnPool(source, settings, num_envs)
 
 

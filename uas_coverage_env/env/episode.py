@@ -15,15 +15,19 @@ from uas_coverage_env.env.global_state import global_state
 from uas_coverage_env.env.infos import Infos
 from uas_coverage_env.env.kernel import ACCEPTED, step_episode
 from uas_coverage_env.env.memory import EPISODE, LEARNERS, SCRATCH, Learners
-from uas_coverage_env.env.observation.nearest import count_company
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
+from uas_coverage_env.env.start import (
+    first_observation,
+    learners_sizes,
+    look_around,
+    tables_of,
+)
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 
@@ -87,7 +91,7 @@ class Episode:
         """Make the arrays whose sizes are those of the scene."""
         world = self._world
         self.scenario, self.revisions = world.known, world.revisions
-        self.tables = tables_of(self.scenario, self.actions)
+        self.tables = tables_of(self.scenario, self.actions.ranges)
         sizes = ARENA.sizes_of(world.arena, self._sizes)
         self._learners = LEARNERS.zeros(sizes)
         self._scratch = SCRATCH.zeros(sizes)
@@ -96,15 +100,14 @@ class Episode:
         """Go on in a scene that has changed; waypoints keep their indices."""
         world, before, outcome = self._world, self._learners, self._scratch
         self._lay_out()
-        for name in ("asked", "targets", "report", "amounts"):
+        for name in ("asked", "targets", "candidates", "report", "amounts"):
             getattr(self._learners, name)[:] = getattr(before, name)
         for array, old in zip(self._scratch, outcome, strict=True):
             array[:] = old
-        count_company(world.state.uncovered, self.tables.neighbours, self._learners.company)
         self._prepare()
-        observe(
-            world.arena, world.state.as_told(), self.tables, self._learners, self._observing,
-            world.state.status == FLYING, self.observation,
+        look_around(
+            world.arena, world.state, self.tables, self._learners, self._observing,
+            self.observation,
         )  # fmt: skip
 
     def _prepare(self) -> None:

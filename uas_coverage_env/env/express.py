@@ -39,7 +39,7 @@ def moment_of(
 
     Args:
         pool: Of missions.
-        s: Index of the one that is flown.
+        s: Index of what is flown now.
         worlds: With an axis of lanes in front.
         learners: Likewise.
         lane: Which.
@@ -47,7 +47,7 @@ def moment_of(
     arena = ARENA.mission(pool.arrays.arenas, s)
     sizes = ARENA.sizes_of(arena)
     return Moment(
-        tuple(uas.name for uas in pool.scenarios[s].uas),
+        tuple(uas.name for uas in pool.scene_of(s).uas),
         arena,
         STATE.lane(worlds, lane, sizes).as_told(),
         TABLES.mission(pool.arrays.tables, s),

@@ -73,7 +73,7 @@ class RewardMeter:
         world = self._world
         actions = actions_of(self._settings.action, world.known)
         sizes = ARENA.sizes_of(world.arena, learners_sizes(self._settings, actions.size))
-        self._tables = tables_of(world.known, actions)
+        self._tables = tables_of(world.known, actions.ranges)
         self._learners = LEARNERS.zeros(sizes)
         self._learners.targets[:] = NO_TARGET
         self._learners.candidates[:] = -1

@@ -36,7 +36,7 @@ class Observer:
         scenario = brief.as_scenario()
         self._view = WorldView(brief)
         actions = actions_of(settings.action, scenario)
-        self._tables = tables_of(scenario, actions)
+        self._tables = tables_of(scenario, actions.ranges)
         sizes = ARENA.sizes_of(self._view.arena, learners_sizes(settings, actions.size))
         self._learners = LEARNERS.zeros(sizes)
         self._learners.targets[:] = NO_TARGET

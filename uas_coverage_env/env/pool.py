@@ -8,37 +8,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Pool
+from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES, FirstObservation
+from uas_coverage_env.env.memory import (
+    FIRST_OBSERVATION,
+    LEARNERS,
+    TABLES,
+    FirstObservation,
+    Tables,
+)
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
-from uas_coverage_env.scenario import Scenario, loaded_scenario
+from uas_coverage_env.scenario import Room, Scenario, loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
-from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.simulation.scenes import changes_scene
+from uas_coverage_env.world.arena import ARENA, Arena, build_arena
 from uas_coverage_env.world.disturbance import Disturbance, fitted_to, in_slots
 from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.state import STATE
 
+MEASURED_M = 0.0
+"""Only what counts: nothing more is told."""
 
-def check_scene(scenario: Scenario) -> None:
-    """Refuse a scenario whose scene changes.
 
-    Raises:
-        ValueError: It does; the scenes of a batch are laid out once.
+def scene_arrays(
+    known: Scenario,
+    settings: MissionSettings,
+    disturbances: Sequence[Disturbance],
+    before: Tables,
+) -> tuple[Arena, Tables]:
+    """The arrays of a mission whose scene has changed.
+
+    Args:
+        known: The scenario from now on.
+        settings: How missions are flown and paid.
+        disturbances: One of each kind in the pool.
+        before: The tables of the scene before.
     """
-    for event in scenario.events:
-        if event.changes_scene:
-            raise ValueError(
-                f"scenario {scenario.name!r} has an event {event.kind!r}, which changes the "
-                f"scene: batches do not fly that; take parallel_env, env or gymnasium.make"
-            )
-    if scenario.asks_again:
-        raise ValueError(
-            f"scenario {scenario.name!r} has waypoints with again_after_s, by which the scene "
-            f"changes: batches do not fly that; take parallel_env, env or gymnasium.make"
-        )
+    slots = fitted_to(disturbances, settings.disturbances_in(known))
+    arena = build_arena(known, measured_m=MEASURED_M, disturbances=slots)
+    return arena, tables_of(known, before.ranges)
 
 
 class MissionPool(NamedTuple):
@@ -77,6 +88,7 @@ class ScenarioPool:
             sequence of these.
         settings: How missions are flown and paid; None: as usual.
         disturbances: One of each kind that there is to be room for; None: those that act.
+        lanes: How many fly them: each may get a scene of its own, behind the missions.
 
     Attributes:
         settings: As given.
@@ -88,6 +100,7 @@ class ScenarioPool:
         n_waypoints: (S,).
         disturbances: One of each kind that acts in any of the scenarios.
         goes_home: Whether an event of any of them may send a UAS home.
+        changes: Whether the scene of any of them may change.
 
     Raises:
         ValueError: There is no scenario, or one is none of what is allowed.
@@ -98,6 +111,8 @@ class ScenarioPool:
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario],
         settings: MissionSettings | None = None,
         disturbances: Sequence[Disturbance] | None = None,
+        *,
+        lanes: int = 0,
     ) -> None:
         if callable(scenario):
             raise ValueError(
@@ -107,19 +122,21 @@ class ScenarioPool:
         settings = settings or MissionSettings()
         self.settings = settings
         self.scenarios = tuple(settings.limited(loaded_scenario(entry)) for entry in given)
-        for each in self.scenarios:
-            check_scene(each)
         self.goes_home = any(goes_home(scenario) for scenario in self.scenarios)
+        self.changes = any(changes_scene(scenario) for scenario in self.scenarios)
         acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
         if disturbances is None:
             self.disturbances, slots = in_slots(acting)
         else:
             self.disturbances = tuple(disturbances)
             slots = [fitted_to(disturbances, own) for own in acting]
-        worlds = pool_worlds(self.scenarios, measured_m=0.0, slots=slots)  # only what counts
+        worlds = pool_worlds(self.scenarios, measured_m=MEASURED_M, slots=slots)
         actions = [actions_of(settings.action, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
-        tables = [tables_of(*both) for both in zip(self.scenarios, actions, strict=True)]
+        tables = [
+            tables_of(scenario, each.ranges)
+            for scenario, each in zip(self.scenarios, actions, strict=True)
+        ]
         own_sizes = learners_sizes(settings, self.actions.size)
         observing = observing_of(settings.observation)
         first = [
@@ -139,12 +156,48 @@ class ScenarioPool:
             FIRST_OBSERVATION.pool([FirstObservation(observation) for _, observation in first]),
         )
         largest = {**STATE.largest(worlds.starts), **ARENA.largest(worlds.arenas)}
-        self.sizes = {**largest, **own_sizes}
+        if self.changes:
+            # once all has happened
+            largest["W"] = max(Room.of(scenario).n_waypoints for scenario in self.scenarios)
+            largest["repeats"] = largest["W"] if largest["repeats"] else 0
+        changes = largest["E"] + largest["repeats"] if self.changes else 0
+        self.sizes = {**largest, **own_sizes, "changes": changes}
+        self._known = [*self.scenarios, *self.scenarios[:1] * lanes]
+        if self.changes and lanes:
+            n = len(self._known)
+            self._arenas, self._tables = Slots(ARENA, n), Slots(TABLES, n)
+            for s in range(len(self)):
+                self._arenas.put(s, ARENA.mission(worlds.arenas, s))
+                self._tables.put(s, tables[s])
         self.n_uas = ARENA.size(worlds.arenas, "U")
         self.n_waypoints = ARENA.size(worlds.arenas, "W")
 
     def __len__(self) -> int:
         return len(self.scenarios)
+
+    def scene_of(self, scene: int) -> Scenario:
+        """The scenario that is flown now where `lanes.scene` is this."""
+        return self._known[scene]
+
+    def put_scene(self, lane: int, scene: int, known: Scenario) -> int:
+        """Lay out what the scene of a lane has become.
+
+        Args:
+            lane: Which; below `lanes`.
+            scene: Index in the pool of what it has been.
+            known: The scenario from now on.
+
+        Returns:
+            Index in the pool of what it is.
+        """
+        now = len(self) + lane
+        before = TABLES.mission(self.arrays.tables, scene)
+        arena, tables = scene_arrays(known, self.settings, self.disturbances, before)
+        self._arenas.put(now, arena)
+        self._tables.put(now, tables)
+        self._known[now] = known
+        self.arrays = self.arrays._replace(arenas=self._arenas.pool, tables=self._tables.pool)
+        return now
 
     def chosen(self, given: Any, num_envs: int) -> NDArray[np.int64] | None:
         """(L,) indices of the scenarios that lanes are to fly; None: they are drawn.

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import Actions
 from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
@@ -24,9 +23,14 @@ from uas_coverage_env.world import FLYING, Arena, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 
-def tables_of(scenario: Scenario, actions: Actions) -> Tables:
-    """What does not change during the missions of a scenario."""
-    return Tables(actions.ranges, scales_of(scenario), neighbours_of(scenario))
+def tables_of(scenario: Scenario, ranges: NDArray[np.float64]) -> Tables:
+    """What does not change as long as the scene does not.
+
+    Args:
+        scenario: As it is now.
+        ranges: Of the actions.
+    """
+    return Tables(ranges, scales_of(scenario), neighbours_of(scenario))
 
 
 def learners_sizes(settings: MissionSettings, action_size: int) -> dict[str, int]:
@@ -66,7 +70,28 @@ def first_observation(
     learners.report[:, STATUS] = state.status
     learners.report[:, COVERED] = (~state.uncovered).sum()
     first = FIRST_OBSERVATION.zeros(sizes)
+    look_around(arena, state, tables, learners, observing, first.observation)
+    return learners, first.observation
+
+
+def look_around(
+    arena: Arena,
+    state: WorldState,
+    tables: Tables,
+    learners: Learners,
+    observing: Observing,
+    observation: NDArray[np.float32],
+) -> None:
+    """Observe a scene that is new to those that fly.
+
+    Args:
+        arena: The arena.
+        state: The world now.
+        tables: Of the scene.
+        learners: The learners' arrays; what depends on the scene is written.
+        observing: What is observed.
+        observation: (U, V); the rows of UAS that fly are written.
+    """
     count_company(state.uncovered, tables.neighbours, learners.company)
     flying = state.status == FLYING
-    observe(arena, state, tables, learners, observing, flying, first.observation)
-    return learners, first.observation
+    observe(arena, state.as_told(), tables, learners, observing, flying, observation)

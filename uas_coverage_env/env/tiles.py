@@ -76,6 +76,7 @@ class Tiles:
             if before != missions[lane]:
                 self._missions[lane] = missions[lane]
                 self._begin(lane, scenario)
+            self._screens[lane].change(scenario)
             self._screens[lane].see(positions_m[lane, : len(scenario.uas)])
 
     def render(self, swarm_state: Callable[[int], SwarmState]) -> Any:

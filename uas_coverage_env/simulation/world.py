@@ -12,8 +12,14 @@ from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.disturbances import Disturbance, disturbances_of
 from uas_coverage_env.disturbances.act import begin_random, disturbance_code
-from uas_coverage_env.scenario import NoFlyZone, Scenario
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import take_off
+from uas_coverage_env.simulation.scenes import (
+    carried_over,
+    changes_due,
+    changes_scene,
+    scene_after,
+)
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
 from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
@@ -25,7 +31,6 @@ from uas_coverage_env.world.packs import packs_left, swap_steps_left, swaps_alon
 from uas_coverage_env.world.state import (
     FLYING,
     LANDED,
-    PACK_COVERED,
     STATE,
     SWAPPING,
     SwarmState,
@@ -143,7 +148,7 @@ class World:
         self._start = initial_state(scenario, len(self.disturbances))
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
-        self._scene_events = [e for e, event in enumerate(scenario.events) if event.changes_scene]
+        self._changes = changes_scene(scenario)
         self._nonlinear = dynamics == "nonlinear"
         self._prepare()
         self._seed = 0
@@ -250,34 +255,16 @@ class World:
         Returns:
             Whether anything changed.
         """
+        if not self._changes:
+            return False
         state = self.state
-        if not self._scene_events and not len(state.due_step):
+        changes = changes_due(self.known, state)
+        if not changes:
             return False
-        now = [e for e in self._scene_events if state.event_step[e] == state.step[0]]
-        again = np.flatnonzero((state.due_step == state.step[0]) & (state.due_step > 0)).tolist()
-        if not now and not again:
-            return False
-        for e in now:
-            event = self.scenario.events[e]
-            self.known = self.known.after(event, self.time_s, int(state.event_uas[e]))
-        for w in again:
-            self.known = self.known.asked_again(w)
+        for change in changes:
+            self.known = scene_after(self.known, change, state)
         self.arena = self._arena_of(self.known)
-        uncovered = np.ones(len(self.known.waypoints), dtype=np.bool_)
-        uncovered[: len(state.uncovered)] = state.uncovered
-        positions_m = self.arena.waypoints["position_m"]
-        for obstacle, hull in zip(self.known.obstacles, self.known.hulls, strict=True):
-            if isinstance(obstacle, NoFlyZone):
-                uncovered &= hull.signed_distance(positions_m) >= 0.0
-        if len(uncovered) > len(state.uncovered):
-            # one that was called home because nothing was left may have something to do now
-            state.returning[:] = False
-            if not (state.status == FLYING).any():
-                # likewise one whose last sortie has covered nothing
-                state.packs[:, PACK_COVERED] = 1
-        due_step = np.zeros(len(uncovered) if len(state.due_step) else 0, dtype=np.int64)
-        due_step[: len(state.due_step)] = state.due_step
-        self._state = state._replace(uncovered=uncovered, due_step=due_step)
+        self._state = carried_over(self.known, self.arena, state)
         self.revisions += 1
         self._prepare()
         return True

@@ -39,6 +39,7 @@ from uas_coverage_env.world.tubes import route_tube_m, tubes_m
 from uas_coverage_env.world.waypoints import (
     N_WAYPOINT_COLUMNS,
     WAYPOINT_DTYPE,
+    again_steps,
     sensors_of,
     unit_m_of,
     waypoint_columns,
@@ -143,6 +144,9 @@ class Arena(NamedTuple):
     north, east, down [m], radius² [m²], weight; then whole numbers: share of all weight in units of
     1 / ALL_SHARES, and this times north and east in units of `rules.unit_m`. Sums of whole numbers
     are exact, whatever their order."""
+    again_steps: Annotated[NDArray[np.int64], "repeats"]
+    """Steps from its covering until each waypoint is asked for again, 0 where that does not happen;
+    of none where no waypoint is to be covered more than once."""
     rules: Annotated[NDArray[np.void], RULES_DTYPE, 1]
     nodes_m: Annotated[NDArray[np.float64], "N", 2]
     """[m] corners at which routes turn."""
@@ -222,6 +226,7 @@ def build_arena(
         moving_velocity_mps=moving_velocity_mps,
         waypoints=waypoints,
         waypoint_columns=waypoint_columns(waypoints, float(rules["unit_m"][0])),
+        again_steps=again_steps(scenario),
         rules=rules,
         nodes_m=nodes_m,
         node_distance_m=node_distances(

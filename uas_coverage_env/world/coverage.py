@@ -99,8 +99,8 @@ def cover(arena, state, sample, outcome):
                 if not _is_as_asked(arena, i, w, state.x[i]):
                     continue
                 state.uncovered[w] = False
-                if rarely(state.due_step.shape[0] > 0) and arena.waypoints[w].again_steps > 0:
-                    state.due_step[w] = sample + arena.waypoints[w].again_steps
+                if rarely(state.due_step.shape[0] > 0) and arena.again_steps[w] > 0:
+                    state.due_step[w] = sample + arena.again_steps[w]
                 event.newly_covered += 1
                 event.newly_covered_weight += columns[4, w]
 

@@ -32,8 +32,6 @@ WAYPOINT_DTYPE = np.dtype(
                 ("lowest_m", "f8"),
                 ("highest_m", "f8"),
                 ("max_speed_mps", "f8"),
-                # steps from one covering to being asked for again; 0: it is not
-                ("again_steps", "i8"),
             ],
             align=True,
         ),
@@ -50,11 +48,18 @@ def waypoint_records(scenario: Scenario) -> NDArray[np.void]:
             0 if w.sensor is None else bits.get(w.sensor, _NOBODY_HAS),
             *(w.heights_m or (-math.inf, math.inf)),
             math.inf if w.max_speed_mps is None else w.max_speed_mps,
-            steps_until(w.again_after_s[0], scenario.dt_s) if w.again_after_s else 0,
         )
         for w in scenario.waypoints
     ]
     return np.array(rows, dtype=WAYPOINT_DTYPE)
+
+
+def again_steps(scenario: Scenario) -> NDArray[np.int64]:
+    """See `Arena.again_steps`."""
+    if not scenario.asks_again:
+        return np.zeros(0, dtype=np.int64)
+    gaps_s = (w.again_after_s for w in scenario.waypoints)
+    return np.array([steps_until(each[0], scenario.dt_s) if each else 0 for each in gaps_s])
 
 
 def sensors_of(scenario: Scenario, uas: Uas) -> int:

@@ -1,0 +1,131 @@
+"""Scenes that change in a batch: those lanes are laid out anew, as a single mission is."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_env.env.batch_memory import Missions, SubEnvironments
+from uas_coverage_env.env.drawn import DrawnPool
+from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
+from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.start import look_around
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.events import OfUas
+from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
+from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.state import STATE, WorldState
+
+
+def change_scenes(
+    pool: ScenarioPool | DrawnPool,
+    missions: Missions,
+    flew: NDArray[np.bool_],
+    observing: Observing,
+    observation: NDArray[np.float32],
+) -> None:
+    """Let happen at this sample what changes scenes, as `World.change_scene` does.
+
+    Args:
+        pool: The scenes of lanes are put into it.
+        missions: Written where a scene changes.
+        flew: (L,) which lanes have flown the step to this sample.
+        observing: What is observed.
+        observation: (L, U, V); written where a scene changes.
+    """
+    worlds = missions.worlds
+    happens = (worlds.event_step == worlds.step).any(axis=1)
+    again = (worlds.due_step == worlds.step).any(axis=1)
+    for lane in np.flatnonzero(flew & (happens | again)).tolist():
+        _change_scene(pool, missions, lane, observing, observation[lane])
+
+
+def _change_scene(
+    pool: ScenarioPool | DrawnPool,
+    missions: Missions,
+    lane: int,
+    observing: Observing,
+    observation: NDArray[np.float32],
+) -> None:
+    worlds, lanes = missions.worlds, missions.lanes
+    scene = int(lanes.scene[lane])
+    known = pool.scene_of(scene)
+    state = STATE.lane(worlds, lane, ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene)))
+    changes = changes_due(known, state)
+    if not changes:
+        return
+    n_before = int((lanes.changes[lane] >= 0).sum())
+    lanes.changes[lane, n_before : n_before + len(changes)] = changes
+    for change in changes:
+        known = scene_after(known, change, state)
+    scene = lanes.scene[lane] = pool.put_scene(lane, scene, known)
+    arena = ARENA.mission(pool.arrays.arenas, scene)
+    sizes = ARENA.sizes_of(arena)
+    carried = carried_over(known, arena, state)
+    state = STATE.lane(worlds, lane, sizes)
+    for array, each in zip(state, carried, strict=True):
+        array[:] = each
+    tables = TABLES.mission(pool.arrays.tables, scene)
+    learners = LEARNERS.lane(missions.learners, lane, sizes)
+    look_around(arena, state, tables, learners, observing, observation[: sizes["U"]])
+
+
+def scenes_in(
+    state: Mapping[str, NDArray[Any]], missions: Mapping[int, Scenario]
+) -> dict[int, Scenario]:
+    """The scenes of a batch that was put aside, where they have changed.
+
+    Args:
+        state: The arrays of the batch by name.
+        missions: Lane -> the scenario that it flies, as it was at t = 0.
+
+    Returns:
+        Lane -> the scenario as it was when the batch was put aside.
+
+    Raises:
+        ValueError: No mission can have changed like this.
+    """
+    changed = {}
+    for lane, known in missions.items():
+        changes = state["changes"][lane].tolist()
+        n = sum(change >= 0 for change in changes)
+        if n:
+            world = WorldState(*(state[name][lane] for name in WorldState._fields))
+            changed[lane] = _scene_after_all(known, changes[:n], world, f"changes[{lane}]")
+    return changed
+
+
+def _scene_after_all(
+    known: Scenario, changes: Sequence[int], state: WorldState, where: str
+) -> Scenario:
+    n_events = len(known.events)
+    for k, change in enumerate(changes):
+        possible = change not in changes[:k]
+        if 0 <= change < n_events:
+            event = known.events[change]
+            possible &= event.changes_scene and 1 <= state.event_step[change] <= state.step[0]
+            of_uas = isinstance(event, OfUas)
+            possible &= not of_uas or 0 <= state.event_uas[change] < len(known.uas)
+        else:
+            w = change - n_events
+            possible &= 0 <= w < len(known.waypoints) and bool(known.waypoints[w].again_after_s)
+        if not possible:
+            raise ValueError(f"{where} is {list(changes)}, which no mission here can have")
+        known = scene_after(known, change, state)
+    return known
+
+
+def install_scenes(
+    pool: ScenarioPool | DrawnPool, lanes: SubEnvironments, changed: Mapping[int, Scenario]
+) -> None:
+    """Put the scenes of `scenes_in` into a pool.
+
+    Args:
+        pool: Of the batch.
+        lanes: With the scenarios and changes of the batch; `scene` is written.
+        changed: Lane -> the scenario that it flies now.
+    """
+    lanes.scene[:] = lanes.scenario
+    for lane, known in changed.items():
+        lanes.scene[lane] = pool.put_scene(lane, int(lanes.scenario[lane]), known)
