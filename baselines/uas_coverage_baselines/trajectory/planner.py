@@ -90,13 +90,15 @@ class Trajectory:
         self._by_legs: LegMission | None = None
         self.mission_plan = None
         if brief.execution is not None:
-            effort = SearchEffort(self.options.moves, total_weight=self.total_weight)
+            weight, moves = self.total_weight, self.options.moves
+            effort = SearchEffort(moves, total_weight=weight, by_pieces=True)
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
         self._way_home = Range(brief)
-        self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
+        margin_m = self.options.moving_margin_m
+        self._safeguard = Safeguard(self._fleet, self._world, self._way_home, margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
@@ -111,7 +113,7 @@ class Trajectory:
         self._down = np.zeros(len(brief.uas), np.bool_)
         self._back, self._blocked = self._down, np.zeros(len(brief.waypoints), np.bool_)
         if self._under_way is None:
-            self._begin(first_sight(brief))
+            self._begin(None)
 
     def _kept(self, brief: MissionBrief) -> UnderWay:
         """What was flown, if it may be flown on in this scene."""
@@ -122,11 +124,13 @@ class Trajectory:
             return UnderWay(order)
         return UnderWay(order, self._planned, self._safeguard.backups)
 
-    def _begin(self, swarm: SwarmState) -> None:
+    def _begin(self, swarm: SwarmState | None) -> None:
         """Make the first plan of a mission, or of one under way since its scene is another."""
-        before = (self._under_way or UnderWay()).at(swarm)
-        if swarm.step == 0:
+        before = UnderWay()
+        if swarm is None or swarm.step == 0:
             swarm = first_sight(self._brief)
+        elif self._under_way is not None:
+            before = self._under_way.at(swarm)
         self._world.update(swarm)
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)
