@@ -26,6 +26,7 @@ from uas_coverage_baselines.routing import (
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
     HOPELESS,
+    SMALL_FLEET,
     Effort,
     MissionPlan,
     Planned,
@@ -38,7 +39,7 @@ from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]
 
-_MOVES_PER_STEP = 160  # changes of an order take as long as a step of a flight looked for
+_MOVES_PER_STEP = 60  # changes of an order take as long as a step of a flight looked for
 _PROGRAMS = 60  # for each flight; more change next to nothing
 _LEFT_STEPS = 20  # a plan that ends sooner after it would take over is not improved
 _AS_PLANNED = 1e-6  # of states
@@ -191,7 +192,9 @@ class Improvement:
         task = self._fleet.task(moment, np.zeros(n_uas))
         nothing = SearchEffort(0, total_weight=effort.total_weight)
         kept = improve_routes(task, order, nothing, 0)
-        search = SearchEffort(moves, total_weight=effort.total_weight, by_pieces=True)
+        search = SearchEffort(
+            moves, total_weight=effort.total_weight, by_pieces=n_uas > SMALL_FLEET
+        )
         searched = OrderSearch(_varied(task, seed), empty_routes(n_uas), search, seed)
         part = _MOVES_PER_STEP * self._steps_each
         while not searched.is_over:

@@ -164,10 +164,7 @@ def plan_mission(
     for _ in range(_BUDGETS):
         task = fleet.task(moment, less_s)
         known: set[tuple[bytes, ...]] = set()
-        orders = _orders(task, effort, seed, kept, fresh)
-        if kept is None:  # how many UAS fly is for the weight to say, not for small differences
-            orders = [order for order in orders if _sent(order) == _sent(orders[0])]
-        orders = orders[: effort.planned]
+        orders = _orders(task, effort, seed, kept, fresh)[: effort.planned]
         if orders[0].trips:  # flights of now alone do not tell which order is cheaper
             orders = orders[:1]
         for order in orders:
@@ -199,11 +196,6 @@ def plan_mission(
     return best
 
 
-def _sent(order: Routes) -> int:
-    """How many UAS have something to visit."""
-    return sum(len(route) > 0 for route in order.routes)
-
-
 def _orders(
     task: RoutingTask,
     effort: Effort,
@@ -222,7 +214,7 @@ def _orders(
             effort.moves,
             hottest_s=4.0 if kept is None or k else 1.5,
             total_weight=effort.total_weight,
-            by_pieces=True,
+            by_pieces=task.n_uas > SMALL_FLEET,
         )
         return improve_trips(task, begin, search, seed + k, fresh)
 

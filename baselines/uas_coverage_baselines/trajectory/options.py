@@ -24,7 +24,7 @@ class TrajectoryOptions(PlannerOptions):
         description="of these orders, how many are planned in full before take-off",
     )
     moves: int = Field(
-        default=600_000,
+        default=300_000,
         ge=0,
         description="changes tried in each search; up to six times as many for large fleets",
     )

@@ -90,8 +90,7 @@ class Trajectory:
         self._by_legs: LegMission | None = None
         self.mission_plan = None
         if brief.execution is not None:
-            weight, moves = self.total_weight, self.options.moves
-            effort = SearchEffort(moves, total_weight=weight, by_pieces=True)
+            effort = SearchEffort(self.options.moves, total_weight=self.total_weight)
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)

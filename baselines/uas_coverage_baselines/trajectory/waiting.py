@@ -19,7 +19,6 @@ _AS_LONG_S = 10.0  # a UAS that can wait nearly as long as another may do so, to
 _OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first
 _OPENS_AGAIN_SHARE = 0.75  # later: of what is left of the mean flight,
 _OPENS_AGAIN_S = 26.0  # and at least so long
-_FEWER = 4  # changes of an order of which only its length matters
 _TOO_LATE_S = 12.0  # before a UAS has to set off home: then it no longer waits
 
 
@@ -94,8 +93,7 @@ def opens_first(
     """
     others = moment.uncovered & ~unknown
     task = fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
-    effort = SearchEffort(moves // _FEWER, by_pieces=True)
-    order = improve_routes(task, empty_routes(task.n_uas), effort, seed)
+    order = improve_routes(task, empty_routes(task.n_uas), SearchEffort(moves), seed)
     late_s = _OPENS_SHARE * float(order.seconds.mean())
     return round(max(_OPENS_AGAIN_S, late_s) / fleet.brief.dt_s)
 
