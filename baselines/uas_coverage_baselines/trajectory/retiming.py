@@ -24,7 +24,7 @@ IntArray = NDArray[np.int64]
 _FIRST_SHARE, _LAST_SHARE = 0.12, 0.03
 _MENDABLE = 4.0
 _REPAIRS = 12
-_STRETCHES = 2  # the longest, from which a step is taken; a third one changed no flight
+_STRETCHES = 3  # the longest, of which one is made shorter
 _LONG_STEPS = 400
 
 
