@@ -96,13 +96,12 @@ class Trajectory:
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
         self._way_home = Range(brief)
-        margin_m = self.options.moving_margin_m
-        self._safeguard = Safeguard(self._fleet, self._world, self._way_home, margin_m)
+        options = self.options
+        self._safeguard = Safeguard(self._fleet, self._world, self._way_home, options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
-        options = self.options
         effort = Effort(1, 1, options.moves, options.programs, self.total_weight)
         self._improvement = Improvement(self._fleet, effort, options.idle_work, seed)
         self._is_handed_over = False
