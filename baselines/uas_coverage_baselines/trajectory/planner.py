@@ -95,9 +95,9 @@ class Trajectory:
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
-        self._way_home = Range(brief)
-        options = self.options
-        self._safeguard = Safeguard(self._fleet, self._world, self._way_home, options.moving_margin_m)
+        options, way_home = self.options, Range(brief)
+        self._way_home = way_home
+        self._safeguard = Safeguard(self._fleet, self._world, way_home, options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
