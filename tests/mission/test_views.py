@@ -6,7 +6,7 @@ import pytest
 from uas_coverage_env import MissionBrief, load_scenario
 from uas_coverage_env.mission import WorldView, first_sight
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import GoTo
+from uas_coverage_env.world import GoTo, build_arena
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,16 @@ def test_a_view_shows_moving_obstacles_where_they_are_now_and_nothing_later(vill
         assert view.arena.moving_path_m[0].tolist() == village.moving_positions(time_s).tolist()
         shown_mps = view.arena.moving_velocity_mps[0]
         assert shown_mps.tolist() == village.moving_velocities(time_s).tolist()
+
+
+def test_what_is_seen_at_rest_before_take_off_stays_there_at_every_sample(village):
+    seen = MissionBrief.of(village).as_scenario()
+    arena = build_arena(seen)
+    for step, (path_m, velocity_mps) in enumerate(
+        zip(arena.moving_path_m, arena.moving_velocity_mps, strict=True)
+    ):
+        assert path_m.tolist() == seen.moving_positions(step * seen.dt_s).tolist()
+        assert not velocity_mps.any()
 
 
 def test_the_rest_of_the_arena_is_the_worlds(village):

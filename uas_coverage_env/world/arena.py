@@ -256,7 +256,10 @@ def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
     n_samples = scenario.max_steps + SAMPLES_AFTER_END + 1
     path_m = np.zeros((n_samples, len(scenario.moving_obstacles), 3))
     velocity_mps = np.zeros_like(path_m)
-    if scenario.moving_obstacles:
+    pieces = [piece for each in scenario.moving_obstacles for piece in each.schedule]
+    if not any(any(piece.velocity_mps) for piece in pieces):  # as planners see it before take-off
+        path_m[:] = scenario.moving_positions(0.0)
+    else:
         for k in range(n_samples):
             path_m[k] = scenario.moving_positions(k * scenario.dt_s)
             velocity_mps[k] = scenario.moving_velocities(k * scenario.dt_s)

@@ -15,7 +15,7 @@ from uas_coverage_baselines.routing.route_time import (
     sum_up,
     sums_of,
 )
-from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
 
 _SAME_TEMPERATURE = 64  # moves
 OVERTIME = 200.0  # cost of a second beyond the budget, in seconds
@@ -34,7 +34,7 @@ class State(NamedTuple):
     """(1,)"""
 
 
-@allocating_kernel
+@inlined_kernel
 def cost_s(task, seconds, left_out, n_left_out, total_weight):
     """What the search minimises: the longest flight, a share of all, and what is left out."""
     budget, left_out_s = task.budget, task.left_out_s
@@ -49,7 +49,7 @@ def cost_s(task, seconds, left_out, n_left_out, total_weight):
     return cost + longest
 
 
-@allocating_kernel
+@inlined_kernel
 def _waiting_s(packs, idle_s, seconds):
     """How much later the last UAS is home than the longest flight takes.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class RoutingArrays(NamedTuple):
     array that they hand on, so these are one."""
 
 
-@allocating_kernel
+@inlined_kernel
 def turn_radii(table, place, a, b, c):
     """Cost in radii of turning at place b on the way from a to c."""
     ax, ay = place[b, 0] - place[a, 0], place[b, 1] - place[a, 1]
@@ -51,7 +51,7 @@ def turn_radii(table, place, a, b, c):
     return table[int(0.5 * (cosine + 1.0) * (len(table) - 1) + 0.5)]
 
 
-@allocating_kernel
+@inlined_kernel
 def setting_off_s(place, motion, u, here, to):
     """What is lost until the velocity points to the first waypoint."""
     dx, dy = place[to, 0] - place[here, 0], place[to, 1] - place[here, 1]
@@ -61,7 +61,7 @@ def setting_off_s(place, motion, u, here, to):
     return (ax * ax + ay * ay) / (2.0 * acceleration_mps2 * speed_mps)
 
 
-@allocating_kernel
+@inlined_kernel
 def route_s(task, u, route, length):
     """Flight time of one UAS along a route and home."""
     if length == 0:
@@ -115,7 +115,7 @@ def sums_of(task, n_uas, width):
     return Sums(np.zeros(shape), np.zeros(shape), np.zeros(shape), twins, np.zeros(n_uas, np.int64))
 
 
-@allocating_kernel
+@inlined_kernel
 def sum_up(task, sums, u, route, length):
     """Write the sums of one route."""
     place, kind = task.place, task.kind[u]
@@ -139,7 +139,7 @@ def sum_up(task, sums, u, route, length):
     sums.late[u] = late
 
 
-@allocating_kernel
+@inlined_kernel
 def add_piece(pieces, n, row, first, last, backward):
     """Add the places `first` to `last` of a row to a list of pieces; how many there are then."""
     if last < first:
@@ -148,7 +148,7 @@ def add_piece(pieces, n, row, first, last, backward):
     return n + 1
 
 
-@allocating_kernel
+@inlined_kernel
 def joined(routes, pieces, n, out):
     """Write the route that pieces make; its length."""
     length = 0
@@ -160,7 +160,7 @@ def joined(routes, pieces, n, out):
     return length
 
 
-@allocating_kernel
+@inlined_kernel
 def pieces_s(task, sums, u, routes, pieces, n):
     """Flight time of one UAS along pieces and home; nothing in them opens late."""
     if n == 0:

@@ -95,13 +95,13 @@ class Trajectory:
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
-        self._way_home = Range(brief)
-        self._safeguard = Safeguard(self._fleet, self._world, self.options.moving_margin_m)
+        options, way_home = self.options, Range(brief)
+        self._way_home = way_home
+        self._safeguard = Safeguard(self._fleet, self._world, way_home, options.moving_margin_m)
         self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
-        options = self.options
         effort = Effort(1, 1, options.moves, options.programs, self.total_weight)
         self._improvement = Improvement(self._fleet, effort, options.idle_work, seed)
         self._is_handed_over = False
@@ -111,7 +111,7 @@ class Trajectory:
         self._down = np.zeros(len(brief.uas), np.bool_)
         self._back, self._blocked = self._down, np.zeros(len(brief.waypoints), np.bool_)
         if self._under_way is None:
-            self._begin(first_sight(brief))
+            self._begin(None)
 
     def _kept(self, brief: MissionBrief) -> UnderWay:
         """What was flown, if it may be flown on in this scene."""
@@ -122,11 +122,13 @@ class Trajectory:
             return UnderWay(order)
         return UnderWay(order, self._planned, self._safeguard.backups)
 
-    def _begin(self, swarm: SwarmState) -> None:
+    def _begin(self, swarm: SwarmState | None) -> None:
         """Make the first plan of a mission, or of one under way since its scene is another."""
-        before = (self._under_way or UnderWay()).at(swarm)
-        if swarm.step == 0:
+        before = UnderWay()
+        if swarm is None or swarm.step == 0:
             swarm = first_sight(self._brief)
+        elif self._under_way is not None:
+            before = self._under_way.at(swarm)
         self._world.update(swarm)
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)

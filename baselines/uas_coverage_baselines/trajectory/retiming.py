@@ -24,6 +24,7 @@ IntArray = NDArray[np.int64]
 _FIRST_SHARE, _LAST_SHARE = 0.12, 0.03
 _MENDABLE = 4.0
 _REPAIRS = 12
+_STRETCHES = 3  # the longest, of which one is made shorter
 _LONG_STEPS = 400
 
 
@@ -221,26 +222,20 @@ def shorten(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, until: int
 ) -> Work[Flight]:
     """Take steps away, one by one, as long as a flight is left that violates nothing."""
-    hint: Flight | None = None
     while program.solved < until:
-        steps = flight.steps - 1
-        if hint is not None and np.isfinite(hint.violation):
-            order, _, cost = worth(hint)
-        else:
-            order, lengths = stretches(flight)
-            cost = np.where(lengths < 2, np.inf, -lengths.astype(float))
-        found = False
-        for stretch in np.argsort(cost, kind="stable")[:3]:
+        order, lengths = stretches(flight)
+        shorter = None
+        for stretch in np.argsort(-lengths, kind="stable")[:_STRETCHES]:
             visits = shifted(flight.visits, order, stretch, -1)
-            if not np.isfinite(cost[stretch]) or (visits < 1).any():
+            if lengths[stretch] < 2 or (visits < 1).any():
                 continue
-            new = retimed(program, start, route, flight, visits, steps)
+            new = retimed(program, start, route, flight, visits, flight.steps - 1)
             yield new.steps
             new = yield from repair(program, start, route, new, _REPAIRS)
             if new.is_clear:
-                flight, found, hint = new, True, None
+                shorter = new
                 break
-            hint = new
-        if not found:
+        if shorter is None:
             return flight
+        flight = shorter
     return flight

@@ -45,13 +45,16 @@ class Safeguard:
     Args:
         fleet: The mission.
         world: What is seen of it.
+        way_home: Of its UAS.
         moving_margin_m: Kept from what moves, in addition to its safe distance.
     """
 
-    def __init__(self, fleet: Fleet, world: WorldView, moving_margin_m: float) -> None:
+    def __init__(
+        self, fleet: Fleet, world: WorldView, way_home: Range, moving_margin_m: float
+    ) -> None:
         self._fleet, self._world = fleet, world
         self._margin_m = moving_margin_m
-        self._range = Range(fleet.brief)
+        self._way_home = way_home
         self.backups: dict[int, Course] = {}
 
     def chosen(
@@ -149,7 +152,7 @@ class Safeguard:
             if (
                 self._is_clear(uas, trial, movers)
                 and float(spare_of_rules_m(space, path_m, False)) >= 0.0
-                and self._range.spare_dod(uas, trial.x[-1]) >= 0.0
+                and self._way_home.spare_dod(uas, trial.x[-1]) >= 0.0
             ):
                 return trial
         return None

@@ -31,9 +31,7 @@ class UnderWay:
     backups: Mapping[int, Course] = field(default_factory=dict)
 
     def at(self, swarm: SwarmState) -> UnderWay:
-        """What of it holds for UAS that are where they are now; nothing of a new mission."""
-        if swarm.step == 0:
-            return UnderWay()
+        """What of it holds for UAS that are where they are now."""
         planned = {}
         for u, each in self.planned.items():
             rest = each.course.rest(swarm.step)
