@@ -14,7 +14,7 @@ from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
-from uas_coverage_env.env.actions.given import as_array
+from uas_coverage_env.env.actions.given import accept_of_lanes
 from uas_coverage_env.env.batch_kernel import (
     BatchRules,
     lane_code,
@@ -243,7 +243,7 @@ class CoverageBatch:
                     f"the mission of lane {int(ended.argmax())} has ended: reset the lanes that "
                     f"have ended before the next step, or choose another autoreset mode"
                 )
-        self._ask(actions)
+        accept_of_lanes(self.actions, actions, self.learners.asked)
         orders = lanes.orders.copy()
         if self.draws:
             # what is drawn begins after the step of the others, which may still be refused
@@ -417,25 +417,6 @@ class CoverageBatch:
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         autoreset = DISABLED if begins_later else self.autoreset
         return BatchRules(rules, autoreset, lane_code(settings.observation_size))
-
-    def _ask(self, actions: Any) -> None:
-        actions = as_array("the swarms", actions)
-        asked = self.learners.asked
-        if len(actions.shape) < 2 or len(actions) != len(asked) or actions.size != asked.size:
-            raise ValueError(
-                f"actions have shape {actions.shape}; give {self.actions.size} for each of "
-                f"{self.n_uas} UAS in each of {self.num_envs} lanes"
-            )
-        if actions.dtype.kind not in ("iu" if self.chooses else "fiu"):
-            numbers = "whole" if self.chooses else "real"
-            raise ValueError(f"actions have dtype {actions.dtype}; give {numbers} numbers")
-        choices = self.actions.kind.choices
-        if self.chooses and (actions.min() < 0 or actions.max() >= choices):
-            raise ValueError(
-                f"actions go from {actions.min()} to {actions.max()}; "
-                f"give whole numbers from 0 to {choices - 1}"
-            )
-        asked[:] = actions.reshape(asked.shape)
 
 
 def _check_count(name: str, count: Any, most: int) -> None:

@@ -158,6 +158,36 @@ def actions_of(kind: str | ActionKind, scenario: Scenario) -> Actions:
     return Choice(kind, ranges) if kind.choices else Continuous(kind, ranges, kind.size)
 
 
+def accept_of_lanes(actions: Actions, given: Any, asked: NDArray[np.float64]) -> None:
+    """Write the actions of many swarms side by side, not yet known to be finite.
+
+    Args:
+        actions: Their kind.
+        given: (L, U, size) numbers, or (L, U) choices; as (L, -1) too.
+        asked: (L, U, size); written.
+
+    Raises:
+        ValueError: They have a wrong type or shape, or a choice is none; names the value.
+    """
+    given = as_array("the swarms", given)
+    n_lanes, n_uas, size = asked.shape
+    if len(given.shape) < 2 or len(given) != n_lanes or given.size != asked.size:
+        raise ValueError(
+            f"actions have shape {given.shape}; give {size} for each of {n_uas} UAS in each of "
+            f"{n_lanes} lanes"
+        )
+    choices = actions.kind.choices
+    if given.dtype.kind not in ("iu" if choices else "fiu"):
+        numbers = "whole numbers" if choices else "real numbers"
+        raise ValueError(f"actions have dtype {given.dtype}; give {numbers}")
+    if choices and (given.min() < 0 or given.max() >= choices):
+        raise ValueError(
+            f"actions go from {given.min()} to {given.max()}; "
+            f"give whole numbers from 0 to {choices - 1}"
+        )
+    asked[:] = given.reshape(asked.shape)
+
+
 def as_array(name: str, action: Any) -> NDArray[Any]:
     """What somebody gives as an action, as an array of whatever it holds.
 
