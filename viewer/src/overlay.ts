@@ -3,7 +3,7 @@
 
 import { FEW, type Flight, type Moment, type Point2, type Point3 } from "./flight";
 import * as marks from "./marks";
-import { bright, colour } from "./palette";
+import { bright, colour, legible } from "./palette";
 import type { Focus } from "./view";
 
 /** Where a point is on the picture; null: behind the eye. */
@@ -130,7 +130,7 @@ export class Overlay {
     const box: Box = [x - half, y - high / 2, x + half, y + high / 2];
     if (this.labels.some((other) => overlap(box, other))) return;
     this.labels.push(box);
-    marks.words(this.pen, text, x, y, high, bright(hex));
+    marks.words(this.pen, text, x, y, high, legible(hex));
   }
 
   private violations(moment: Moment, unit: number): void {
