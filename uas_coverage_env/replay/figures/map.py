@@ -80,10 +80,8 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         _heights(axes, scenario, float((high - low)[1]) / (width_in() * _PT_PER_IN))
         _north(figure, axes)
         _moving_obstacles(axes, scenario, moving_m)
-        pt_per_m = width_in() * _PT_PER_IN / float((high - low)[1])
         for i in range(len(flight.names)):
             _uas(axes, flight, now, i)
-        _names(axes, flight, now, pt_per_m)
         _violations(axes, flight, now)
         title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s:"
         count = f"{flight.covered[now]} of {len(scenario.waypoints)} waypoints"
@@ -91,6 +89,7 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         title += f"{' ' if wide else chr(10)}{count}"
         axes.set_title(title, fontsize=9, parse_math=False)
         figure.legend(handles=legend, loc="outside lower center", ncols=columns, columnspacing=1.2)
+        _names(figure, axes, flight, now)
     return figure
 
 
@@ -184,8 +183,10 @@ def _moving_obstacles(axes: Axes, scenario: Scenario, moving_m: NDArray[np.float
         axes.add_patch(Circle((x, y), kept_m, fill=False, edgecolor=red, linestyle="--", lw=0.8))
 
 
-def _names(axes: Axes, flight: Flight, now: int, pt_per_m: float) -> None:
+def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
     """The name of each UAS beside its mark; where there is no free place, none."""
+    figure.draw_without_rendering()  # lays out the axes, so that distances are known
+    pt_per_px = _PT_PER_IN / figure.dpi
     taken: list[Box] = []
     many = len(flight.names) > MANY
     for i, whole in enumerate(flight.names):
@@ -193,12 +194,13 @@ def _names(axes: Axes, flight: Flight, now: int, pt_per_m: float) -> None:
         east, north = _flat(flight.x[min(now, int(flight.last_sample[i])), i, :3]).tolist()
         # where there is no room to the right, the name stands to the left
         crowded = east > np.dot(axes.get_xlim(), (0.12, 0.88))
+        x_pt, y_pt = pt_per_px * axes.transData.transform((east, north))
         width = _LETTER * _NAME_PT * len(name)
         beside = -9.0 if crowded else 9.0
-        left = pt_per_m * east + beside - (width if crowded else 0.0)
+        left = x_pt + beside - (width if crowded else 0.0)
         for row in _NAME_ROWS:
             up = 6.0 + 1.2 * _NAME_PT * row
-            box = (left, pt_per_m * north + up, width, _NAME_PT)
+            box = (left, y_pt + up, width, _NAME_PT)
             if any(overlap(box, it) for it in taken):
                 continue
             taken.append(box)
