@@ -6,6 +6,7 @@ from typing import Any
 
 import shapely
 
+from uas_coverage_env.draw.labels import short_name
 from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.convex import hull_of
@@ -211,7 +212,7 @@ def _map(parts: Sequence[Part]) -> str:
         )
         x, y, _ = one.track.home_m
         shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
-        homes[one.track.name] = (y, -x)
+        homes[names[n]] = (y, -x)
         lost = one.point_of_no_return
         if lost is not None:
             x, y, _ = one.track.legs[lost].end_m
@@ -221,7 +222,8 @@ def _map(parts: Sequence[Part]) -> str:
                 f"</title></circle>"
             )
     around = 0.02 * span_m
-    shapes += [_words(name, x + 6 * pen, y, pen) for name, (x, y) in homes.items()]
+    for name, (x, y) in homes.items():
+        shapes.append(_words(short_name(name), x, y - 6 * pen, pen, anchor="middle"))
     shapes.append(_scale(low[1], -low[0], span_m, pen))
     height, width = high - low + 2.0 * around
     box = f"{low[1] - around:.1f} {-high[0] - around:.1f} {width:.1f} {height:.1f}"
@@ -229,11 +231,9 @@ def _map(parts: Sequence[Part]) -> str:
     return f'<svg viewBox="{box}" role="img" aria-label="{told}">{"".join(shapes)}</svg>'
 
 
-def _words(text: str, x: float, y: float, pen: float) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{11 * pen:.1f}" stroke-width="{3 * pen:.1f}">'
-        f"{escape(text)}</text>"
-    )
+def _words(text: str, x: float, y: float, pen: float, anchor: str = "start") -> str:
+    size = f'font-size="{11 * pen:.1f}" stroke-width="{3 * pen:.1f}" text-anchor="{anchor}"'
+    return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(text)}</text>'
 
 
 def _scale(west: float, south: float, span_m: float, pen: float) -> str:
