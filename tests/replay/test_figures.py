@@ -216,7 +216,7 @@ def test_of_many_uas_the_battery_figure_shows_least_median_and_span(swarm):
 def test_of_many_uas_the_modes_figure_counts_how_many_do_what(swarm):
     _, counts = modes_figure(swarm).axes
     landed = counts.collections[MODES.index("landed")]
-    heights = [path.vertices[:, 1].max() - path.vertices[:, 1].min() for path in landed.get_paths()]
+    heights = [np.ptp(np.asarray(path.vertices)[:, 1]) for path in landed.get_paths()]
     assert max(heights) == 15.0
     assert counts.get_ylabel() == "UAS"
     assert modes_figure(swarm).get_size_inches()[1] < 6.0

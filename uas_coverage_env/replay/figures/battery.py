@@ -59,7 +59,7 @@ def battery_figure(flight: Flight, *, published: bool | None = None) -> Figure:
         axes[0].set_ylim(bottom=0)
         axes[-1].set_xlabel("Time, s")
         figure.align_ylabels(axes)
-        handles = [*(_span_legend(flight) if many else _lines_legend(flight))]
+        handles = _span_legend(flight) if many else _lines_legend(flight)
         handles += _other_legend(published)
         longest = max(len(str(handle.get_label())) for handle in handles)
         columns = columns_of(longest, 3)
