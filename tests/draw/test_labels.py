@@ -1,11 +1,12 @@
 """Labels: where nothing hides them, and no longer than there is room for."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.draw import picture
-from uas_coverage_env.draw.labels import free_place
+from uas_coverage_env.draw import colours, picture
+from uas_coverage_env.draw.labels import free_place, overlap, short_name
 from uas_coverage_env.draw.text import fitted, width_of
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
@@ -70,3 +71,27 @@ def test_writing_too_small_to_read_is_left_out():
     # the figures of the altitude scale, right of it
     assert len(np.unique(small[40:220, 241:].reshape(-1, 3), axis=0)) == 1
     assert len(np.unique(large[80:440, 482:].reshape(-1, 3), axis=0)) > 5
+
+
+def test_boxes_overlap_where_they_share_more_than_an_edge():
+    box = (0.0, 0.0, 10.0, 5.0)
+    assert overlap(box, (9.0, 4.0, 3.0, 3.0))
+    assert overlap(box, (2.0, 1.0, 1.0, 1.0))
+    assert not overlap(box, (10.0, 0.0, 3.0, 3.0))
+    assert not overlap(box, (0.0, 5.0, 3.0, 3.0))
+
+
+def test_a_short_name_is_the_end_of_a_name():
+    assert short_name("uas_12") == "12"
+    assert short_name("scout") == "sco"
+
+
+def luminance(colour):
+    parts = np.array(colour) / 255
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+@pytest.mark.parametrize("colour", colours.UAS)
+def test_words_about_a_uas_are_read_on_white(colour):
+    assert 1.05 / (luminance(colours.of_words(colour)) + 0.05) >= 4.5

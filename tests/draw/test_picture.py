@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uas_coverage_env.draw import Picture, legend, picture
-from uas_coverage_env.draw.colours import of_charge
+from uas_coverage_env.draw.colours import UAS, of_charge
+from uas_coverage_env.draw.colours import of_words as of_words_
 from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.legend import SIGNS, decoration_kinds, obstacle_kinds
 from uas_coverage_env.scenario import generate_scenario, load_scenario, scenario_names
@@ -47,6 +48,21 @@ def test_a_uas_is_drawn_as_it_looks(village, swarm):
     assert top <= row <= bottom
     assert left <= column <= right
     assert max(bottom - top, right - left) < 30
+
+
+def test_the_names_of_uas_side_by_side_do_not_hide_each_other(village, swarm):
+    """Also where the mark of one lies over the place of the other's name."""
+
+    def of_words(image, i):
+        colour = np.array(of_words_(UAS[i]))
+        return int((np.abs(image.astype(int) - colour).max(axis=2) < 12).sum())
+
+    for moved_m in ((0.0, 0.0), (-6.0, 6.0), (6.0, -6.0)):
+        x = swarm.x.copy()
+        x[0, :2] = 250.0
+        x[1, :2] = x[0, :2] + moved_m
+        image = picture(village, dataclasses.replace(swarm, x=x), size_px=900)
+        assert min(of_words(image, i) for i in range(2)) > 8, moved_m
 
 
 def test_a_picture_is_an_array_of_bytes(village, swarm):

@@ -251,7 +251,13 @@ def test_the_page_shows_every_uas_and_needs_no_network(flight, place):
     page = exported(flight, place, "csv").files["report.html"]
     assert page.count("<polyline") == len(tracks_of(flight))
     assert "http" not in page
-    ElementTree.fromstring(page[page.index("<svg") : page.index("</svg>") + 6])
+    svg = ElementTree.fromstring(page[page.index("<svg") : page.index("</svg>") + 6])
+    words = [text.text for text in svg.iter() if text.tag.endswith("text")]
+    names = list(tracks_of(flight))
+    assert words[:-1] == [name.removeprefix("uas_") for name in names]
+    assert words[-1].endswith(" m, N ↑")
+    assert all(name in svg.attrib["aria-label"] for name in names)
+    assert 'name="viewport"' in page
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, DecisionRecord
+from uas_coverage_env.flight import MODES, DecisionRecord, load_planner, rollout
 from uas_coverage_env.replay.figures import (
     KINDS,
     WIDTH_IN,
@@ -24,7 +24,7 @@ from uas_coverage_env.replay.figures import (
     with_baselines,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
-from uas_coverage_env.scenario import Sensor
+from uas_coverage_env.scenario import Sensor, generate_scenario
 
 
 def lines(axes) -> list[np.ndarray]:
@@ -191,6 +191,47 @@ def test_the_battery_figure_holds_our_curves_and_the_published_ones(flight):
         assert any(np.array_equal(line, scale * ours[:-1, 1]) for line in series)
         assert any(np.array_equal(line, scale * table[name][:airborne]) for line in series)
     assert soc.get_ylabel() == "State of charge, %"
+
+
+@pytest.fixture(scope="module")
+def swarm():
+    """Thirty UAS, the second half of which has landed after two steps."""
+    town = generate_scenario(seed=5, n_uas=30, n_waypoints=60, n_obstacles=5)
+    flown = rollout(town, load_planner("hover"), max_steps=4)
+    mode = flown.mode.copy()
+    mode[2:, 15:] = MODES.index("landed")
+    return dataclasses.replace(flown, mode=mode)
+
+
+def test_of_many_uas_the_battery_figure_shows_least_median_and_span(swarm):
+    soc, voltage, _ = battery_figure(swarm).axes
+    least, median = (line[:, 1] for line in lines(soc)[:2])
+    airborne = np.arange(4)[:, None] < swarm.last_sample
+    flown = np.where(airborne, 100.0 * swarm.soc[:4], np.nan)
+    assert np.array_equal(least, np.nanmin(flown, axis=1))
+    assert median == pytest.approx(np.nanmedian(flown, axis=1))
+    assert len(voltage.get_lines()) == 2
+
+
+def test_of_many_uas_the_modes_figure_counts_how_many_do_what(swarm):
+    _, counts = modes_figure(swarm).axes
+    landed = counts.collections[MODES.index("landed")]
+    heights = [np.ptp(np.asarray(path.vertices)[:, 1]) for path in landed.get_paths()]
+    assert max(heights) == 15.0
+    assert counts.get_ylabel() == "UAS"
+    assert modes_figure(swarm).get_size_inches()[1] < 6.0
+
+
+def test_of_many_uas_no_name_lies_on_another_on_the_map(swarm):
+    x = swarm.x.copy()
+    x[:, :, :2] = 0.2 * x[:, :, :2]
+    figure = map_figure(dataclasses.replace(swarm, x=x))
+    figure.draw_without_rendering()
+    names = [text for text in figure.axes[0].texts if text.get_text().isdigit()]
+    assert 5 < len(names) < 30, "those without a place are left out"
+    boxes = [name.get_window_extent() for name in names]
+    for i, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:i]), names[i].get_text()
 
 
 def test_the_published_curves_are_drawn_beside_the_village_alone(flight):

@@ -3,6 +3,7 @@
 import dataclasses
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from chromium import (
     DESKTOP,
@@ -27,7 +28,9 @@ from selenium.webdriver.support.ui import Select
 from uas_coverage_env.flight import DecisionRecord, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay import write_replay
+from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.scenario import generate_scenario
+from uas_coverage_env.vehicle import DOD
 
 pytestmark = needs_chromium
 
@@ -147,6 +150,58 @@ def test_trails_are_coloured_by_a_value_with_its_scale(browser, page, troubled, 
     low, high = heights_m.min(), heights_m.max()
     assert legend.text.split() == ["height:", f"{low:.0f}", f"{high:.0f}", "m"]
     assert complaints(browser) == []
+
+
+def edge_of_reach_m(flight, k: int, uas: int, angle: float) -> tuple[float, float] | None:
+    """Where the charge after a straight flight is what `Range` wants there; None: at the fence."""
+    found = reach(flight.scenario)
+    range_ = Range(MissionBrief.of(flight.scenario))
+    at = flight.x[k, uas].copy()
+    way = np.array([np.cos(angle), np.sin(angle)])
+    for far_m in np.arange(1.0, 1000.0):
+        x = np.zeros_like(at)
+        x[:2] = at[:2] + far_m * way
+        x[2] = -found.height_m
+        for value, axis in zip(x[:2], (found.north_m, found.east_m), strict=True):
+            if not axis[0] <= value <= axis[-1]:
+                return None
+        # the way home is estimated with the current of an empty battery
+        x[DOD] = flight.scenario.uas[uas].dod_max
+        home = range_.home(uas, x)
+        needed = 1.0 - x[DOD] + home.dod + home.dod_margin
+        if 1.0 - at[DOD] - found.fixed[uas] - far_m * found.per_m[uas] <= needed:
+            return x[0], x[1]
+    raise AssertionError("the way out of the fence is no longer than this")
+
+
+def test_without_following_one_the_area_in_reach_of_each_ends_where_range_says(
+    browser, discharged, tmp_path
+):
+    """The second UAS, orange, is short of charge: its area ends within the fence."""
+    k = 25
+    page = write_replay([discharged], tmp_path / "replay.html")
+    opened(browser, page, DESKTOP, moment=f"#view=map&t={k}")
+    picture = pixels(browser, ".stage").astype(int)
+    height, width = picture.shape[:2]
+    corners_m = discharged.scenario.fence.vertices_m
+    low, high = corners_m.min(axis=0), corners_m.max(axis=0)
+    scale = min((width - 28) / (high[1] - low[1]), (height - 28) / (high[0] - low[0]))
+    middle = (low + high) / 2
+    at_m = discharged.x[k, 1, :2]
+
+    def orange(north, east) -> bool:
+        row = round(height / 2 - scale * (north - middle[0]))
+        column = round(width / 2 + scale * (east - middle[1]))
+        near = picture[row - 5 : row + 6, column - 5 : column + 6]
+        return bool(((near[..., 0] - near[..., 2]) > 60).any())
+
+    edges = [edge_of_reach_m(discharged, k, 1, angle) for angle in np.linspace(0.0, 6.0, 30)]
+    inside = [np.array(edge) for edge in edges if edge is not None]
+    assert len(inside) > 8
+    drawn = [orange(*edge) for edge in inside]
+    within = [orange(*(at_m + 0.85 * (edge - at_m))) for edge in inside]
+    assert np.mean(drawn) > 0.8, "dashes, and the grid of the page is coarser than Range"
+    assert np.mean(within) < 0.4, "paths and houses"
 
 
 def test_the_height_profile_lies_under_the_map_and_sets_the_time(browser, page):

@@ -52,6 +52,11 @@ def shaded(colour: Colour, factor: float) -> Colour:
     return red, green, blue
 
 
+def of_words(colour: Colour) -> Colour:
+    """Of words about what has this colour: so dark that they are read on white (WCAG AA)."""
+    return shaded(colour, 0.62)
+
+
 def of_obstacle(kind: str | None) -> Colour:
     """The tint of an obstacle."""
     return OBSTACLES.get(kind or "", OTHER_OBSTACLE)

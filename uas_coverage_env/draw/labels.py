@@ -5,6 +5,22 @@ from numpy.typing import NDArray
 
 _TRIED = 15
 
+Box = tuple[float, float, float, float]
+"""Left, least height, width, height."""
+
+
+def overlap(box: Box, other: Box) -> bool:
+    """Whether two boxes have a place in common."""
+    return all(
+        box[axis] < other[axis] + other[axis + 2] and other[axis] < box[axis] + box[axis + 2]
+        for axis in (0, 1)
+    )
+
+
+def short_name(name: str) -> str:
+    """What a UAS is called on a crowded picture: the end of its name."""
+    return name.rpartition("_")[2][:3]
+
 
 def free_place(
     outline: NDArray[np.float64], box: NDArray[np.float64], marks: NDArray[np.float64]

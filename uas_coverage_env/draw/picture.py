@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours, marks
 from uas_coverage_env.draw.canvas import Canvas
 from uas_coverage_env.draw.frame import Frame
+from uas_coverage_env.draw.labels import Box, overlap, short_name
 from uas_coverage_env.draw.terrain import terrain
 from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.scenario import Scenario
@@ -24,6 +25,7 @@ _SMALLEST_PX, _LARGEST_PX = 128, 4096
 # More do not fit below the map; a larger swarm is summed up.
 _NAMED_UAS = 4
 _LABELLED_UAS = 12
+_NAME_ROWS = (0, 1, -1, 2)
 
 
 def picture(
@@ -75,7 +77,7 @@ class Picture:
         weights = [point.weight for point in scenario.waypoints]
         self._heavy = [weight > min(weights) for weight in weights]
         self._radii = [point.radius_m * frame.scale for point in scenario.waypoints]
-        self._labels = [uas.name.rpartition("_")[2][:3] for uas in scenario.uas]
+        self._labels = [short_name(uas.name) for uas in scenario.uas]
         self._canvas = Canvas(frame.side)
         self._terrain = terrain(scenario, frame).convert("RGBX")
         unit = frame.unit
@@ -198,29 +200,41 @@ class Picture:
     def _swarm(self, image: "Image", draw: "ImageDraw", swarm: SwarmState) -> None:
         frame, unit = self._frame, self._frame.unit
         centres = frame.pixels(swarm.x[:, :2]).tolist()
-        labelled = len(centres) <= _LABELLED_UAS
+        spots: list[tuple[float, float, float, float]] = []
         for i, (x, y) in enumerate(centres):
             colour = _colour(i)
             if swarm.status[i] == FLYING:
                 yaw, soc = float(swarm.heading_rad[i]), 1 - float(swarm.x[i, DOD])
                 marks.flying(draw, frame, x, y, yaw, soc, colour)
-                place = (x + 13 * unit, y - 9 * unit)
+                beside, up = 13 * unit, 9 * unit
             elif swarm.status[i] == LANDED:
                 marks.landed(draw, frame, x, y, colour)
-                place = (x + 7 * unit, y)
+                beside, up = 7 * unit, 0.0
             else:
                 marks.lost(draw, frame, x, y)
-                place = (x + 11 * unit, y)
-            if labelled:
-                if x > frame.gauge - 35 * unit:
-                    # no room at the edge of the map: write to the left
-                    place = (2 * x - place[0], place[1])
-                self._label(image, place, i, align=float(place[0] < x))
+                beside, up = 11 * unit, 0.0
+            spots.append((x, y, beside, up))
+        if len(spots) <= _LABELLED_UAS:
+            self._names(image, spots)
 
-    def _label(self, image: "Image", place: tuple[float, float], i: int, align: float) -> None:
-        unit = self._frame.unit
-        size = 11 * self._frame.letter
-        write(image, place, self._labels[i], size, _colour(i), align=align, halo=1.5 * unit)
+    def _names(self, image: "Image", spots: list[tuple[float, float, float, float]]) -> None:
+        """The number of each UAS beside its mark, over all marks; no number lies on another."""
+        unit, size = self._frame.unit, 11 * self._frame.letter
+        taken: list[Box] = []
+        for i, (x, y, beside, up) in enumerate(spots):
+            name, colour = self._labels[i], colours.of_words(_colour(i))
+            width = width_of(name, size)
+            # no room at the edge of the map: write to the left
+            left = x > self._frame.gauge - 35 * unit
+            at = x - beside if left else x + beside
+            for row in _NAME_ROWS:
+                y_name = y - up + row * size
+                box = (at - width if left else at, y_name, width, size)
+                if not any(overlap(box, it) for it in taken):
+                    taken.append(box)
+                    place, halo = (at, y_name), 1.5 * unit
+                    write(image, place, name, size, colour, align=float(left), halo=halo)
+                    break
 
     def _altitudes(self, draw: "ImageDraw", swarm: SwarmState) -> None:
         """Where the flying UAS are on the altitude scale."""

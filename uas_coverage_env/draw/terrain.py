@@ -59,6 +59,12 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
     return image
 
 
+def scale_step_m(extent_m: float) -> float:
+    """The length of the scale bar of a map: 1, 2 or 5 × 10^k, a quarter of the map at most."""
+    power = 10.0 ** np.floor(np.log10(extent_m / 4))
+    return float(power * max(factor for factor in (1, 2, 5) if factor * power <= extent_m / 4))
+
+
 def _grid(
     image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]
 ) -> tuple[float, float]:
@@ -67,9 +73,7 @@ def _grid(
     Returns:
         The place beside the scale bar.
     """
-    extent_m = np.ptp(fence, axis=0).max()
-    power = 10.0 ** np.floor(np.log10(extent_m / 4))
-    step_m = power * max(factor for factor in (1, 2, 5) if factor * power <= extent_m / 4)
+    step_m = scale_step_m(np.ptp(fence, axis=0).max())
     low, high = fence.min(axis=0), fence.max(axis=0)
     for axis in (0, 1):
         for at in np.arange(np.ceil(low[axis] / step_m), high[axis] / step_m) * step_m:

@@ -169,7 +169,8 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
             axes.set_title(name, fontsize=8)
             axes.set_xlabel("Time, s")
         panels[0].set_ylabel("Energy, Wh")
-        panels[0].legend()
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         figure.suptitle("Each point is a flight; numbers: UAS that fly.", fontsize=8)
     return figure
 

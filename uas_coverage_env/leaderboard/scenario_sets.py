@@ -5,8 +5,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.suggestions import meant
 from uas_coverage_env.leaderboard.hashing import content_hash
-from uas_coverage_env.scenario import ALIASES, SERIES, Scenario, load_scenario
+from uas_coverage_env.scenario import ALIASES, SERIES, Scenario, load_scenario, scenario_names
+from uas_coverage_env.scenario.load import is_path
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
 SETS: Mapping[str, range] = {"dev": range(2000, 2020), "test": range(3000, 3020)}
@@ -84,5 +86,7 @@ def _scenarios(item: str) -> Iterator[Scenario]:
         yield from map(SERIES["generated"], SETS[item])
     elif ":" in rest and kind in SERIES:
         yield from map(SERIES[kind], seed_range(f"--scenarios {kind}:", rest))
+    elif not (is_path(item) or item in scenario_names()) and (close := meant(item, SETS)):
+        raise InputError(f"unknown scenario or set {item!r}; did you mean {close}?")
     else:
         yield load_scenario(item)

@@ -6,16 +6,19 @@ from typing import Any
 
 import shapely
 
+from uas_coverage_env.draw.labels import short_name
+from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.convex import hull_of
 
 _COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
 _STYLE = """
 body{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#26282c}
-table{border-collapse:collapse;margin:1rem 0}
+table{border-collapse:collapse;margin:1rem 0;display:block;overflow-x:auto}
 th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
 th:first-child,td:first-child{text-align:left}
-svg{width:100%;max-height:80vh;background:#eaebe0}
+svg{width:100%;max-width:48rem;max-height:80vh;background:#eaebe0}
+svg text{font-weight:600;paint-order:stroke;stroke:#fff}
 .bad{color:#c81e2d;font-weight:600}
 summary{cursor:pointer}
 """
@@ -45,6 +48,7 @@ def report_page(parts: Sequence[Part], data: dict[str, Any]) -> str:
         *(_legs(uas) for uas in data["uas"]),
     ]
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+    head += '<meta name="viewport" content="width=device-width,initial-scale=1">'
     return f"{head}<style>{_STYLE}</style><body>{''.join(blocks)}</body></html>\n"
 
 
@@ -196,6 +200,7 @@ def _map(parts: Sequence[Part]) -> str:
         f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
         for w in scenario.waypoints
     ]
+    homes: dict[str, tuple[float, float]] = {}
     names = parts[0].flight.names
     files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
     for n, one in files:
@@ -207,6 +212,7 @@ def _map(parts: Sequence[Part]) -> str:
         )
         x, y, _ = one.track.home_m
         shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
+        homes[names[n]] = (y, -x)
         lost = one.point_of_no_return
         if lost is not None:
             x, y, _ = one.track.legs[lost].end_m
@@ -216,9 +222,26 @@ def _map(parts: Sequence[Part]) -> str:
                 f"</title></circle>"
             )
     around = 0.02 * span_m
+    for name, (x, y) in homes.items():
+        shapes.append(_words(short_name(name), x, y - 6 * pen, pen, anchor="middle"))
+    shapes.append(_scale(low[1], -low[0], span_m, pen))
     height, width = high - low + 2.0 * around
     box = f"{low[1] - around:.1f} {-high[0] - around:.1f} {width:.1f} {height:.1f}"
-    return f'<svg viewBox="{box}" role="img" aria-label="map">{"".join(shapes)}</svg>'
+    told = escape(f"Map, north up: fence, obstacles, waypoints, legs of {', '.join(homes)}")
+    return f'<svg viewBox="{box}" role="img" aria-label="{told}">{"".join(shapes)}</svg>'
+
+
+def _words(text: str, x: float, y: float, pen: float, anchor: str = "start") -> str:
+    size = f'font-size="{11 * pen:.1f}" stroke-width="{3 * pen:.1f}" text-anchor="{anchor}"'
+    return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(text)}</text>'
+
+
+def _scale(west: float, south: float, span_m: float, pen: float) -> str:
+    """A bar of a round length at the south-west, and where north is."""
+    long_m = scale_step_m(span_m)
+    bar = f"M{west + 4 * pen:.1f} {south - 4 * pen:.1f}h{long_m:g}"
+    words = _words(f"{long_m:g} m, N \N{UPWARDS ARROW}", west + 4 * pen, south - 8 * pen, pen)
+    return f'<path d="{bar}" stroke="#26282c" stroke-width="{2 * pen:.1f}"/>{words}'
 
 
 def _outline(vertices_m: Any, style: str) -> str:

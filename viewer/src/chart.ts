@@ -2,8 +2,8 @@
 // and a cursor at the time of the page.
 
 import { bandOf, drawBand } from "./band";
-import { noReturn, stroke } from "./marks";
-import { bright, colour } from "./palette";
+import { noReturn, stroke, words } from "./marks";
+import { bright, colour, legible } from "./palette";
 import { roundStep } from "./round_step";
 
 export interface Line {
@@ -132,6 +132,12 @@ export abstract class TimeCanvas {
     return LEFT + (time / Math.max(this.duration, 1e-9)) * (this.width - LEFT - RIGHT);
   }
 
+  /** What the curves of a band are, on it. */
+  protected bandWords(count: number, above: number): void {
+    const [x, y] = [this.width - RIGHT, this.height - BOTTOM - above];
+    words(this.pen, `least and median of ${count}`, x, y, 11, colour("--faint"), "right", 400);
+  }
+
   protected write(
     text: string,
     x: number,
@@ -185,7 +191,7 @@ export class Chart extends TimeCanvas {
     this.write(content.title, 2, 9, colour("--ink"), "left", 600);
     let beside = right;
     for (const [word, hex] of [...(content.legend ?? [])].reverse()) {
-      beside -= this.write(word, beside, 9, bright(hex), "right", 600) + 8;
+      beside -= this.write(word, beside, 9, legible(hex), "right", 600) + 8;
     }
     pen.setLineDash([]);
     const first = Math.ceil(this.low / this.step - 1e-6);
@@ -224,12 +230,11 @@ export class Chart extends TimeCanvas {
       if (line.limit || this.pale(line)) continue;
       const k = Math.min(line.values.length - 1, Math.floor(time / content.dt + 1e-6));
       if (k < 0) continue;
-      const ink = bright(line.colour);
-      pen.fillStyle = ink;
+      pen.fillStyle = bright(line.colour);
       pen.beginPath();
       pen.arc(this.x(k * content.dt), this.y(line.values[k]), 3, 0, 2 * Math.PI);
       if (content.lines.length <= MANY || this.focused !== null) pen.fill();
-      shown.push([line.values[k], ink]);
+      shown.push([line.values[k], legible(line.colour)]);
     }
     if (content.legend) return;
     let right = this.width - RIGHT;
@@ -277,15 +282,14 @@ export class Chart extends TimeCanvas {
     const x = (k: number) => this.x(k * content.dt);
     const ink = this.focused === null ? "--accent" : "--faint";
     drawBand(pen, band, colour(ink), x, (value) => this.y(value));
-    const words = `least and median of ${lines.length}`;
-    this.write(words, this.width - RIGHT, this.height - BOTTOM - 10, colour("--faint"), "right");
+    this.bandWords(lines.length, 10);
   }
 
   private point({ sample, value, serious, colour: hex, words }: Point): void {
     const [x, y] = [this.x(sample * this.content.dt), this.y(value)];
     noReturn(this.pen, x, y, 5, serious, hex);
     const left = x > this.width / 2;
-    const ink = serious ? colour("--discharged") : bright(hex);
+    const ink = serious ? colour("--discharged") : legible(hex);
     const above = y - 12 > TOP ? y - 11 : y + 12;
     this.write(words, left ? x - 6 : x + 6, above, ink, left ? "right" : "left", 600);
   }
@@ -332,7 +336,7 @@ export class Chart extends TimeCanvas {
       this.pen.font = "600 11px system-ui, sans-serif";
       // a long name that begins at the end of a flight would leave the picture
       const left = Math.min(x, this.width - 1 - this.pen.measureText(line.label).width);
-      this.write(line.label, left, apart, bright(line.colour), "left", 600);
+      this.write(line.label, left, apart, legible(line.colour), "left", 600);
     }
   }
 

@@ -151,7 +151,8 @@ export interface Moment {
   covered: number;
 }
 
-const FEW = 8;
+/** So many UAS are each shown in full on the map, without being followed. */
+export const FEW = 8;
 const LITTLE_SPARE = 0.1;
 
 export class Flight {

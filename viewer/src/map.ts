@@ -24,6 +24,8 @@ export class MapView implements View {
   private unit = 1;
   private scale = 1;
   private middle: Point2 = [0, 0];
+  /** Of the canvas [px]: to ask the canvas for each point costs a quarter of a picture. */
+  private size: Point2 = [0, 0];
   private readonly overlay: Overlay;
   private readonly seen: SeenSheet[];
   readonly canvases: HTMLCanvasElement[];
@@ -67,7 +69,7 @@ export class MapView implements View {
     this.frame(moment, focus.uas);
     const { pen, flight } = this;
     pen.fillStyle = colour("--outside");
-    pen.fillRect(0, 0, this.canvas.clientWidth, this.canvas.clientHeight);
+    pen.fillRect(0, 0, ...this.size);
     this.terrain(moment.sample);
     flight.scene.waypoints.forEach(({ at, radius, heavy }, i) => {
       if (!flight.asked(i, moment.sample)) return;
@@ -90,7 +92,7 @@ export class MapView implements View {
   }
 
   private frame(moment: Moment, followed: number | null): void {
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const [width, height] = (this.size = [this.canvas.clientWidth, this.canvas.clientHeight]);
     this.unit = Math.min(1, Math.max(0.65, Math.min(width, height) / 500));
     const fit = Math.min(
       (width - 28) / (this.high[1] - this.low[1]),
@@ -105,8 +107,8 @@ export class MapView implements View {
 
   pixel(point: Point2 | Point3): Point2 {
     return [
-      this.canvas.clientWidth / 2 + this.scale * (point[1] - this.middle[1]),
-      this.canvas.clientHeight / 2 - this.scale * (point[0] - this.middle[0]),
+      this.size[0] / 2 + this.scale * (point[1] - this.middle[1]),
+      this.size[1] / 2 - this.scale * (point[0] - this.middle[0]),
     ];
   }
 
@@ -173,7 +175,7 @@ export class MapView implements View {
     const [x, y] = this.pixel(this.low);
     const end = x + 8 + step * this.scale;
     marks.stroke(this.pen, x + 8, y - 8, end, y - 8, 2, colour("--ink"));
-    marks.words(this.pen, `${step} m`, x + 8, y - 18, 11, colour("--ink"), "left");
+    marks.words(this.pen, `${step} m, N ↑`, x + 8, y - 18, 11, colour("--ink"), "left");
   }
 
   private circle(x: number, y: number, radius: number, edge: string, width: number): void {

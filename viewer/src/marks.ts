@@ -1,7 +1,7 @@
 // What stands for a waypoint, a vehicle, a violation: drawn alike on the map and over the 3D
 // scene. What has a meaning has a shape, not only a colour.
 
-import { bright, colour, ofSpare } from "./palette";
+import { bright, colour, legible, ofSpare } from "./palette";
 
 type Pen = CanvasRenderingContext2D;
 
@@ -109,7 +109,7 @@ export function landed(pen: Pen, x: number, y: number, radius: number, hex: stri
 /** A UAS of another flight: a thin ring, its number with a stroke. */
 export function ghost(pen: Pen, x: number, y: number, radius: number, label: string, hex: string): void {
   ring(pen, x, y, radius, 2 * Math.PI, 0.16 * radius, bright(hex));
-  words(pen, `${label}′`, x + 1.2 * radius, y + 1.1 * radius, 0.9 * radius, bright(hex));
+  words(pen, `${label}′`, x + 1.2 * radius, y + 1.1 * radius, 0.9 * radius, legible(hex));
 }
 
 /** A red cross: a UAS that is lost, or a violation. */
@@ -154,8 +154,9 @@ export function words(
   size: number,
   ink: string,
   align: CanvasTextAlign = "center",
+  weight = 600,
 ): void {
-  pen.font = `600 ${size}px system-ui, sans-serif`;
+  pen.font = `${weight} ${size}px system-ui, sans-serif`;
   pen.textAlign = align;
   pen.textBaseline = "middle";
   pen.lineJoin = "round";

@@ -3,7 +3,7 @@
 import { RIGHT, TimeCanvas } from "./chart";
 import type { Flight } from "./flight";
 import { shortName } from "./marks";
-import { bright, colour } from "./palette";
+import { colour, legible } from "./palette";
 
 const TOP = 20;
 /** Height of a row of charts, of which a chart of many takes several. */
@@ -47,7 +47,7 @@ export class ModeChart extends TimeCanvas {
       const y = TOP + i * height;
       // of rows that are low every second has room for its number
       if (height >= WORDS_PX || i % 2 === 0) {
-        this.write(shortName(uas.name), 35, y + height / 2, bright(uas.colour), "right", 600);
+        this.write(shortName(uas.name), 35, y + height / 2, legible(uas.colour), "right", 600);
       }
       const gap = height >= WORDS_PX ? 3 : 1;
       for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - gap);
@@ -62,7 +62,7 @@ export class ModeChart extends TimeCanvas {
     const own = this.focused === null ? 0 : 16;
     if (this.focused !== null) {
       const { name, colour: hex } = this.flight.scene.uas[this.focused];
-      this.write(shortName(name), 35, TOP + 6, bright(hex), "right", 600);
+      this.write(shortName(name), 35, TOP + 6, legible(hex), "right", 600);
       for (const [mode, from, to] of this.runs(this.focused)) this.band(mode, from, to, TOP, 13);
     }
     const [top, bottom] = [TOP + own, this.height - 6];

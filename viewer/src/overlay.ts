@@ -1,9 +1,9 @@
 // What is drawn over the map and over the 3D scene alike, wherever a point of the flight lies on
 // the picture: rings of charge, names, violations, points of no return, what was clicked.
 
-import type { Flight, Moment, Point2, Point3 } from "./flight";
+import { FEW, type Flight, type Moment, type Point2, type Point3 } from "./flight";
 import * as marks from "./marks";
-import { bright, colour } from "./palette";
+import { bright, colour, legible } from "./palette";
 import type { Focus } from "./view";
 
 /** Where a point is on the picture; null: behind the eye. */
@@ -22,25 +22,33 @@ export class Overlay {
     private readonly project: Project,
   ) {}
 
-  /** The area that the UAS in focus can still reach and come home from. */
+  /** The areas that UAS can still reach and come home from: of the followed one, or of a few. */
   reach(moment: Moment, focus: Focus): void {
-    if (focus.uas === null) return;
-    const corners = this.flight.reach(moment, focus.uas);
+    const all = this.flight.scene.uas.map((_, i) => i);
+    const looked = all.filter((i) => (focus.uas === null ? focus.shown(i) : focus.uas === i));
+    if (looked.length > FEW) return;
+    for (const i of looked) this.reachOf(moment, i, focus.uas === i);
+  }
+
+  private reachOf(moment: Moment, i: number, followed: boolean): void {
+    const corners = this.flight.reach(moment, i);
     if (corners.length === 0) return;
     const { pen } = this;
-    const hex = bright(this.flight.scene.uas[focus.uas].colour);
+    const hex = bright(this.flight.scene.uas[i].colour);
     pen.beginPath();
     for (const corner of corners) {
       const at = this.project(corner);
       if (at) pen.lineTo(...at);
     }
     pen.closePath();
-    pen.globalAlpha = 0.07;
-    pen.fillStyle = hex;
-    pen.fill();
-    pen.globalAlpha = 0.9;
+    if (followed) {
+      pen.globalAlpha = 0.07;
+      pen.fillStyle = hex;
+      pen.fill();
+    }
+    pen.globalAlpha = followed ? 0.9 : 0.7;
     pen.setLineDash([7, 4]);
-    pen.lineWidth = 1.6;
+    pen.lineWidth = followed ? 1.6 : 1.1;
     pen.strokeStyle = hex;
     pen.stroke();
     pen.setLineDash([]);
@@ -122,7 +130,7 @@ export class Overlay {
     const box: Box = [x - half, y - high / 2, x + half, y + high / 2];
     if (this.labels.some((other) => overlap(box, other))) return;
     this.labels.push(box);
-    marks.words(this.pen, text, x, y, high, bright(hex));
+    marks.words(this.pen, text, x, y, high, legible(hex));
   }
 
   private violations(moment: Moment, unit: number): void {

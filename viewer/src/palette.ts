@@ -1,6 +1,8 @@
 // Colours: those of the page are custom properties of style.css, light and dark; those of things
 // on the map come with the flight and are fitted to the dark ground here.
 
+import { mixed, readOn } from "./contrast";
+
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 const known = new Map<string, string>();
@@ -35,6 +37,17 @@ export function bright(hex: string): string {
   return mixed(hex, 255, light < 200 ? 0.65 : 0.3);
 }
 
+/** The colour of words in that of a line: nearer to the ink until they are read well (WCAG AA). */
+export function legible(hex: string): string {
+  const name = `words ${hex}`;
+  let value = known.get(name);
+  if (value === undefined) {
+    value = readOn(colour("--panel"), bright(hex), isDark() ? 255 : 0);
+    known.set(name, value);
+  }
+  return value;
+}
+
 /** The colour of a large area: darker on the dark ground. */
 export function dim(hex: string): string {
   return isDark() ? mixed(hex, 0, 0.3) : hex;
@@ -50,10 +63,4 @@ export const LITTLE_SPARE = 0.05;
 /** Green: enough charge for the way home with margin; yellow: little more; red: not enough. */
 export function ofSpare(spare: number): string {
   return colour(spare > LITTLE_SPARE ? "--charged" : spare > 0 ? "--half" : "--discharged");
-}
-
-function mixed(hex: string, towards: number, share: number): string {
-  const parts = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
-  const result = parts.map((part) => Math.round(part + share * (towards - part)));
-  return "#" + result.map((part) => part.toString(16).padStart(2, "0")).join("");
 }

@@ -4,7 +4,7 @@ import { type Band, bandOf, drawBand } from "./band";
 import { DASHES, LEFT, RIGHT, TimeCanvas } from "./chart";
 import type { Flight } from "./flight";
 import { shortName, stroke } from "./marks";
-import { bright, colour } from "./palette";
+import { bright, colour, legible } from "./palette";
 import { roundStep } from "./round_step";
 
 const TOP = 20;
@@ -63,7 +63,7 @@ export class ProfileChart extends TimeCanvas {
     for (const i of [...shown].reverse()) {
       const k = Math.min(this.altitudes[i].length - 1, Math.floor(time / dt_s + 1e-6));
       const [height, floor] = [this.altitudes[i][k], this.floors[i][k]];
-      const ink = bright(this.flight.scene.uas[i].colour);
+      const ink = legible(this.flight.scene.uas[i].colour);
       const over = floor > 0 && this.width > WIDE ? `, ${(height - floor).toFixed(1)} over a roof` : "";
       const words = `${shortName(this.flight.scene.uas[i].name)}: ${height.toFixed(1)} m${over}`;
       right -= this.write(words, right, 9, ink, "right", 600) + 10;
@@ -75,8 +75,7 @@ export class ProfileChart extends TimeCanvas {
     const x = (k: number) => this.x(k * this.flight.data.dt_s);
     const ink = this.focused === null ? "--accent" : "--faint";
     drawBand(this.pen, this.spread, colour(ink), x, (height) => this.y(height));
-    const words = `least and median of ${this.flight.uas}`;
-    this.write(words, this.width - RIGHT, this.height - BOTTOM - 8, colour("--faint"), "right");
+    this.bandWords(this.flight.uas, 8);
   }
 
   protected words(time: number): string {

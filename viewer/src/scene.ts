@@ -3,6 +3,7 @@
 import { AmbientLight, Color, DirectionalLight, PCFShadowMap, Scene, WebGLRenderer } from "three";
 import { element } from "./dom";
 import type { Flight, Moment, Point2, Point3 } from "./flight";
+import { words } from "./marks";
 import { Overlay } from "./overlay";
 import { colour } from "./palette";
 import { Camera } from "./scene_camera";
@@ -110,6 +111,10 @@ export class SceneView implements View {
     this.moving.draw(moment);
     this.renderer.render(this.scene, lens);
     this.pen.clearRect(0, 0, width, height);
+    for (const [text, point] of this.terrain.signs) {
+      const at = this.pixel(point);
+      if (at) words(this.pen, text, ...at, Math.max(11, 15 * size), colour("--faint"));
+    }
     this.overlay.reach(moment, focus);
     this.overlay.moving(moment, size);
     if (this.ghost && other) this.overlay.ghosts(this.ghost, other, size);

@@ -18,14 +18,10 @@ import {
   RingGeometry,
   Shape,
   ShapeGeometry,
-  Sprite,
-  SpriteMaterial,
   Vector3,
 } from "three";
 import type { Obstacle, Point2, Point3, Scene } from "./flight";
 import { bodyGeometry } from "./scene_space";
-import { drawn } from "./scene_sprites";
-import { words } from "./marks";
 import { bright, colour, darker, dim } from "./palette";
 import { roundStep } from "./round_step";
 
@@ -50,11 +46,15 @@ export function extentOf(scene: Scene): Extent {
   return { centre, half, ground: low.y, corners };
 }
 
+/** Words on the ground, and where. */
+export type Sign = [string, Point3];
+
 /** What stands still, and what of it is there at a sample: events add obstacles and move homes. */
 export interface Terrain {
   group: Group;
   /** Show what is there; whether that is something else than before. */
   at(sample: number): boolean;
+  signs: Sign[];
 }
 
 export function terrain(scene: Scene, extent: Extent): Terrain {
@@ -88,9 +88,11 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
   }
   const [south, north] = [Math.min, Math.max].map((pick) => pick(...extent.corners.map((c) => -c.z)));
   const west = Math.min(...extent.corners.map((corner) => corner.x));
-  group.add(sign("N", new Vector3(centre.x, ground, -north - 0.09 * half), 0.16 * half));
-  const step = `grid ${roundStep(half / 2)} m`;
-  group.add(sign(step, new Vector3(west + 0.5 * roundStep(half / 2), ground, -south + 0.08 * half), 0.26 * half));
+  const step = roundStep(half / 2);
+  const signs: Sign[] = [
+    ["N", [north + 0.09 * half, centre.x, -ground]],
+    [`grid ${step} m`, [south - 0.08 * half, west + 0.5 * step, -ground]],
+  ];
   const fence = new EdgesGeometry(bodyGeometry(scene.fence), 1);
   group.add(new LineSegments(fence, new LineBasicMaterial({ color: colour("--fence") })));
   const at = (sample: number): boolean => {
@@ -98,7 +100,7 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
     for (const { part } of wrong) part.visible = !part.visible;
     return wrong.length > 0;
   };
-  return { group, at };
+  return { group, at, signs };
 }
 
 /** Where a UAS starts and lands. */
@@ -108,15 +110,6 @@ function pad([n, e]: Point3, hex: string, height: number, half: number): Mesh {
   mesh.rotation.x = -Math.PI / 2;
   mesh.position.set(e, height, -n);
   return mesh;
-}
-
-/** A word that stands on the ground. */
-function sign(text: string, at: Vector3, size: number): Sprite {
-  const map = drawn((pen, px) => words(pen, text, px / 2, px / 2, Math.min(0.3, 1.5 / text.length) * px, colour("--faint")));
-  const sprite = new Sprite(new SpriteMaterial({ map, depthTest: false, depthWrite: false }));
-  sprite.position.copy(at);
-  sprite.scale.setScalar(size);
-  return sprite;
 }
 
 function area(outline: Point2[], paint: string, height: number): Mesh {

@@ -99,8 +99,10 @@ class LegPilot:
     def _call_home(self, swarm: SwarmState) -> None:
         """Note whose charge suffices for nothing more than the way home."""
         self._view.update(swarm)
-        for u in np.flatnonzero((swarm.status == FLYING) & ~self._returns & swarm.departed):
-            self._returns[u] = has_to_return(self._view.arena, self._view.state, u)
+        for u in np.flatnonzero((swarm.status == FLYING) & ~self._returns):
+            # asked before it departs, too, so that nothing is compiled in mid-flight
+            called = has_to_return(self._view.arena, self._view.state, u)
+            self._returns[u] = called and swarm.departed[u]
 
     def _command(self, swarm: SwarmState, u: int, route: list[int]) -> Command:
         if self._returns[u] or (not route and not swarm.departed[u]):

@@ -11,16 +11,18 @@ from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
-from uas_coverage_env.draw.labels import free_place
+from uas_coverage_env.draw.labels import Box, free_place, overlap, short_name
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, SceneHistory, SeenGround, seen_ground
 from uas_coverage_env.replay.figures.map_legend import LANDED, LOST, SEEN_ALPHA, legend_of
 from uas_coverage_env.replay.figures.style import (
+    MANY,
     columns_of,
     printed,
     shade,
     uas_colour,
     width_in,
+    words_colour,
 )
 from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.scenario import Scenario
@@ -78,10 +80,8 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         _heights(axes, scenario, float((high - low)[1]) / (width_in() * _PT_PER_IN))
         _north(figure, axes)
         _moving_obstacles(axes, scenario, moving_m)
-        pt_per_m = width_in() * _PT_PER_IN / float((high - low)[1])
-        sides = _sides_of_names(axes, flight, now, pt_per_m)
-        for i, side in enumerate(sides):
-            _uas(axes, flight, now, i, side)
+        for i in range(len(flight.names)):
+            _uas(axes, flight, now, i)
         _violations(axes, flight, now)
         title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s:"
         count = f"{flight.covered[now]} of {len(scenario.waypoints)} waypoints"
@@ -89,6 +89,7 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         title += f"{' ' if wide else chr(10)}{count}"
         axes.set_title(title, fontsize=9, parse_math=False)
         figure.legend(handles=legend, loc="outside lower center", ncols=columns, columnspacing=1.2)
+        _names(figure, axes, flight, now)
     return figure
 
 
@@ -182,39 +183,42 @@ def _moving_obstacles(axes: Axes, scenario: Scenario, moving_m: NDArray[np.float
         axes.add_patch(Circle((x, y), kept_m, fill=False, edgecolor=red, linestyle="--", lw=0.8))
 
 
-def _sides_of_names(
-    axes: Axes, flight: Flight, now: int, pt_per_m: float
-) -> list[tuple[float, float]]:
-    """Where the name of each UAS stands, from its mark [pt]: no name lies on another."""
-    taken: list[tuple[float, float, float, float]] = []
-    sides: list[tuple[float, float]] = []
-    for i, name in enumerate(flight.names):
+def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
+    """The name of each UAS beside its mark; where there is no free place, none."""
+    figure.draw_without_rendering()  # lays out the axes, so that distances are known
+    pt_per_px = _PT_PER_IN / figure.dpi
+    taken: list[Box] = []
+    many = len(flight.names) > MANY
+    for i, whole in enumerate(flight.names):
+        name = short_name(whole) if many else whole
         east, north = _flat(flight.x[min(now, int(flight.last_sample[i])), i, :3]).tolist()
         # where there is no room to the right, the name stands to the left
         crowded = east > np.dot(axes.get_xlim(), (0.12, 0.88))
+        x_pt, y_pt = pt_per_px * axes.transData.transform((east, north))
         width = _LETTER * _NAME_PT * len(name)
         beside = -9.0 if crowded else 9.0
-        left = pt_per_m * east + beside - (width if crowded else 0.0)
-        rows = [6.0 + 1.2 * _NAME_PT * row for row in _NAME_ROWS]
-        boxes = [(left, pt_per_m * north + up, width, _NAME_PT) for up in rows]
-        free = (k for k, box in enumerate(boxes) if not any(_overlap(box, it) for it in taken))
-        chosen = next(free, 0)
-        taken.append(boxes[chosen])
-        sides.append((beside, rows[chosen]))
-    return sides
+        left = x_pt + beside - (width if crowded else 0.0)
+        for row in _NAME_ROWS:
+            up = 6.0 + 1.2 * _NAME_PT * row
+            box = (left, y_pt + up, width, _NAME_PT)
+            if any(overlap(box, it) for it in taken):
+                continue
+            taken.append(box)
+            axes.annotate(
+                name,
+                (east, north),
+                xytext=(beside, up),
+                textcoords="offset points",
+                ha="right" if crowded else "left",
+                color=words_colour(i),
+                fontsize=_NAME_PT,
+                fontweight="bold",
+                path_effects=[withStroke(linewidth=2, foreground="white")],
+            )
+            break
 
 
-def _overlap(
-    box: tuple[float, float, float, float], other: tuple[float, float, float, float]
-) -> bool:
-    """Whether two boxes, each left, bottom, width, height, have a place in common."""
-    return all(
-        box[axis] < other[axis] + other[axis + 2] and other[axis] < box[axis] + box[axis + 2]
-        for axis in (0, 1)
-    )
-
-
-def _uas(axes: Axes, flight: Flight, now: int, i: int, side: tuple[float, float]) -> None:
+def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
     colour = uas_colour(i)
     until = min(now, int(flight.last_sample[i]))
     path = _flat(flight.x[: until + 1, i, :3])
@@ -234,17 +238,6 @@ def _uas(axes: Axes, flight: Flight, now: int, i: int, side: tuple[float, float]
         _charge_ring(axes, (x, y), float(flight.soc[now, i]))
         heading = float(np.degrees(flight.x[now, i, PSI]))
         axes.plot(x, y, marker=(4, 2, 45 - heading), color=shade(colours.INK), markersize=7)
-    axes.annotate(
-        flight.names[i],
-        (x, y),
-        xytext=side,
-        textcoords="offset points",
-        ha="right" if side[0] < 0.0 else "left",
-        color=colour,
-        fontsize=_NAME_PT,
-        fontweight="bold",
-        path_effects=[withStroke(linewidth=2, foreground="white")],
-    )
 
 
 def _charge_ring(axes: Axes, place: tuple[float, float], soc: float) -> None:

@@ -20,6 +20,9 @@ from uas_coverage_env.files.suggestions import did_you_mean
 WIDTH_IN = 6.3
 """Text width of an A4 page; of figures for which no other is asked."""
 
+MANY = 8
+"""Of more UAS, figures show spans and counts, and names are short."""
+
 LINE_STYLES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 
 _RC: dict[Any, Any] = {
@@ -145,6 +148,11 @@ def shade(colour: colours.Colour) -> tuple[float, float, float]:
 def uas_colour(i: int) -> tuple[float, float, float]:
     """The colour of the UAS at place `i` of the fleet."""
     return shade(colours.UAS[i % len(colours.UAS)])
+
+
+def words_colour(i: int) -> tuple[float, float, float]:
+    """The colour of words about that UAS."""
+    return shade(colours.of_words(colours.UAS[i % len(colours.UAS)]))
 
 
 def line_style(i: int):
