@@ -207,6 +207,13 @@ def _map(parts: Sequence[Part]) -> str:
         )
         x, y, _ = one.track.home_m
         shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
+        if one.track.lands_elsewhere:
+            x, y, _ = one.track.landing_m
+            shapes.append(
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="none" stroke="{colour}" '
+                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: landing</title>'
+                "</circle>"
+            )
         lost = one.point_of_no_return
         if lost is not None:
             x, y, _ = one.track.legs[lost].end_m
