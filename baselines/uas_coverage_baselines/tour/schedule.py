@@ -101,7 +101,7 @@ class Schedule:
         """Drop what is covered, and search again where something has happened."""
         self._drop_covered(view)
         self._time_legs(view)
-        if self._has_changed(view):
+        if self._has_changed(view) or self._is_asked_for_more(view):
             kept, better = self._searched_again(view)
             worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
             self.take(better if worthwhile else kept, view)
@@ -147,6 +147,14 @@ class Schedule:
         spare_s = self._budget_s(view) + _SPARE_S / self.pace - self._legs_left_s
         too_long = [len(route) and spare_s[u] < 0.0 for u, route in enumerate(self.order.routes)]
         return bool(len(self.order.left_out) or any(too_long))
+
+    def _is_asked_for_more(self, view: View) -> bool:
+        """Whether a waypoint is to be visited again that the order does not know of."""
+        if view.asked_in_s is None:
+            return False
+        known = np.zeros(len(view.uncovered), np.bool_)
+        known[np.concatenate([*self.order.routes, self.order.left_out, self.order.later])] = True
+        return bool((view.uncovered & self._can_cover[view.may_work].any(axis=0) & ~known).any())
 
     def _time_legs(self, view: View) -> None:
         """Measure how long flights take beside their legs, waiting not counted."""
