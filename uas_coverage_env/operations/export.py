@@ -252,10 +252,11 @@ def _unkept(flight: Flight, one: Exported) -> list[str]:
     file_s = one.followed.duration_s
     if abs(file_s - planned_s) <= PROMISE * planned_s:
         return []
-    return [
-        f"{one.track.name}: the file takes {file_s:.0f} s, the flight {planned_s:.0f}; "
-        f"plan for the autopilot with tour, trajectory or lawnmower"
-    ]
+    waited_s = one.waits.start_s + one.waits.hold_s
+    why = "plan for the autopilot with tour, trajectory or lawnmower"
+    if abs(file_s - waited_s - planned_s) <= PROMISE * planned_s:
+        why = f"{waited_s:.0f} s of it are waits for others"
+    return [f"{one.track.name}: the file takes {file_s:.0f} s, the flight {planned_s:.0f}; {why}"]
 
 
 def _notes(part: Part) -> list[str]:

@@ -20,7 +20,8 @@ _VEHICLE_TYPES = {4: 2, 6: 13, 8: 14}
 """MAV_TYPE by number of motors: quadrotor, hexarotor, octorotor."""
 
 _RELATIVE_ALTITUDE = 1
-_ZONES = ("no_fly", "outside_fence")
+ZONES = ("no_fly", "outside_fence")
+"""Kinds of obstacles at which nothing stands: where no UAS may fly."""
 
 
 def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, autopilot: str) -> str:
@@ -88,7 +89,7 @@ def _polygons(scenario: Scenario, one: Exported) -> list[dict[str, Any]]:
     bodies += [
         (hull.vertices_m, False)
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
-        if obstacle.kind in _ZONES
+        if obstacle.kind in ZONES
     ]
     found = []
     for vertices_m, inclusion in bodies:
