@@ -123,8 +123,9 @@ def _as_events_left_it(flight: Flight) -> tuple[Flight, NDArray[np.int64]]:
         return flight, covered_at(flight)
     history = SceneHistory.of(flight)
     scenario, numbers = history.scene_at(flight.steps)
-    once = tuple(w.model_copy(update={"again_after_s": ()}) for w in scenario.waypoints)
-    scenario = scenario.model_copy(update={"waypoints": once})
+    if scenario.asks_again:  # every visit is there as a waypoint of its own
+        once = tuple(w.model_copy(update={"again_after_s": ()}) for w in scenario.waypoints)
+        scenario = scenario.model_copy(update={"waypoints": once, "events": ()})
     moving_m = history.moving_position_m
     all_there = replace(flight, scenario=scenario, events=(), moving_position_m=moving_m)
     return all_there, history.covered_at[numbers]
