@@ -3,10 +3,13 @@
     python benchmarks/sorties.py                       # some minutes of processor time
     python benchmarks/sorties.py --planners tour --swap 30
     python benchmarks/sorties.py --towns 7:12 --charges 0.33,0.37 --forms alone --each
+    python benchmarks/sorties.py --uas 1 --waypoints 10 --again 15,15 --charges 1 --forms relaunch
 
 The towns are `generate_scenario(seed, n_uas=3, n_waypoints=90)`, packs charged to `--charges`. They
-are flown as sorties one after the other (`run --sorties`: all wait for the last one to land)
-and in one flight (`together = false`). A row for each planner, form and charge, of all towns, as
+are flown as sorties one after the other (`run --sorties`: all wait for the last one to land),
+in one flight (`together = false`), and on the charge that is left (`relaunch = true`). With
+`--again`, every waypoint is asked for again so many seconds after it was covered, once for each
+number; the last two forms know that. A row for each planner, form and charge, of all towns, as
 median (range): waypoints covered, time of the whole mission with its swaps, energy, packs used, and
 violations and breaches in all. `--each` prints a row for each mission, too.
 """
@@ -51,8 +54,15 @@ def mission(charge: float, swap_s: float, town: Scenario | None = None) -> Scena
     """A town with packs charged to a share, swapped together."""
     town = town or generate_scenario(TOWN, n_uas=3, n_waypoints=90)
     fleet = tuple(uas.model_copy(update={"soc_0": charge}) for uas in town.uas)
-    packs = Sorties(packs=20, swap_s=swap_s)
+    # waypoints that are asked for again do not go with sorties one after the other
+    packs = Sorties(packs=20, swap_s=swap_s, together=not town.asks_again)
     return town.model_copy(update={"uas": fleet, "sorties": packs, "max_steps": 5000})
+
+
+def asked_again(town: Scenario, gaps_s: tuple[float, ...]) -> Scenario:
+    """A town whose waypoints are all asked for again."""
+    again = (w.model_copy(update={"again_after_s": gaps_s}) for w in town.waypoints)
+    return town.model_copy(update={"waypoints": (*again,)}) if gaps_s else town
 
 
 def together(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
@@ -71,8 +81,17 @@ def alone(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown
     """One flight in which each swaps while the others fly on."""
     packs = Sorties(packs=20, swap_s=scenario.sorties.swap_s if scenario.sorties else 0.0,
                     together=False)  # fmt: skip
-    alone = scenario.model_copy(update={"sorties": packs})
-    flight = rollout(alone, load_planner(planner, options))
+    return _in_one(scenario.model_copy(update={"sorties": packs}), planner, options)
+
+
+def relaunch(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
+    """One flight in which UAS take off again on the charge that is left."""
+    changes = {"sorties": None, "relaunch": True}
+    return _in_one(scenario.model_copy(update=changes), planner, options)
+
+
+def _in_one(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
+    flight = rollout(scenario, load_planner(planner, options))
     covered = int(flight.covered[-1])
     harm = len(flight.violations) + flight.breaches
     time_s, spent_Wh = flight.steps * scenario.dt_s, float(energy_Wh(flight).sum())
@@ -80,7 +99,11 @@ def alone(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown
     return Flown(covered, covered + open_waypoints(flight), time_s, spent_Wh, packs_in_all, harm)
 
 
-FORMS = {"together": ("together", together), "alone": ("each on its own", alone)}
+FORMS = {
+    "together": ("together", together),
+    "alone": ("each on its own", alone),
+    "relaunch": ("not", relaunch),
+}
 
 
 def _spread(values: Sequence[float], digits: int) -> str:
@@ -107,13 +130,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--charges", default="0.4", help="of a fresh pack, 0 to 1")
     parser.add_argument("--swap", type=float, default=60.0, help="[s]")
     parser.add_argument("--towns", default=f"{TOWN}:{TOWN + 1}", help="seeds, FIRST:LAST+1")
-    parser.add_argument("--forms", default=",".join(FORMS))
+    parser.add_argument("--forms", default="together,alone", help=f"of {', '.join(FORMS)}")
+    parser.add_argument("--uas", type=int, default=3)
+    parser.add_argument("--waypoints", type=int, default=90)
+    parser.add_argument("--again", default="", help="[s] after which waypoints are asked for again")
     parser.add_argument("--each", action="store_true", help="print each mission, too")
     parser.add_argument("--option", action="append", default=[], help="NAME=VALUE, of the planners")
     given = parser.parse_args(arguments)
     options = dict(one.split("=", 1) for one in given.option)
     seeds = range(*map(int, given.towns.split(":")))
-    towns = [generate_scenario(seed, n_uas=3, n_waypoints=90) for seed in seeds]
+    gaps_s = tuple(float(gap) for gap in given.again.split(",") if gap)
+    towns = [
+        asked_again(generate_scenario(seed, n_uas=given.uas, n_waypoints=given.waypoints), gaps_s)
+        for seed in seeds
+    ]
     print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
     for planner in given.planners.split(","):
         for form, fly in (FORMS[name] for name in given.forms.split(",")):

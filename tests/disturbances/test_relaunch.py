@@ -150,6 +150,14 @@ def test_nobody_goes_while_another_is_at_work():
     assert due(again(), LANDED, FLYING) == [False, False]
 
 
+def test_where_a_waypoint_is_asked_for_again_one_goes_while_another_is_at_work():
+    relaunch = Relaunch(MissionBrief.of(again()))
+    swarm = seen(again(), LANDED, FLYING)
+    assert relaunch.due(swarm, asked_again=True).tolist() == [True, False]
+    nothing = dataclasses.replace(swarm, uncovered=np.zeros_like(swarm.uncovered))
+    assert not relaunch.due(nothing, asked_again=True).any()
+
+
 def test_one_that_return_mode_flies_home_is_not_at_work():
     assert due(again(), LANDED, FLYING, returning=np.array([False, True])) == [True, False]
 

@@ -157,6 +157,18 @@ def test_steps_and_sorties_together_are_refused(tmp_path, capsys):
     assert not (tmp_path / "o").exists()
 
 
+def test_sorties_of_waypoints_that_are_asked_for_again_are_refused(tmp_path, capsys):
+    scenario = load_scenario("open_field")
+    first, *others = scenario.waypoints
+    again = (first.model_copy(update={"again_after_s": (60.0,)}), *others)
+    changed = scenario.model_copy(update={"waypoints": again, "relaunch": True})
+    changed.to_file(tmp_path / "patrol.toml")
+    assert main(["run", str(tmp_path / "patrol.toml"), "--sorties", "2"]) == 2
+    said = capsys.readouterr().err
+    assert "asked for again some time after they were covered (again_after_s)" in said
+    assert said.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [

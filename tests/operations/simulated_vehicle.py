@@ -1,4 +1,4 @@
-"""ArduCopters of a few lines behind loopback sockets, and a clock that drives them."""
+"""Autopilots of a few lines behind loopback sockets, and a clock that drives them."""
 
 import os
 import socket
@@ -12,19 +12,22 @@ STABILIZE, GUIDED, LAND = 0, 4, 9
 
 
 class SimulatedVehicle:
-    """Goes where its targets are, no faster than it can.
+    """An ArduCopter: goes where its targets are, no faster than it can.
 
     `slow` is a stretch of time (from, to) [s] in which it makes only 1 m/s; from `silent_s` on it
     says nothing; at `taken_s` its pilot takes it over.
     """
 
+    autopilot = mav.MAV_AUTOPILOT_ARDUPILOTMEGA
+    manual, guided, land = STABILIZE, GUIDED, LAND
+
     def __init__(self, frame, home_m, slow=(0.0, 0.0), silent_s=np.inf, taken_s=np.inf):
-        self._frame, self.autopilot = frame, mav.MAV_AUTOPILOT_ARDUPILOTMEGA
+        self._frame = frame
         self.place_m = np.array([*home_m[:2], 0.0])
         self._slow, self._silent_s, self._taken_s = slow, silent_s, taken_s
-        self.mode, self.armed, self.time_s, self._told_s = STABILIZE, False, 0.0, -np.inf
+        self.mode, self.armed, self.time_s, self._told_s = self.manual, False, 0.0, -np.inf
         self._target_m, self._ahead_mps, self._climbs_to_m = None, np.zeros(3), None
-        self.modes, self.path = [STABILIZE], []
+        self.modes, self.path = [self.manual], []
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._socket.setblocking(False)
@@ -40,8 +43,8 @@ class SimulatedVehicle:
     def step(self, dt_s):
         self._hear()
         self.time_s += dt_s
-        if self.time_s >= self._taken_s and self.mode == GUIDED:
-            self._enter(STABILIZE)
+        if self.time_s >= self._taken_s and self.mode == self.guided:
+            self._enter(self.manual)
         self._move(dt_s)
         self.path.append((self.time_s, *self.place_m))
         if self._peer is not None and self.time_s < self._silent_s:
@@ -72,9 +75,9 @@ class SimulatedVehicle:
         elif kind == "COMMAND_LONG" and message.command == mav.MAV_CMD_COMPONENT_ARM_DISARM:
             self.armed = True
         elif kind == "COMMAND_LONG" and message.command == mav.MAV_CMD_NAV_TAKEOFF:
-            if self.armed and self.mode == GUIDED:
+            if self.armed and self.mode == self.guided:
                 self._climbs_to_m = message.param7
-        elif kind == "SET_POSITION_TARGET_GLOBAL_INT" and self.mode == GUIDED:
+        elif kind == "SET_POSITION_TARGET_GLOBAL_INT" and self.mode == self.guided:
             place = 1e-7 * message.lat_int, 1e-7 * message.lon_int
             self._target_m = self._frame.to_ned(*place, message.alt)
             self._ahead_mps = np.array([message.vx, message.vy, message.vz])
@@ -83,7 +86,7 @@ class SimulatedVehicle:
         if not self.armed:
             return
         wanted_mps = np.zeros(3)
-        if self.mode == LAND:
+        if self.mode == self.land:
             wanted_mps[2] = 1.5
         elif self._target_m is not None:
             wanted_mps = self._ahead_mps + (self._target_m - self.place_m)
@@ -92,7 +95,7 @@ class SimulatedVehicle:
         most_mps = 1.0 if self._slow[0] <= self.time_s < self._slow[1] else 15.0
         share = min(1.0, most_mps / max(np.linalg.norm(wanted_mps), 1e-9))
         self.place_m = self.place_m + dt_s * share * wanted_mps
-        if self.place_m[2] >= 0.0 and self.mode == LAND:
+        if self.place_m[2] >= 0.0 and self.mode == self.land:
             self.place_m[2], self.armed = 0.0, False
 
     def _report(self):
@@ -108,6 +111,48 @@ class SimulatedVehicle:
 
     def _say(self, message):
         self._socket.sendto(message.pack(self._link), self._peer)
+
+
+class SimulatedPX4(SimulatedVehicle):
+    """A PX4 as its documentation has it: OFFBOARD lives on a stream of targets.
+
+    It enters that mode only after more than a second of targets, no two of them half a second or
+    more apart, and leaves it by itself where none comes for a second (COM_OF_LOSS_T), to hold its
+    position (COM_OBL_RC_ACT = 5). It takes off by targets. In the stretch of time `deaf` it hears
+    nothing.
+    """
+
+    autopilot = mav.MAV_AUTOPILOT_PX4
+    manual, guided, land, hold = 3 << 16, 6 << 16, 4 << 16 | 6 << 24, 4 << 16 | 3 << 24
+
+    def __init__(self, frame, home_m, deaf=(0.0, 0.0), **how):
+        super().__init__(frame, home_m, **how)
+        self._deaf, self._first_s, self._last_s = deaf, np.inf, -np.inf
+        self.denied = 0
+
+    def step(self, dt_s):
+        super().step(dt_s)
+        if self.mode == self.guided and self.time_s - self._last_s > 1.0:
+            self._enter(self.hold)
+
+    def _obey(self, message):
+        if self._deaf[0] <= self.time_s < self._deaf[1]:
+            return
+        kind = message.get_type()
+        if kind == "SET_POSITION_TARGET_GLOBAL_INT":
+            assert message.coordinate_frame in (5, 6, 11)
+            if self.time_s - self._last_s >= 0.5:
+                self._first_s = self.time_s
+            self._last_s = self.time_s
+        if kind == "COMMAND_LONG" and message.command == mav.MAV_CMD_DO_SET_MODE:
+            mode = int(message.param2) << 16 | int(message.param3) << 24
+            is_streamed = self.time_s - self._last_s < 0.5 and self.time_s - self._first_s > 1.0
+            if mode == self.guided and not is_streamed:
+                self.denied += 1
+            else:
+                self._enter(mode)
+        elif kind != "COMMAND_LONG" or message.command != mav.MAV_CMD_NAV_TAKEOFF:
+            super()._obey(message)
 
 
 class DrivenClock:

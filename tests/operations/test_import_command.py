@@ -198,6 +198,8 @@ HOSTILE = {
     "an external entity": ("a.kml", XXE, "document type or entities"),
     "no XML": ("a.kml", "<kml><Placemark>", "is no XML"),
     "text for coordinates": ("a.kml", KML.format("1,2 three,4 5,6"), "broken coordinate"),
+    "underscores": ("a.kml", KML.format("1,4_7 2,47 2,48"), "broken coordinate"),
+    "a line of the map": ("a.kml", KML.format("8.54,47.37 8.544,47.37 8.548,47.37"), "no area"),
     "deep XML": ("a.kml", "<a>" * 200_000 + "</a>" * 200_000, "no area to search"),
     "no archive": ("a.kmz", "PK but no archive", "cannot be unpacked"),
     "no JSON": ("a.geojson", '{"type": ', "is not JSON"),

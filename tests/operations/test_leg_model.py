@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
+from uas_coverage_env.operations.corners import cut_path, distances_m
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.tracks import cut_path, distances_m
 from uas_coverage_env.scenario import Place
 
 RECORDED = Path(__file__).parent / "recorded"

@@ -197,6 +197,21 @@ def test_telemetry_of_several_vehicles_is_refused(tmp_path):
         read_log(tmp_path / "a.tlog")
 
 
+def test_a_log_whose_clock_goes_back_is_refused(tmp_path):
+    tlog(tmp_path / "a.tlog", [0.0, 100.0, 30.0], CORNERS[:3])
+    with pytest.raises(InputError, match=r"clock goes back by 70 s, 100 s after its beginning"):
+        read_log(tmp_path / "a.tlog")
+
+
+def test_damaged_places_of_a_log_are_passed_over_without_a_word(tmp_path, capfd):
+    bin_log(tmp_path / "a.bin", np.arange(3.0), CORNERS[:3])
+    whole = (tmp_path / "a.bin").read_bytes()
+    (tmp_path / "a.bin").write_bytes(whole + b"\x55" * 1_000 + whole[-200:])
+    (logged,) = read_log(tmp_path / "a.bin")
+    assert len(logged.time_s) == 3
+    assert capfd.readouterr() == ("", "")
+
+
 def test_data_flash_logs_become_a_flight(plan, plan_at, tmp_path, capsys):
     paths = []
     for i, name in enumerate(plan.names):
@@ -267,6 +282,7 @@ MISTAKES = {
     "no column": ("t_s,lat,lon\n0,1,2", "has no column latitude_deg"),
     "no rows": (HEAD, "holds no sample"),
     "no number": (f"{HEAD}\n0,47,x,1", "line 2: longitude_deg 'x' is no number"),
+    "underscores": (f"{HEAD}\n0,4_7,19,1", "line 2: latitude_deg '4_7' is no number"),
     "not finite": (f"{HEAD}\n0,47,nan,1", "line 2: longitude_deg 'nan' is no number"),
     "a short row": (f"{HEAD}\n0,47", "line 2: holds 2 values, not 4"),
     "one sample": (f"{HEAD}\n0,47,19,1", "fewer than two positions"),

@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 import pytest
-from simulated_vehicle import LAND, DrivenClock, SimulatedVehicle
+from simulated_vehicle import LAND, DrivenClock, SimulatedPX4, SimulatedVehicle
 from small_worlds import meadow, waypoint
 
 pytest.importorskip("pyproj")
@@ -30,10 +30,18 @@ def flight():
 
 
 class Loopback:
-    def __init__(self, flight, *, stop_s=np.inf, vehicles=({}, {}), **options):
+    def __init__(
+        self,
+        flight,
+        *,
+        stop_s=np.inf,
+        kinds=(SimulatedVehicle, SimulatedVehicle),
+        vehicles=({}, {}),
+        **options,
+    ):
         self.vehicles = [
-            SimulatedVehicle(FRAME, start_m, **how)
-            for start_m, how in zip(STARTS_M, vehicles, strict=True)
+            kind(FRAME, start_m, **how)
+            for kind, start_m, how in zip(kinds, STARTS_M, vehicles, strict=True)
         ]
         self.flight, self.said = flight, []
         self.clock, self.options = DrivenClock(self.vehicles, stop_s), StreamOptions(**options)
@@ -58,14 +66,22 @@ def off_m(vehicle, flight, uas):
     return max(np.linalg.norm(path - place, axis=1).min() for place in flown)
 
 
-def test_vehicles_take_off_follow_the_plan_in_time_and_land(flight, tmp_path):
-    loop = Loopback(flight)
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        (SimulatedVehicle, SimulatedVehicle),
+        (SimulatedPX4, SimulatedPX4),
+        (SimulatedVehicle, SimulatedPX4),
+    ],
+)
+def test_vehicles_take_off_follow_the_plan_in_time_and_land(flight, tmp_path, kinds):
+    loop = Loopback(flight, kinds=kinds)
     ended, table = loop.fly()
     assert ended.reason == ""
     assert ended.late_s < 5.0
     for u, vehicle in enumerate(loop.vehicles):
         assert not vehicle.armed
-        assert vehicle.modes == [0, 4, LAND]
+        assert vehicle.modes == [vehicle.manual, vehicle.guided, vehicle.land]
         assert np.linalg.norm(vehicle.place_m - (*STARTS_M[u][:2], 0.0)) < 2.5
         assert off_m(vehicle, flight, u) < 1.0
         took_s = vehicle.path[-1][0]
@@ -87,14 +103,35 @@ def test_time_passes_more_slowly_for_all_while_one_lags_and_both_stay_on_their_p
     assert np.abs(one - other).max() < 12.0
 
 
-@pytest.mark.parametrize(("reaction", "mode"), [("hold", BRAKE), ("rtl", RTL), ("land", LAND)])
+@pytest.mark.parametrize(
+    ("reaction", "mode", "px4_mode"),
+    [("hold", BRAKE, (4, 3)), ("rtl", RTL, (4, 5)), ("land", LAND, (4, 6))],
+)
 def test_a_stream_that_is_stopped_by_hand_leaves_all_vehicles_in_the_mode_asked(
-    flight, reaction, mode
+    flight, reaction, mode, px4_mode
 ):
-    loop = Loopback(flight, stop_s=20.0, reaction=reaction)
+    kinds = (SimulatedVehicle, SimulatedPX4)
+    loop = Loopback(flight, stop_s=20.0, reaction=reaction, kinds=kinds)
     ended, _ = loop.fly()
     assert ended.reason == "stopped by hand"
-    assert [vehicle.modes[-1] for vehicle in loop.vehicles] == [mode, mode]
+    main, sub = px4_mode
+    assert [vehicle.modes[-1] for vehicle in loop.vehicles] == [mode, main << 16 | sub << 24]
+
+
+def test_px4_is_asked_for_offboard_only_once_it_has_heard_targets_for_long_enough(flight):
+    loop = Loopback(flight, kinds=(SimulatedPX4, SimulatedPX4))
+    loop.fly()
+    assert [vehicle.denied for vehicle in loop.vehicles] == [0, 0]
+
+
+def test_px4_that_has_left_offboard_without_targets_stops_time_for_all(flight):
+    kinds = (SimulatedPX4, SimulatedPX4)
+    loop = Loopback(flight, kinds=kinds, vehicles=({"deaf": (18.0, 20.0)}, {}), patience_s=10.0)
+    ended, _ = loop.fly()
+    one, other = loop.vehicles
+    assert ended.reason == "uas_1 does not take targets (main mode 4, sub mode 3)"
+    assert one.modes == [one.manual, one.guided, one.hold]
+    assert other.modes == [other.manual, other.guided, other.hold]
 
 
 def test_one_that_is_not_heard_stops_time_and_is_given_up_after_the_patience(flight):
@@ -121,10 +158,10 @@ def test_a_vehicle_that_is_elsewhere_is_not_armed(flight):
     assert not any(vehicle.armed for vehicle in loop.vehicles)
 
 
-def test_what_is_no_ardupilot_is_refused(flight):
+def test_an_autopilot_with_other_modes_is_refused(flight):
     loop = Loopback(flight)
-    loop.vehicles[0].autopilot = 12
-    with pytest.raises(InputError, match=r"uas_1.*is no ArduPilot"):
+    loop.vehicles[0].autopilot = 13
+    with pytest.raises(InputError, match=r"uas_1.*autopilot 13.*only.*ArduPilot and PX4"):
         loop.fly()
 
 

@@ -77,3 +77,25 @@ def test_only_a_scene_with_at_most_more_waypoints_is_as_clear_as_it_was():
     assert still_clear(brief, MissionBrief.of(more))
     assert not still_clear(brief, MissionBrief.of(less))
     assert not still_clear(brief, MissionBrief.of(other))
+
+
+@pytest.mark.parametrize("name", ["trajectory", "tour"])
+def test_what_is_going_to_be_asked_for_is_planned_before_it_is(name):
+    """A UAS that knows only what is open flies home between, and out again for each waypoint."""
+    town = generate_scenario(seed=4, n_uas=1, n_waypoints=5, n_obstacles=2)
+    once = rollout(town, load_planner(name, {"moves": "20000"}))
+    gap_s = 1.2 * once.steps * town.dt_s
+    again = tuple(w.model_copy(update={"again_after_s": (gap_s,)}) for w in town.waypoints)
+    planner = load_planner(name, {"moves": "20000"})
+    flight = rollout(town.model_copy(update={"waypoints": again, "relaunch": True}), planner)
+    assert accomplished(flight)
+    assert flight.breaches == 0
+    # it waits no longer than for the first waypoint, and then flies the same once more
+    assert flight.steps < gap_s / town.dt_s + 1.25 * once.steps
+
+
+def test_a_planner_flies_the_same_repeated_mission_twice_as_a_fresh_one_does():
+    for name in ("trajectory", "tour"):
+        used = load_planner(name, {"moves": "20000"})
+        first, second = (rollout(patrol(4), used, max_steps=60) for _ in range(2))
+        assert (first.x == second.x).all()

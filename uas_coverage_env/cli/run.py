@@ -122,6 +122,12 @@ def run(
             f"--sorties flies sorties one after the other, and in {mission.name!r} each UAS swaps "
             f"packs on its own (sorties.together = false): leave --sorties out"
         )
+    if sorties is not None and mission.asks_again:
+        raise InputError(
+            f"--sorties begins each sortie anew, and waypoints of {mission.name!r} are asked for "
+            f"again some time after they were covered (again_after_s): leave --sorties out; "
+            f"[sorties] with together = false gives UAS packs"
+        )
     player = load_planner(planner, options_of(option or ()))
     # KIND:ARGUMENT may hold a path
     player_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")

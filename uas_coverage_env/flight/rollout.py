@@ -217,7 +217,10 @@ def _fly(
         if not plans_on:
             # a UAS flies again, with a fresh pack
             changed |= bool(((before.status == LANDED) & (swarm.status == FLYING)).any())
-        again = relaunch.due(swarm) if relaunch and log.steps < limit else None
+        more = world.known.asks_again and len(swarm.uncovered) > len(before.uncovered)
+        again = None
+        if relaunch and log.steps < limit:
+            again = relaunch.due(swarm, asked_again=more)
         if again is not None and again.any():
             world.take_off(again)
             swarm, changed = world.swarm_state(), True

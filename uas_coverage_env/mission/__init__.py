@@ -10,6 +10,7 @@ from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.recall import Recall
 from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.mission.relaunch import Relaunch
+from uas_coverage_env.mission.repeats import Repeats
 from uas_coverage_env.mission.views import WorldView, first_sight
 from uas_coverage_env.mission.ways import Way, Ways
 
@@ -23,6 +24,7 @@ __all__ = [
     "Range",
     "Recall",
     "Relaunch",
+    "Repeats",
     "ReturnEstimate",
     "Way",
     "Ways",

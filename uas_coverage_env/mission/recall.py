@@ -34,3 +34,11 @@ class Recall:
         for u in np.flatnonzero(flies & ~self._called).tolist():
             self._called[u] = swarm.returning[u] or has_to_return(view.arena, view.state, u)
         return self._called
+
+    def keep(self, called: BoolArray) -> None:
+        """Forget others: what called them home no longer holds, as where there is more to cover.
+
+        Args:
+            called: (U,) of these it may hold.
+        """
+        self._called &= called

@@ -25,7 +25,8 @@ class Relaunch:
     They do where no UAS is at work any more: all others have landed, are lost, take no commands
     (`Handover`), or are on their way home in return mode. Then each goes that reaches an open
     waypoint and comes home again with the charge that it has, and stands clear of everything.
-    Where nothing has been covered since, and no UAS was lost, they do not go a second time.
+    Where nothing has been covered since, and no UAS was lost, they do not go a second time. When a
+    waypoint is asked for again they go at once, whoever is at work: it is no UAS's work yet.
 
     Args:
         brief: The mission as it is now.
@@ -37,16 +38,18 @@ class Relaunch:
         self._ways, self._range = Ways(brief), Range(brief)
         self._tried: tuple[bytes, bytes] | None = None
 
-    def due(self, swarm: SwarmState) -> BoolArray:
+    def due(self, swarm: SwarmState, *, asked_again: bool = False) -> BoolArray:
         """(U,) which UAS take off now; to be called once per sample.
 
         Args:
             swarm: What is seen.
+            asked_again: Whether a waypoint is asked for again at this sample.
         """
         again = np.zeros(len(swarm.status), np.bool_)
         at_work = self._handover.at_work(swarm) & ~swarm.returning
         waits = (swarm.status == LANDED) & swarm.responds
-        if at_work.any() or not waits.any() or not swarm.uncovered.any():
+        works = at_work.any() and not asked_again
+        if works or not waits.any() or not swarm.uncovered.any():
             return again
         situation = swarm.uncovered.tobytes(), (swarm.status == LOST).tobytes()
         if situation == self._tried:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.mission.leg_model import DT_S, Followed
-from uas_coverage_env.operations.tracks import Track, cut_path, distances_m
+from uas_coverage_env.operations.corners import cut_path, distances_m
+from uas_coverage_env.operations.tracks import Track
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]

@@ -7,8 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import MODES, Flight, SceneHistory, sorties_summary
+from uas_coverage_env.flight import MODES, Flight, SceneHistory, covered_at, sorties_summary
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.mission.separation import Waits, ready_s
@@ -89,8 +92,9 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
     frame = LocalFrame(place_of_flight(flights[0], options.place))
     for flight in flights:
         check_flight(flight)
-    flights = [_as_events_left_it(flight) for flight in flights]
-    laid = [_tracks(flight, settled) for flight in flights]
+    left = [_as_events_left_it(flight) for flight in flights]
+    flights = [flight for flight, _ in left]
+    laid = [_tracks(flight, covered, settled) for flight, covered in left]
     if not any(laid):
         raise InputError("no UAS flies in this flight; there is nothing to export")
     parts: list[Part] = []
@@ -110,22 +114,29 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
     return Export(files, data, grounded, tuple(notes))
 
 
-def _as_events_left_it(flight: Flight) -> Flight:
-    """The flight among all that was there at its end: files cannot say when something appears."""
-    if not flight.events:
-        return flight
+def _as_events_left_it(flight: Flight) -> tuple[Flight, NDArray[np.int64]]:
+    """The flight among all that was there at its end, and when each waypoint was covered.
+
+    Files cannot say when something appears.
+    """
+    if not flight.events and not flight.scenario.asks_again:
+        return flight, covered_at(flight)
     history = SceneHistory.of(flight)
-    scenario, _ = history.scene_at(flight.steps)
+    scenario, numbers = history.scene_at(flight.steps)
+    if scenario.asks_again:  # every visit is there as a waypoint of its own
+        once = tuple(w.model_copy(update={"again_after_s": ()}) for w in scenario.waypoints)
+        scenario = scenario.model_copy(update={"waypoints": once, "events": ()})
     moving_m = history.moving_position_m
-    return replace(flight, scenario=scenario, events=(), moving_position_m=moving_m)
+    all_there = replace(flight, scenario=scenario, events=(), moving_position_m=moving_m)
+    return all_there, history.covered_at[numbers]
 
 
-def _tracks(flight: Flight, settled: Settled) -> list[Track]:
+def _tracks(flight: Flight, covered: NDArray[np.int64], settled: Settled) -> list[Track]:
     """All sorties of a flight, those of a UAS one after the other."""
     return [
         _as_asked(flight, track, settled.tolerances)
         for i in range(len(flight.names))
-        for track in make_tracks(flight, i, settled.tolerances)
+        for track in make_tracks(flight, i, settled.tolerances, covered)
     ]
 
 
@@ -223,12 +234,12 @@ def check_flight(flight: Flight) -> None:
             state = MODES[mode]
             state = "lost" if state == "lost" else "still in the air"
             raise InputError(f"{name} is {state} at the end of the flight; export one that is home")
-    for i, uas in enumerate(flight.scenario.uas):
-        away_m = math.dist(flight.x[-1, i, :2], uas.start_m[:2])
+    homes_m = SceneHistory.of(flight).home_m[-1]  # where an event has closed one, it is another
+    for i, name in enumerate(flight.names):
+        away_m = math.dist(flight.x[-1, i, :2], homes_m[i, :2])
         if away_m > flight.scenario.landing_distance_m + _ROUNDING:
             raise InputError(
-                f"{uas.name} lands {away_m:.0f} m from its start (an event home_closed); files "
-                f"land where they take off: export a flight that ends at home"
+                f"{name} lands {away_m:.0f} m from its home; export a flight that ends there"
             )
     contacts = [violation for violation in flight.violations if violation.kind != LIMIT]
     if contacts:
@@ -242,10 +253,11 @@ def _unkept(flight: Flight, one: Exported) -> list[str]:
     file_s = one.followed.duration_s
     if abs(file_s - planned_s) <= PROMISE * planned_s:
         return []
-    return [
-        f"{one.track.name}: the file takes {file_s:.0f} s, the flight {planned_s:.0f}; "
-        f"plan for the autopilot with tour, trajectory or lawnmower"
-    ]
+    waited_s = one.waits.start_s + one.waits.hold_s
+    why = "plan for the autopilot with tour, trajectory or lawnmower"
+    if abs(file_s - waited_s - planned_s) <= PROMISE * planned_s:
+        why = f"{waited_s:.0f} s of it are waits for others"
+    return [f"{one.track.name}: the file takes {file_s:.0f} s, the flight {planned_s:.0f}; {why}"]
 
 
 def _notes(part: Part) -> list[str]:
@@ -259,6 +271,12 @@ def _notes(part: Part) -> list[str]:
     if scenario.execution is not None:
         notes += [line for one in exports for line in _unkept(flight, one)]
     for one in exports:
+        if one.track.lands_elsewhere:
+            away_m = math.dist(one.track.home_m, one.track.landing_m)
+            notes.append(
+                f"{one.track.name} lands {away_m:.0f} m from where it takes off, since its home "
+                f"was closed; there is its rally point, which only --format qgc holds"
+            )
         notes += [f"{one.track.name} {line}" for line in waiting(one)]
         lost = one.point_of_no_return
         if lost is not None:

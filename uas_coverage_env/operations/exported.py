@@ -219,7 +219,7 @@ def return_height_m(scenario: Scenario, track: Track) -> float | None:
     places = track.flown_m[-track.flown_m[:, 2] >= LIFT_M][::_EVERY]
     for height_m in sorted({_LEAST_RETURN_M, *roofs_m}):
         if _LEAST_RETURN_M <= height_m <= top_m and all(
-            _returns(around, place, track.home_m, height_m) for place in places
+            _returns(around, place, track.landing_m, height_m) for place in places
         ):
             return height_m
     return None
@@ -228,12 +228,12 @@ def return_height_m(scenario: Scenario, track: Track) -> float | None:
 def _returns(
     around: Surroundings,
     place: NDArray[np.float64],
-    home_m: NDArray[np.float64],
+    landing_m: NDArray[np.float64],
     height_m: float,
 ) -> bool:
     up = np.array([*place[:2], min(float(place[2]), -height_m)])
-    above = np.array([*home_m[:2], up[2]])
-    ways = ((place, up), (up, above), (above, home_m - (0.0, 0.0, LIFT_M)))
+    above = np.array([*landing_m[:2], up[2]])
+    ways = ((place, up), (up, above), (above, landing_m - (0.0, 0.0, LIFT_M)))
     return all(around.room(a, b, 1.0).contact_m > 0.0 for a, b in ways)
 
 

@@ -12,9 +12,9 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.rollout import recorded_versions
+from uas_coverage_env.operations.corners import distances_m
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged
-from uas_coverage_env.operations.tracks import distances_m
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.flown import FlownWorld
 from uas_coverage_env.vehicle import (

@@ -105,10 +105,10 @@ def _extended_data(placemark: Element) -> dict[str, Any]:
 
 def _positions(coordinates: Element) -> list[tuple[float, ...]]:
     """(longitude, latitude, ...) of each place; empty where one is broken."""
+    text = coordinates.text or ""
     try:
-        return [
-            tuple(float(number) for number in place.split(","))
-            for place in (coordinates.text or "").split()
-        ]
+        if "_" in text:  # which Python takes for a number's
+            raise ValueError
+        return [tuple(float(number) for number in place.split(",")) for place in text.split()]
     except ValueError:
         return [()]

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission.lateness import kept_m
 from uas_coverage_env.mission.separation import Waits
-from uas_coverage_env.operations.tracks import Tolerances, Track, distances_m, relaid
+from uas_coverage_env.operations.corners import distances_m
+from uas_coverage_env.operations.tracks import Tolerances, Track, relaid
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from uas_coverage_env.operations.frame import LocalFrame
 FURTHEST_M = 20_000.0
 """From the middle of what was drawn; no multicopter flies there and back."""
 
-_SMALLEST_M2 = 1.0
+_SMALLEST_M2, _NARROWEST_M = 1.0, 0.2
 _PLACE = re.compile(r"\[(-?[\d.e+-]+) (-?[\d.e+-]+)\]")
 
 
@@ -44,7 +44,8 @@ def local_polygon(frame: LocalFrame, drawn: DrawnPolygon) -> Polygon:
             at = f" at {latitude:.6f}, {longitude:.6f}"
         what = reason.partition("[")[0].lower()
         raise InputError(f"{drawn.source} is no simple polygon ({what}{at}); redraw it there")
-    if polygon.area < _SMALLEST_M2:
+    # corners on a line of the map are on none of the ground, by millimetres
+    if polygon.area < _SMALLEST_M2 or polygon.buffer(-_NARROWEST_M / 2.0).is_empty:
         raise InputError(f"{drawn.source} has no area; draw at least three corners in no line")
     return polygon
 

@@ -10,15 +10,22 @@ from uas_coverage_env.draw.labels import short_name
 from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.convex import hull_of
+from uas_coverage_env.operations.formats.qgc import ZONES
+from uas_coverage_env.scenario import Obstacle
 
 _COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
+_OBSTACLE, _NO_FLY = "#bbb8b0", "#d9a29c"
+_FILLS = {_OBSTACLE: "obstacle", _NO_FLY: "no-fly zone"}
 _STYLE = """
 body{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#26282c}
-table{border-collapse:collapse;margin:1rem 0;display:block;overflow-x:auto}
+table{border-collapse:collapse;margin:1rem 0}
 th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
 th:first-child,td:first-child{text-align:left}
 svg{width:100%;max-width:48rem;max-height:80vh;background:#eaebe0}
 svg text{font-weight:600;paint-order:stroke;stroke:#fff}
+.wide{overflow-x:auto}
+.key span{display:inline-block;margin-right:1rem}
+.key i{display:inline-block;width:.8em;height:.8em;margin-right:.3em}
 .bad{color:#c81e2d;font-weight:600}
 summary{cursor:pointer}
 """
@@ -41,6 +48,7 @@ def report_page(parts: Sequence[Part], data: dict[str, Any]) -> str:
         f"<p>{data['waypoints_passed']} of {data['waypoints']} waypoints are passed; files are "
         f"within {data['path_tolerance_m']:g} m of the flight. {_NOTE}</p>",
         _map(parts),
+        _key(parts),
         _order(data),
         _fleet(data["uas"]),
         _waits(data["uas"]),
@@ -55,7 +63,7 @@ def report_page(parts: Sequence[Part], data: dict[str, Any]) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     cells = "".join(f"<th>{name}</th>" for name in head)
     body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
-    return f"<table><tr>{cells}</tr>{body}</table>"
+    return f'<div class="wide"><table><tr>{cells}</tr>{body}</table></div>'
 
 
 def _order(data: dict[str, Any]) -> str:
@@ -194,7 +202,10 @@ def _map(parts: Sequence[Part]) -> str:
     shapes = [
         _outline(scenario.fence.vertices_m, f'fill="#fff" stroke="#888" stroke-width="{pen}"')
     ]
-    shapes += [_outline(hull.vertices_m, 'fill="#bbb8b0"') for hull in scenario.hulls]
+    shapes += [
+        _outline(hull.vertices_m, f'fill="{_fill_of(obstacle)}"', obstacle.name)
+        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+    ]
     shapes += [
         f'<circle cx="{w.position_m[1]:.1f}" cy="{-w.position_m[0]:.1f}" r="{w.radius_m:g}" '
         f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
@@ -213,6 +224,13 @@ def _map(parts: Sequence[Part]) -> str:
         x, y, _ = one.track.home_m
         shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
         homes[names[n]] = (y, -x)
+        if one.track.lands_elsewhere:
+            x, y, _ = one.track.landing_m
+            shapes.append(
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="none" stroke="{colour}" '
+                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: landing</title>'
+                "</circle>"
+            )
         lost = one.point_of_no_return
         if lost is not None:
             x, y, _ = one.track.legs[lost].end_m
@@ -244,7 +262,28 @@ def _scale(west: float, south: float, span_m: float, pen: float) -> str:
     return f'<path d="{bar}" stroke="#26282c" stroke-width="{2 * pen:.1f}"/>{words}'
 
 
-def _outline(vertices_m: Any, style: str) -> str:
+def _key(parts: Sequence[Part]) -> str:
+    """What is what on the map."""
+    flight = parts[0].flight
+    entries = [
+        (_COLOURS[n % len(_COLOURS)], "50%", name)
+        for n, name in enumerate(flight.names)
+        if any(part.of(name) for part in parts)
+    ]
+    fills = {_fill_of(obstacle) for obstacle in flight.scenario.obstacles}
+    entries += [(fill, "0", name) for fill, name in _FILLS.items() if fill in fills]
+    marks = "".join(
+        f'<span><i style="background:{colour};border-radius:{corner}"></i>{escape(name)}</span>'
+        for colour, corner, name in entries
+    )
+    return f'<p class="key">{marks}<span>green circles: waypoints</span></p>'
+
+
+def _fill_of(obstacle: Obstacle) -> str:
+    return _NO_FLY if obstacle.kind in ZONES else _OBSTACLE
+
+
+def _outline(vertices_m: Any, style: str, name: str = "") -> str:
     ring = hull_of(shapely.MultiPoint(vertices_m[:, :2])).exterior.coords[:-1]
     points = " ".join(f"{east:.1f},{-north:.1f}" for north, east in ring)
-    return f'<polygon points="{points}" {style}/>'
+    return f'<polygon points="{points}" {style}><title>{escape(name)}</title></polygon>'

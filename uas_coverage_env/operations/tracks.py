@@ -11,6 +11,7 @@ Legs are made as long as that allows, one after the other. At a corner that must
 because the cut would be too close to something or miss a waypoint, the autopilot stops.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
-from uas_coverage_env.geometry import nearest_on_segment
+from uas_coverage_env.operations.corners import cut_corner, cut_path, distances_m
 from uas_coverage_env.operations.room import Room, Surroundings
 from uas_coverage_env.operations.sorties import Sortie, sorties_of
 from uas_coverage_env.world.coverage import covering_samples
@@ -62,13 +63,14 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The legs of one UAS, from above its start to above it again.
+    """The legs of one UAS, from above its start to above where it lands: there again, mostly.
 
     Attributes:
         uas: Index of the UAS.
         name: Of its file: that of the UAS, and which of its sorties it is, if there are several.
         sortie: Which part of the flight it is.
         home_m: (3,) its start on the ground [m].
+        landing_m: (3,) where it lands, on the ground; elsewhere where its home was closed [m].
         take_off_m: (3,) where the first leg begins, above the start [m].
         legs: One or more.
         off_m: Largest distance of a sample from its leg [m].
@@ -83,6 +85,7 @@ class Track:
     name: str
     sortie: Sortie
     home_m: FloatArray
+    landing_m: FloatArray
     take_off_m: FloatArray
     legs: tuple[Leg, ...]
     off_m: float
@@ -91,6 +94,11 @@ class Track:
     flown_m: FloatArray
     layer: str = ""
     number: int = 1
+
+    @property
+    def lands_elsewhere(self) -> bool:
+        """Whether it does not land where it takes off."""
+        return bool((self.landing_m != self.home_m).any())
 
     @property
     def corners_m(self) -> FloatArray:
@@ -119,28 +127,38 @@ class Tolerances:
     corner_m: float = 2.0
 
 
-def make_tracks(flight: Flight, uas: int, tolerances: Tolerances) -> list[Track]:
+def make_tracks(
+    flight: Flight, uas: int, tolerances: Tolerances, covered: NDArray[np.int64] | None = None
+) -> list[Track]:
     """The legs of each sortie of a UAS; of those that leave the ground.
 
     Args:
-        flight: In which the UAS has landed.
+        flight: In which the UAS has landed; its scenario is that at the end, homes where they are
+            then.
         uas: Index of the UAS.
         tolerances: How far legs may be from the flight.
+        covered: (W,) the sample in which each waypoint was covered; None: where all were to be
+            covered from the start on.
 
     Raises:
         InputError: No legs could be found that are free of contact.
     """
-    found = (make_track(flight, uas, one, tolerances) for one in sorties_of(flight, uas))
+    if covered is None:
+        covered = covered_at(flight)
+    found = (make_track(flight, uas, one, covered, tolerances) for one in sorties_of(flight, uas))
     return [track for track in found if track is not None]
 
 
-def make_track(flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances) -> Track | None:
+def make_track(
+    flight: Flight, uas: int, sortie: Sortie, covered: NDArray[np.int64], tolerances: Tolerances
+) -> Track | None:
     """The legs of a sortie; None where the UAS stays on the ground.
 
     Args:
-        flight: In which the UAS has landed.
+        flight: As for `make_tracks`; likewise the other arguments.
         uas: Index of the UAS.
         sortie: From which take-off to which landing.
+        covered: (W,) samples.
         tolerances: How far legs may be from the flight.
 
     Raises:
@@ -159,10 +177,12 @@ def make_track(flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances)
             f"{scenario.uas[uas].name} is on the ground {at_s:g} s after the start and flies on; "
             f"export the flight that was planned instead"
         )
-    home_m = np.array(scenario.uas[uas].start_m) * (1.0, 1.0, 0.0)
-    builder = _Builder(flight, uas, sortie, tolerances)
+    home_m, landing_m = (
+        _place_m(flight, uas, sample) * (1.0, 1.0, 0.0) for sample in (sortie.first, sortie.landed)
+    )
+    builder = _Builder(flight, uas, sortie, _covered_by(flight, uas, sortie, covered), tolerances)
     take_off_m = np.array([*home_m[:2], path[first, 2]])
-    above_m = np.array([*home_m[:2], path[last, 2]])
+    above_m = np.array([*landing_m[:2], path[last, 2]])
     points = [(take_off_m, first), (path[first], first), *builder.legs(first, last)]
     if flight.scenario.execution is not None:
         points = builder.sharpened(points)
@@ -185,6 +205,7 @@ def make_track(flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances)
         name=scenario.uas[uas].name,
         sortie=sortie,
         home_m=home_m,
+        landing_m=landing_m,
         take_off_m=take_off_m,
         legs=legs,
         off_m=off_m,
@@ -192,13 +213,35 @@ def make_track(flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances)
         passed_m=passed_m,
         flown_m=path,
     )
-    ups = builder.around.path_room(np.array([take_off_m, home_m - (0.0, 0.0, LIFT_M)]))
-    if min(track.room.contact_m, ups.contact_m) <= 0.0:
+    ups_m = [
+        builder.around.path_room(np.array([above, ground_m - (0.0, 0.0, LIFT_M)])).contact_m
+        for above, ground_m in ((take_off_m, home_m), (above_m, landing_m))
+    ]
+    if min(track.room.contact_m, *ups_m) <= 0.0:
         raise InputError(
             f"{track.name}: no legs are free of contact within --tolerance {tolerances.path_m:g}; "
             f"make it smaller"
         )
     return track
+
+
+def _place_m(flight: Flight, uas: int, sample: int) -> FloatArray:
+    """(3,) the home at which a UAS stands at a sample: its first, or that at the end."""
+    homes = np.array([flight.x[0, uas, :3], flight.scenario.uas[uas].start_m])
+    away_m = np.linalg.norm(homes - flight.x[sample, uas, :3], axis=1)
+    return homes[1 if away_m[1] <= away_m[0] else 0]
+
+
+def _covered_by(
+    flight: Flight, uas: int, sortie: Sortie, covered: NDArray[np.int64]
+) -> dict[int, int]:
+    """The waypoints that a UAS covers in a sortie, and in which of the samples of that."""
+    scenario, (first, landed) = flight.scenario, sortie[:2]
+    return {
+        w: sample - first
+        for w, sample in enumerate(covered.tolist())
+        if first <= sample < landed and covering_samples(scenario, w, flight.x[sample])[uas]
+    }
 
 
 def relaid(
@@ -219,7 +262,8 @@ def relaid(
         tolerances: How far legs may be from the flight.
         layer: What is different, in words.
     """
-    builder = _Builder(flight, track.uas, track.sortie, tolerances)
+    covered = dict.fromkeys(track.waypoints, 0)
+    builder = _Builder(flight, track.uas, track.sortie, covered, tolerances)
     legs = tuple(
         replace(track.legs[n], end_m=end_m, room=builder.around.room(start_m, end_m), stop=False)
         for (start_m, end_m), n in zip(pairwise(corners), leg_of, strict=True)
@@ -238,64 +282,28 @@ def relaid(
     return new if clear and passes.all() else None
 
 
-def distances_m(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """(N,) distances of points (N, 3) from a straight line between two places [m]."""
-    return nearest_on_segment(points, a, b).distance_m
-
-
-def cut_path(corners: FloatArray, stops: list[bool], corner_m: float) -> FloatArray:
-    """(N, 3) the path when every corner without a stop is cut as far as it may be.
-
-    Args:
-        corners: (C, 3) [m].
-        stops: (C - 1,) whether the autopilot stops at the end of each leg.
-        corner_m: How far from a corner it may pass [m].
-    """
-    path = [corners[0]]
-    for before, corner, after, stop in zip(corners, corners[1:], corners[2:], stops, strict=False):
-        path += [corner] if stop else _cut(before, corner, after, corner_m)
-    return np.array([*path, corners[-1]])
-
-
-def _cut(
-    before: FloatArray, corner: FloatArray, after: FloatArray, corner_m: float
-) -> list[FloatArray]:
-    """Where a straight cut that comes no closer to a corner than `corner_m` leaves both legs.
-
-    Half a leg is left in any case: an autopilot turns while it brakes and while it accelerates.
-    """
-    ways = [before - corner, after - corner]
-    lengths = [max(float(np.linalg.norm(way)), 1e-9) for way in ways]
-    units = [way / length for way, length in zip(ways, lengths, strict=True)]
-    depth = 0.5 * float(np.linalg.norm(units[0] + units[1]))  # of a cut of 1 m on both legs
-    return [
-        corner + unit * min(corner_m / max(depth, 1e-9), 0.5 * length)
-        for unit, length in zip(units, lengths, strict=True)
-    ]
-
-
 class _Builder:
     """Finds the legs of one sortie; samples are counted from its first one."""
 
-    def __init__(self, flight: Flight, uas: int, sortie: Sortie, tolerances: Tolerances) -> None:
+    def __init__(
+        self,
+        flight: Flight,
+        uas: int,
+        sortie: Sortie,
+        covered: Mapping[int, int],
+        tolerances: Tolerances,
+    ) -> None:
         path = flight.x[sortie.first : sortie.landed, uas, 0:3]
         self.path, self.tolerances, self.dt_s = path, tolerances, flight.scenario.dt_s
         self.around = Surroundings(flight.scenario, uas)
         self._rests_between = flight.scenario.execution is not None
         self.steps = [self.around.room(a, b) for a, b in pairwise(path)]
-        first_at = covered_at(flight)
-        self.waypoints: list[int] = []
-        self._covered: dict[int, list[int]] = {}
-        centres = np.array([w.position_m for w in flight.scenario.waypoints])
-        self._centres = centres
+        self.waypoints = list(covered)
+        self._centres = np.array([w.position_m for w in flight.scenario.waypoints])
         self._radii = np.array([w.radius_m for w in flight.scenario.waypoints])
-        for w, sample in enumerate(first_at):
-            if (
-                sortie.first <= sample < sortie.landed
-                and (covering_samples(flight.scenario, w, flight.x[sample])[uas])
-            ):
-                self.waypoints.append(w)
-                self._covered.setdefault(int(sample) - sortie.first, []).append(w)
+        self._covered: dict[int, list[int]] = {}
+        for w, sample in covered.items():
+            self._covered.setdefault(sample, []).append(w)
 
     def legs(self, first: int, last: int) -> list[tuple[FloatArray, int]]:
         """Ends of legs from one sample to another, each with its sample."""
@@ -406,7 +414,7 @@ class _Builder:
             least = room.least(legs[n + 1].room)
             for share in _CUTS:
                 before, corner, after = corners[n : n + 3]
-                a, b = _cut(before, corner, after, share * self.tolerances.corner_m)
+                a, b = cut_corner(before, corner, after, share * self.tolerances.corner_m)
                 room = room.least(self.around.room(a, b))
             allowed_m = min(-min(SPENT_M, self.tolerances.path_m), least.spare_m)
             stop = room.contact_m <= 0.0 or room.spare_m < allowed_m

@@ -97,6 +97,9 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         turned_rad=turned_rad,
         packs_left=packs_left(arena, state),
         ground_s=scenario.dt_s * swap_steps_left(arena, state).astype(float),
+        again_s=np.where(
+            state.due_step > step, scenario.dt_s * (state.due_step - step).astype(float), np.inf
+        ),
     )
 
 

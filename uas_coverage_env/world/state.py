@@ -169,6 +169,8 @@ class SwarmState:
             none swaps (`[sorties]` with `together = false`). 0 of one that waits because its last
             sortie has covered nothing.
         ground_s: (U,) [s] until a UAS that swaps is ready to take off, 0 for the others; likewise.
+        again_s: (W,) [s] until each waypoint is asked for again, inf where it is not, or was; empty
+            where none is (`again_after_s`).
     """
 
     time_s: float
@@ -187,6 +189,7 @@ class SwarmState:
     turned_rad: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     packs_left: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     ground_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    again_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def heading_rad(self) -> NDArray[np.float64]:

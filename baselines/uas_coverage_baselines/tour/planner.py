@@ -20,6 +20,7 @@ from uas_coverage_env.mission import (
     Handover,
     MissionBrief,
     Recall,
+    Repeats,
     WorldView,
     first_sight,
     without,
@@ -72,6 +73,7 @@ class Tour:
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
         self._has_acted = False
+        self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -81,6 +83,11 @@ class Tour:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Search the order from the starts; that of a mission under way, when it goes on."""
+        repeats = self._repeats if self._has_acted and seed == self._seed else None
+        if repeats is not None and repeats.goes_on(brief):
+            return
+        self._repeats = Repeats.of(brief) if brief.execution is None else None
+        brief = brief if self._repeats is None else self._repeats.brief
         self._flown: Routes | None = None
         if may_go_on := self._has_acted and self._by_legs is None:
             self._flown = self._schedule.order
@@ -113,6 +120,11 @@ class Tour:
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Plan for each flying UAS, in order, and fly the first command of each plan."""
+        if self._repeats is not None:
+            if self._has_acted and swarm.step == 0:  # the same mission once more
+                self._has_acted = False
+                self.reset(self._brief, self._seed)
+            swarm = self._repeats.seen(swarm, self._is_idle(swarm))
         self._has_acted = True
         if self._by_legs is not None:
             self.last_decision = None
@@ -130,6 +142,11 @@ class Tour:
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
         return commands
+
+    def _is_idle(self, swarm: SwarmState) -> bool:
+        """Whether a UAS flies home, with no visit left."""
+        routes = self._schedule.order.routes
+        return any(not len(routes[i]) for i in np.flatnonzero(swarm.status == FLYING))
 
     def _find_order(self, view: View, seed: int) -> None:
         self._schedule.begin(view, seed)
@@ -155,6 +172,8 @@ class Tour:
         self._is_flown[i] = seconds < SAFE_BELOW_S
         if not self._is_flown[i]:
             target = int(task.route[0]) if len(task.route) else None
+            if target is not None and self._repeats is not None:
+                target = self._repeats.waypoint(target)
             return GoTo(target, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
         return Velocity(north_mps, east_mps, altitude_m, mode)
@@ -166,9 +185,10 @@ class Tour:
             route = route[:0]
         radius_m, blocked = self._radius_m[route], view.blocked[route]
         within_m = radius_m - np.minimum(_COVERED_WITHIN_M, radius_m / 50.0)
+        closed = blocked if view.asked_in_s is None else blocked | (view.asked_in_s[route] > 0.0)
         return PursuitTask(
             np.ascontiguousarray(route),
-            np.where(blocked, -1.0, within_m),
+            np.where(closed, -1.0, within_m),
             np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),
             schedule.rest_s(i, SLOWER, _PER_WAYPOINT_S) if len(route) else np.zeros(1),
             schedule.legs.acceleration_mps2[i],
@@ -217,6 +237,8 @@ class Tour:
     def _view(self, swarm: SwarmState) -> View:
         self._world.update(swarm)
         flies = swarm.status == FLYING
+        if self._repeats is not None:
+            self._recall.keep(swarm.departed & (not self._repeats.has_grown))
         self._returns = self._recall.update(swarm, self._world)
         works = self._handover.workers(swarm)
         return View(
@@ -227,4 +249,5 @@ class Tour:
             blocked=self._world.blocked(_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M),
             time_s=swarm.time_s,
             swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
+            asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
         )

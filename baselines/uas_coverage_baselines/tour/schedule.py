@@ -51,6 +51,7 @@ class View:
         blocked: (W,) inside the keep-out of something that moves, now.
         time_s: since the start.
         swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
+        asked_in_s: (W,) from now until a waypoint is asked for; None: all are.
     """
 
     x: FloatArray
@@ -60,6 +61,7 @@ class View:
     blocked: NDArray[np.bool_]
     time_s: float
     swarm: SwarmState | None = None
+    asked_in_s: FloatArray | None = None
 
 
 class Schedule:
@@ -113,7 +115,7 @@ class Schedule:
         """Drop what is covered, and search again where something has happened."""
         self._drop_covered(view)
         self._time_legs(view)
-        if self._has_changed(view):
+        if self._has_changed(view) or self._is_asked_for_more(view):
             kept, better = self._searched_again(view)
             worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
             self.take(better if worthwhile else kept, view)
@@ -162,11 +164,19 @@ class Schedule:
         too_long = [len(route) and spare_s[u] < 0.0 for u, route in enumerate(self.order.routes)]
         return bool(len(self.order.left_out) or any(too_long))
 
+    def _is_asked_for_more(self, view: View) -> bool:
+        """Whether a waypoint is to be visited again that the order does not know of."""
+        if view.asked_in_s is None:
+            return False
+        known = np.zeros(len(view.uncovered), np.bool_)
+        known[np.concatenate([*self.order.routes, self.order.left_out, self.order.later])] = True
+        return bool((view.uncovered & self._can_cover[view.may_work].any(axis=0) & ~known).any())
+
     def _time_legs(self, view: View) -> None:
         """Measure how long flights take beside their legs, waiting not counted."""
         left_s = self._legs_left(view)
         for u, route in enumerate(self.order.routes):
-            if view.may_work[u] and len(route) and not view.blocked[route[0]]:
+            if view.may_work[u] and len(route) and not self._waits(view, route[0]):
                 self._flown_s[u] += view.time_s - self._seen.time_s
                 self._legs_flown_s[u] += self._legs_left_s[u] - left_s[u]
         self._seen, self._legs_left_s = view, left_s
@@ -186,7 +196,19 @@ class Schedule:
 
     def _legs_left(self, view: View) -> FloatArray:
         """(U,) seconds of legs along each route and home, turns not counted."""
-        return np.array([self._seconds_left(u, x[:3]) for u, x in enumerate(view.x)])
+        left_s = np.array([self._seconds_left(u, x[:3]) for u, x in enumerate(view.x)])
+        if view.asked_in_s is not None:  # none is over before its last waypoint is asked for
+            for u, route in enumerate(self.order.routes):
+                rest_s = self.rest_s(u, 1.0, 0.0)[:-1]
+                left_s[u] = max(left_s[u], np.max(view.asked_in_s[route] + rest_s, initial=0.0))
+        return left_s
+
+    def _waits(self, view: View, waypoint: int) -> bool:
+        """Whether a waypoint cannot be covered yet."""
+        return bool(
+            view.blocked[waypoint]
+            or (view.asked_in_s is not None and view.asked_in_s[waypoint] > 0.0)
+        )
 
     def rest_s(self, uas: int, slower: float, per_waypoint_s: float) -> FloatArray:
         """Flight time from each waypoint of a UAS's route to its end.
@@ -223,7 +245,13 @@ class Schedule:
 
         def task(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingTask:
             return self.task(
-                replace(view, x=x, may_work=may_work, blocked=np.zeros_like(view.blocked))
+                replace(
+                    view,
+                    x=x,
+                    may_work=may_work,
+                    blocked=np.zeros_like(view.blocked),
+                    asked_in_s=None,
+                )
             )
 
         return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, task)
@@ -237,6 +265,9 @@ class Schedule:
         open_ = view.uncovered.copy()
         if view.may_work.any():  # what no UAS can cover is no reason to search again
             open_ &= self._can_cover[view.may_work].any(axis=0)
+        not_before_s = np.where(view.blocked, opens_s, 0.0)
+        if view.asked_in_s is not None:
+            not_before_s = np.maximum(not_before_s, view.asked_in_s)
         return RoutingTask.of(
             self.legs,
             view.x,
@@ -245,5 +276,5 @@ class Schedule:
             weight=self._weight,
             budget_s=self._budget_s(view),
             landing_s=TOUR.landing_s,
-            not_before_s=np.where(view.blocked, opens_s, 0.0),
+            not_before_s=not_before_s,
         )

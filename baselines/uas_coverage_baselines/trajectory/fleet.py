@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.routing import FreshPacks, Packs, RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
+from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
 from uas_coverage_baselines.trajectory.retiming import (
     Draft,
@@ -66,10 +67,18 @@ class Fleet:
         brief: The mission.
         margin_m: Planned beyond the distances that count as a breach.
         speed_share: Of the largest horizontal speed, that is flown.
+        moving_margin_m: Planned beyond the safe distances from what moves.
     """
 
-    def __init__(self, brief: MissionBrief, margin_m: float, speed_share: float = 1.0) -> None:
+    def __init__(
+        self,
+        brief: MissionBrief,
+        margin_m: float,
+        speed_share: float = 1.0,
+        moving_margin_m: float = 0.0,
+    ) -> None:
         self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
+        self._moving_margin_m = moving_margin_m
         self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
@@ -101,6 +110,15 @@ class Fleet:
         """The separation of two UAS that the rules ask for."""
         uas = self.brief.uas
         return uas[i].radius_m + uas[j].radius_m + self.brief.uas_safe_distance_m
+
+    def bodies(self, movers: Movers, uas: int) -> list[Body]:
+        """What moves, as a UAS keeps clear of it."""
+        return movers.bodies(self.brief.uas[uas].radius_m, self._moving_margin_m)
+
+    def opens(self, movers: Movers) -> IntArray:
+        """(W,) steps from now at which what moves lets waypoints be covered."""
+        radius_m = max(uas.radius_m for uas in self.brief.uas)
+        return movers.open_from(self.waypoints_m, self.radius_m, radius_m, self._moving_margin_m)
 
     def battery_s(self, x: FloatArray) -> FloatArray:
         """(U,) seconds that each battery lasts at full speed, and with the worst vehicle stated."""

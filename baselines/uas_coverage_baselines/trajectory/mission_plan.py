@@ -24,11 +24,12 @@ from uas_coverage_baselines.trajectory.course import (
     trouble_alone,
 )
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
+from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work, done
-from uas_coverage_env.world import SwarmState
+from uas_coverage_env.world import FLYING, SwarmState
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -36,6 +37,8 @@ IntArray = NDArray[np.int64]
 SMALL_FLEET = 4
 """So many UAS, or fewer; of larger fleets, less is searched for each."""
 
+_ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
+_SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _UNFLOWN_S = 1000.0
 _LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
 HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
@@ -64,6 +67,27 @@ class Effort:
     programs: int
     total_weight: float
     threads: int = 1
+
+    @classmethod
+    def of(
+        cls, options: TrajectoryOptions, moment: Moment, total_weight: float, *, first: bool
+    ) -> Effort:
+        """The effort of a plan.
+
+        Args:
+            options: Of the planner.
+            moment: From where.
+            total_weight: See the attribute.
+            first: Whether it is made before take-off; later, the order that is flown is there, too.
+        """
+        n_uas = len(moment.x)
+        orders, planned = 1, 2
+        if first:
+            orders = options.orders if n_uas <= _ONE_SEARCH else 1
+            planned = options.planned_orders
+        larger = min(max(n_uas * len(moment.uncovered) / _SMALL, 1.0), _LARGER)
+        moves = round(larger * options.moves)
+        return cls(orders, planned, moves, options.programs, total_weight, options.threads)
 
 
 @dataclass(frozen=True)
@@ -132,6 +156,12 @@ class MissionPlan:
         for each in planned.values():
             known[each.route[each.open_visits(swarm.step, swarm.uncovered)]] = True
         return known
+
+
+def is_idle(swarm: SwarmState, planned: Mapping[int, Planned]) -> bool:
+    """Whether a UAS flies home, with no visit left in its plan."""
+    flying = [p for u, p in planned.items() if swarm.status[u] == FLYING]
+    return any((p.flight.visits + p.course.begin <= swarm.step).all() for p in flying)
 
 
 def plan_mission(

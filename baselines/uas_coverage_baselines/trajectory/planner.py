@@ -18,12 +18,12 @@ from uas_coverage_baselines.trajectory.mission_plan import (
     Effort,
     MissionPlan,
     Planned,
+    is_idle,
     plan_mission,
 )
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
-from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
@@ -33,6 +33,7 @@ from uas_coverage_env.mission import (
     Handover,
     MissionBrief,
     Range,
+    Repeats,
     WorldView,
     first_sight,
     without,
@@ -47,8 +48,6 @@ _AS_PLANNED = 1e-6  # of states
 _AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
 _HOME_AFTER_S = 30.0  # without a plan for so long a UAS flies home
 _PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is flown has to
-_ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
-_SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _SOON_S = BRAKING_S  # a visit to what is still blocked so soon is put off,
 _AT_LAST_S = 8.0  # given up where it cannot be put off
 
@@ -71,6 +70,7 @@ class Trajectory:
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
         self._has_acted = False
+        self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -84,6 +84,11 @@ class Trajectory:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts; one that may be under way, when it goes on."""
+        repeats = self._repeats if self._has_acted and seed == self._seed else None
+        if repeats is not None and repeats.goes_on(brief):
+            return
+        self._repeats = Repeats.of(brief) if brief.execution is None else None
+        brief = brief if self._repeats is None else self._repeats.brief
         self._under_way = self._kept(brief) if self._has_acted else None
         self._has_acted = False
         self._brief, self._seed = brief, seed
@@ -94,11 +99,11 @@ class Trajectory:
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
-        self._fleet = Fleet(brief, self.options.margin_m, self.options.speed_share)
         options, way_home = self.options, Range(brief)
+        moving_m = options.moving_margin_m + _PLAN_MARGIN_M
+        self._fleet = Fleet(brief, options.margin_m, options.speed_share, moving_m)
         self._way_home = way_home
         self._safeguard = Safeguard(self._fleet, self._world, way_home, options.moving_margin_m)
-        self._radius_m = max(uas.radius_m for uas in brief.uas)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
         self._steering: Steering | None = None
@@ -132,12 +137,17 @@ class Trajectory:
         self._world.update(swarm)
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)
-        self._make_plan(swarm, self._seen_movers(swarm))
+        self._make_plan(swarm, Movers.seen(self._brief, swarm, self._silent))
         if (said := self._brief.conditions) is not None and said.mean_mps > 0.0:
             self._steering = self._steer()  # no flight that is planned in still air is flown
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
+        if self._repeats is not None:
+            if self._has_acted and swarm.step == 0:  # the same mission once more
+                self._has_acted = False
+                self.reset(self._brief, self._seed)
+            swarm = self._repeats.seen(swarm, is_idle(swarm, self._planned))
         self._has_acted = True
         if self._by_legs is not None:
             self.last_decision = None
@@ -146,7 +156,7 @@ class Trajectory:
             self._begin(swarm)
         self._world.update(swarm)
         self._silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
-        movers = self._seen_movers(swarm)
+        movers = Movers.seen(self._brief, swarm, self._silent)
         # with a fresh battery pack
         self._back = (swarm.status == FLYING) & self._down
         self._down = swarm.status == LANDED
@@ -155,6 +165,8 @@ class Trajectory:
         if self._steering is None and self._failures.are_many:
             self._steering = self._steer()
         if self._steering is not None:
+            if self._repeats is not None:
+                swarm = self._repeats.open_now(swarm)
             self.last_decision = Decision({})
             return {**self._steering.commands(swarm, self._world), **home}
         flying = swarm.status == FLYING
@@ -181,10 +193,6 @@ class Trajectory:
     def total_weight(self) -> float:
         """Worth of a second of each UAS's flight: in a large fleet of less, or most stay home."""
         return self.options.weight_energy * min(1.0, SMALL_FLEET / len(self._brief.uas))
-
-    def _seen_movers(self, swarm: SwarmState) -> Movers:
-        """What moves, and with it UAS that take no commands."""
-        return Movers.seen(self._brief, swarm, self._silent)
 
     def _commands(
         self,
@@ -270,7 +278,7 @@ class Trajectory:
                 for k, other in self._planned.items()
                 if k != u
             }
-            bodies = self._bodies(movers, u)
+            bodies = self._fleet.bodies(movers, u)
             new = tracked(self._fleet, u, planned, swarm, others, bodies)
             if new is None:
                 del self._planned[u]
@@ -278,15 +286,11 @@ class Trajectory:
                 self._failures.add(float(swarm.responds[u] * (new.course.end - planned.course.end)))
                 self._planned[u] = new
 
-    def _bodies(self, movers: Movers, uas: int) -> list[Body]:
-        margin_m = self.options.moving_margin_m + _PLAN_MARGIN_M
-        return movers.bodies(self._brief.uas[uas].radius_m, margin_m)
-
-    def _opens(self, movers: Movers) -> NDArray[np.int64]:
-        """(W,) steps from now at which what moves lets waypoints be covered."""
-        margin_m = self.options.moving_margin_m + _PLAN_MARGIN_M
-        fleet = self._fleet
-        return movers.open_from(fleet.waypoints_m, fleet.radius_m, self._radius_m, margin_m)
+    def _earliest(self, opens: NDArray[np.int64], later: int) -> NDArray[np.int64]:
+        """(W,) steps, from a sample so much later, before which waypoints are not to be visited."""
+        if self._repeats is None:
+            return np.maximum(opens, 0)
+        return np.maximum(opens, self._repeats.steps_until_open - later).clip(0)
 
     def _why_plan_anew(self, swarm: SwarmState, movers: Movers) -> str | None:
         flying = swarm.status == FLYING
@@ -313,7 +317,7 @@ class Trajectory:
         later_s = self._brief.dt_s * (swarm.step - self._planned_at)
         if waited and movers.off_m(self._seen, later_s) > _PLAN_MARGIN_M:
             return "a UAS without a radio flies otherwise"
-        opens = self._opens(movers)
+        opens = self._fleet.opens(movers)
         if not np.array_equal((opens > 0) & swarm.uncovered, self._blocked & swarm.uncovered):
             return "a waypoint opened or closed"
         if (opens >= NEVER).any():
@@ -341,30 +345,23 @@ class Trajectory:
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
         first, self._step = self.mission_plan is None and self._order is None, swarm.step
         flying = swarm.status == FLYING
-        opens = self._opens(movers)
-        earliest = np.where(opens > 0, opens, 0)
+        opens = self._fleet.opens(movers)
+        earliest = self._earliest(opens, 0)
         # a flight that had to wait for something may be shorter now
         waits = (opens > 0) if first else (opens > 0) | self._blocked
         left = {u: p.rest(swarm.step, swarm.uncovered) for u, p in self._planned.items()}
         flown = {u: rest for u, rest in left.items() if not waits[rest[0]].any()}
         moment = Moment(swarm.x, flying, swarm.uncovered, earliest, swarm.time_s)
-        bodies = {u: self._bodies(movers, u) for u in range(len(swarm.x))}
+        bodies = {u: self._fleet.bodies(movers, u) for u in range(len(swarm.x))}
         unknown = (opens >= NEVER) & swarm.uncovered
-        options, n_uas = self.options, len(flying)
-        orders, planned = 1, 2  # and the one that is kept
-        if first:
-            orders = options.orders if n_uas <= _ONE_SEARCH else 1
-            planned = options.planned_orders
-        larger = min(max(n_uas * len(unknown) / _SMALL, 1.0), _LARGER)
-        moves, weight = round(larger * options.moves), self.total_weight
-        effort = Effort(orders, planned, moves, options.programs, weight, options.threads)
+        effort = Effort.of(self.options, moment, self.total_weight, first=first)
         self._latest_visit = np.full(len(unknown), NEVER)
         self._waiting = who_waits(self._fleet, self._way_home, moment, unknown)
         if unknown.any():
             latest = self._waiting.latest
             self._latest_visit[unknown] = swarm.step + latest[unknown]
             if self.mission_plan is None:
-                opens_at = opens_first(self._fleet, moment, unknown, moves, self._seed)
+                opens_at = opens_first(self._fleet, moment, unknown, effort.moves, self._seed)
             else:
                 steps_left = [len(p.course.rest(swarm.step).u) for p in self._planned.values()]
                 opens_at = opens_again(steps_left, self._brief.dt_s)
@@ -416,15 +413,15 @@ class Trajectory:
 
         def ahead(then: int, planned: Mapping[int, Planned]) -> Ahead:
             expected = movers.later(then - swarm.step)
-            opens = self._opens(expected)
+            opens = self._fleet.opens(expected)
             unknown = (opens >= NEVER) & swarm.uncovered
-            earliest = np.where(opens > 0, opens, 0)
-            earliest[unknown] = 0
+            opens[unknown] = 0
+            earliest = self._earliest(opens, then - swarm.step)
             for p in planned.values():  # what is blocked is visited as late as planned
                 visits = p.flight.visits + p.course.begin - then
                 late = unknown[p.route]
                 earliest[p.route[late]] = np.maximum(visits[late], 0)
-            bodies = {u: self._bodies(expected, u) for u in range(len(swarm.x))}
+            bodies = {u: self._fleet.bodies(expected, u) for u in range(len(swarm.x))}
             barred = self._waiting.barred if unknown.any() else None
             if plan.order.trips:  # which UAS visits what is part of a larger plan
                 others = all_but_own(planned, (len(swarm.x), len(swarm.uncovered)))

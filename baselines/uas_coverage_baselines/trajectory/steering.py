@@ -83,7 +83,7 @@ class Steering:
         self._effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
         self._again = max(round(_AGAIN_S / brief.dt_s), 1)
         self._attempts, self._approach = Attempts(brief), Approach(brief)
-        self._recall = Recall(len(brief.uas))
+        self._recall, self._called = Recall(len(brief.uas)), np.zeros(len(brief.uas), np.bool_)
         self._worked = np.zeros(len(brief.uas), np.bool_)
 
     def commands(self, swarm: SwarmState, world: WorldView) -> Mapping[str, Command]:
@@ -97,7 +97,9 @@ class Steering:
         wanted = self._attempts.wanted(swarm.uncovered)
         free = wanted & ~blocked
         target = free if free.any() else wanted
-        works = np.isin(swarm.names, swarm.active) & ~self._recall.update(swarm, world)
+        if swarm.uncovered.any():
+            self._called = self._recall.update(swarm, world)
+        works = np.isin(swarm.names, swarm.active) & ~swarm.returning & ~self._called
         self._search(swarm, works, target)
         flown_to = {
             swarm.names[u]: int(route[0])

@@ -51,6 +51,8 @@ def parameters_text(scenario: Scenario, one: Exported, tolerances: Tolerances) -
         "FENCE_ALT_MAX": -float(scenario.fence.vertices_m[:, 2].min()),
         "BATT_FS_LOW_ACT": _SMART_RTL,  # back the way it came, where it remembers that
     }
+    if one.track.lands_elsewhere:
+        values["RALLY_INCL_HOME"] = 0  # it is closed
     if one.waits.start_s:
         values["DISARM_DELAY"] = 0  # it would disarm while it waits on the ground
     if one.return_m is None:

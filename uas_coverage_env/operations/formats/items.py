@@ -61,7 +61,8 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
         items.append(Item(WAYPOINT, RELATIVE_FRAME, (*first, *place)))
     if apart_m:
         items.append(_trigger(0.0))
-    items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, *ground, 0.0)))
+    latitude, longitude, _ = one.geodetic(one.track.landing_m)
+    items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, float(latitude), float(longitude), 0.0)))
     return items
 
 

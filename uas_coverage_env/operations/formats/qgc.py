@@ -20,7 +20,8 @@ _VEHICLE_TYPES = {4: 2, 6: 13, 8: 14}
 """MAV_TYPE by number of motors: quadrotor, hexarotor, octorotor."""
 
 _RELATIVE_ALTITUDE = 1
-_ZONES = ("no_fly", "outside_fence")
+ZONES = ("no_fly", "outside_fence")
+"""Kinds of obstacles at which nothing stands: where no UAS may fly."""
 
 
 def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, autopilot: str) -> str:
@@ -32,8 +33,10 @@ def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, autopil
         tolerances: How far from a corner it may pass.
         autopilot: Key of `FIRMWARE`.
     """
-    latitude, longitude, _ = one.geodetic(one.track.home_m).tolist()
-    home = [round(latitude, 8), round(longitude, 8)]
+    home, landing = (
+        [round(degrees, 8) for degrees in one.geodetic(place_m)[:2].tolist()]
+        for place_m in (one.track.home_m, one.track.landing_m)
+    )
     return_m = one.return_m if one.return_m is not None else -float(one.track.take_off_m[2])
     plan = {
         "fileType": "Plan",
@@ -52,7 +55,7 @@ def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, autopil
             ],
         },
         "geoFence": {"version": 2, "circles": [], "polygons": _polygons(scenario, one)},
-        "rallyPoints": {"version": 2, "points": [[*home, round(return_m, 3)]]},
+        "rallyPoints": {"version": 2, "points": [[*landing, round(return_m, 3)]]},
     }
     return json.dumps(plan, indent=1, allow_nan=False) + "\n"
 
@@ -86,7 +89,7 @@ def _polygons(scenario: Scenario, one: Exported) -> list[dict[str, Any]]:
     bodies += [
         (hull.vertices_m, False)
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
-        if obstacle.kind in _ZONES
+        if obstacle.kind in ZONES
     ]
     found = []
     for vertices_m, inclusion in bodies:

@@ -5,7 +5,9 @@ one UAS, and the clocks of several share the time of the satellites (.bin) or of
 (.tlog).
 """
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,8 @@ FloatArray = NDArray[np.float64]
 Rows = dict[str, list[list[float]]]
 
 _MOST_BYTES = 500_000_000
+_LONGEST_STEP_BACK_S = 5.0
+_STDERR = 2
 _AUTOPILOT = 1
 """Component of telemetry that flies."""
 
@@ -92,20 +96,36 @@ def _rows(
     read_bytes(path, _MOST_BYTES)  # a plain file, and no device to listen to
     rows: Rows = {}
     try:
-        log: Any = mavutil.mavlink_connection(str(path.resolve()), robust_parsing=True)
-        try:
-            while (message := log.recv_match(type=list(wanted))) is not None:
-                kind = message.get_type()
-                if accepted(message):
-                    values = [float(value) for value in wanted[kind](message)]
-                    rows.setdefault(kind, []).append([float(message._timestamp), *values])
-        finally:
-            log.close()
+        with _unheard():
+            log: Any = mavutil.mavlink_connection(str(path.resolve()), robust_parsing=True)
+            with closing(log):
+                while (message := log.recv_match(type=list(wanted))) is not None:
+                    kind = message.get_type()
+                    if accepted(message):
+                        values = [float(value) for value in wanted[kind](message)]
+                        rows.setdefault(kind, []).append([float(message._timestamp), *values])
     except ModuleNotFoundError:
         raise
     except Exception as error:  # its parsers raise whatever a damaged file makes them
         raise InputError(f"{path}: cannot be read as a log: {error}") from error
     return rows
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Without the lines that the parsers print of each damaged place; one is compiled code."""
+    kept = os.dup(_STDERR)
+    try:
+        with (
+            open(os.devnull, "w", encoding="utf-8") as nowhere,
+            redirect_stdout(nowhere),
+            redirect_stderr(nowhere),
+        ):
+            os.dup2(nowhere.fileno(), _STDERR)
+            yield
+    finally:
+        os.dup2(kept, _STDERR)
+        os.close(kept)
 
 
 def _logged(
@@ -121,6 +141,13 @@ def _logged(
     places = np.array(rows[position])
     # places that were not known yet are at 0, 0; a clock may say the same time twice
     places = places[(np.abs(places[:, 1:3]) > 0.0).any(axis=1)]
+    back_s = -np.diff(places[:, 0])
+    if (back_s > _LONGEST_STEP_BACK_S).any():
+        at_s = places[int(back_s.argmax()), 0] - places[0, 0]
+        raise InputError(
+            f"{path}: its clock goes back by {back_s.max():.0f} s, {at_s:.0f} s after its "
+            f"beginning; cut out one flight"
+        )
     places = places[np.append(True, np.diff(np.maximum.accumulate(places[:, 0])) > 0.0)]
     times_s = places[:, 0]
 

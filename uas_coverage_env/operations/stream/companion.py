@@ -13,14 +13,19 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from uas_coverage_env.operations.stream.clock import Clock
-from uas_coverage_env.operations.stream.link import BRAKE, GUIDED, LAND, RTL, VehicleLink
+from uas_coverage_env.operations.stream.link import VehicleLink
 from uas_coverage_env.operations.stream.timeline import Timeline
 
-REACTIONS = {"hold": BRAKE, "rtl": RTL, "land": LAND}
-"""What becomes of vehicles where the stream is given up: the mode that they get."""
+REACTIONS = ("hold", "rtl", "land")
+"""What becomes of vehicles where the stream is given up: the mode of `Autopilot` that they get."""
 
 _TICK_S = 0.1
+_STREAM_FIRST_S = 1.5
+"""So long targets are streamed before a mode is entered that needs them."""
+
 _AGAIN_S = 1.0
 """So often a request is repeated until it is seen to be followed."""
 
@@ -45,7 +50,7 @@ class StreamOptions:
         lag_m: Behind by so much, time stops for all [m].
         patience_s: So long it may stand still, and a vehicle may take to be ready [s].
         silent_s: Not heard for so long, a vehicle counts as lost, and time stops [s].
-        reaction: Key of `REACTIONS`.
+        reaction: One of `REACTIONS`.
     """
 
     lag_m: float = 5.0
@@ -93,6 +98,7 @@ class Companion:
         self._clock, self._tell = clock, tell
         self._beat_s = -math.inf
         self._landing: set[str] = set()
+        self._held: list[VehicleLink] = []
         self._rows: list[tuple[float, str, float, float, float]] = []
         self.plan_s = min(plan.first_s for plan in plans.values())
         self.late_s = 0.0
@@ -136,6 +142,8 @@ class Companion:
                 if link.armed and link.place_m is not None:
                     north_m, east_m, down_m = link.place_m.tolist()
                     self._rows.append((now_s, name, north_m, east_m, down_m))
+            for link in self._held:
+                link.go(self._plans[link.name].place_m(0.0), np.zeros(3))
             yield now_s
 
     def _make_ready(self) -> None:
@@ -155,12 +163,16 @@ class Companion:
                 raise _GivenUpError(f"{name} is flying or armed; stream begins on the ground")
 
     def _take_off(self) -> None:
-        patience_s = self._options.patience_s
+        patience_s, links = self._options.patience_s, self._links.values()
+        # these take off by targets, which they have to hear for a while before they fly by them
+        self._held = [link for link in links if link.autopilot.is_streamed_to]
+        if self._held:
+            self._let_pass(_STREAM_FIRST_S)
         self._until(
-            lambda link: link.mode == GUIDED,
-            lambda link: link.set_mode(GUIDED),
+            lambda link: link.takes_targets,
+            lambda link: link.set_mode(link.autopilot.targets),
             patience_s,
-            "does not enter GUIDED",
+            "does not enter {targets}",
         )
         self._until(lambda link: link.armed, lambda link: link.arm(), patience_s, "does not arm")
         heights_m = {name: -float(plan.place_m(0.0)[2]) for name, plan in self._plans.items()}
@@ -168,10 +180,20 @@ class Companion:
             lambda link: (
                 link.place_m is not None and -link.place_m[2] > heights_m[link.name] - _UP_WITHIN_M
             ),
-            lambda link: link.take_off(heights_m[link.name]),
+            lambda link: (
+                None if link.autopilot.is_streamed_to else link.take_off(heights_m[link.name])
+            ),
             patience_s,
             "does not take off",
         )
+        self._held = []
+
+    def _let_pass(self, seconds: float) -> None:
+        """Let some time pass."""
+        began_s = self._clock.now_s()
+        for now_s in self._ticks():
+            if now_s >= began_s + seconds:
+                return
 
     def _until(
         self,
@@ -187,7 +209,9 @@ class Companion:
             if not missing:
                 return
             if now_s > began_s + patience_s:
-                raise _GivenUpError(f"{missing[0].name} {otherwise} ({missing[0].address})")
+                link = missing[0]
+                what = otherwise.format(targets=link.autopilot.targets_name)
+                raise _GivenUpError(f"{link.name} {what} ({link.address})")
             if now_s >= asked_s + _AGAIN_S:
                 asked_s = now_s
                 for link in missing:
@@ -234,8 +258,9 @@ class Companion:
         for link, plan in self._flown():
             if link.heard_s is None or now_s - link.heard_s > self._options.silent_s:
                 return 0.0, f"{link.name} is not heard from: all hold"
-            if link.mode != GUIDED or not link.armed:
-                return 0.0, f"{link.name} does not take targets (mode {link.mode}): all hold"
+            if not link.takes_targets or not link.armed:
+                mode = link.autopilot.told(link.mode)
+                return 0.0, f"{link.name} does not take targets ({mode}): all hold"
             steps = (0.0, 0.25 * _DELAY_S, 0.5 * _DELAY_S, 0.75 * _DELAY_S, _DELAY_S)
             behind_m = min(link.off_m(plan.place_m(self.plan_s - early)) for early in steps)
             share = min(max(2.0 - 2.0 * behind_m / self._options.lag_m, 0.0), 1.0)
@@ -251,32 +276,34 @@ class Companion:
             at_end = self.plan_s >= plan.last_s and link.off_m(plan.place_m(plan.last_s)) < 1.5
             if at_end:
                 self._landing.add(link.name)
-                link.set_mode(LAND)
-            elif link.mode == GUIDED:  # one that a pilot has taken over is left alone
+                link.set_mode(link.autopilot.land)
+            elif link.takes_targets:  # one that a pilot has taken over is left alone
                 link.go(plan.place_m(self.plan_s), rate * plan.velocity_mps(self.plan_s))
         for name in self._landing:
             link = self._links[name]
-            if link.mode == GUIDED and link.armed:
-                link.set_mode(LAND)
+            if link.takes_targets and link.armed:
+                link.set_mode(link.autopilot.land)
         return len(self._landing) < len(self._links)
 
     def _wait_for_landings(self) -> None:
         self._until(
             lambda link: not link.armed,
-            lambda link: link.set_mode(LAND) if link.mode == GUIDED else None,
+            lambda link: link.set_mode(link.autopilot.land) if link.takes_targets else None,
             _LANDING_S,
             "does not land",
         )
 
     def _react(self) -> None:
         """Give every vehicle that flies by targets its mode, until it says that it has it."""
-        mode = REACTIONS[self._options.reaction]
+        self._held = []
         try:
             self._until(
                 lambda link: (
-                    link.name in self._landing or not link.armed or link.mode not in (GUIDED, None)
+                    link.name in self._landing
+                    or not link.armed
+                    or not (link.takes_targets or link.mode is None)
                 ),
-                lambda link: link.set_mode(mode),
+                lambda link: link.set_mode(getattr(link.autopilot, self._options.reaction)),
                 self._options.silent_s + 2.0 * _AGAIN_S,
                 "does not answer",
             )

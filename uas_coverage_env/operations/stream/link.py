@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.stream.autopilots import ARDUPILOT, AUTOPILOTS
 
 FloatArray = NDArray[np.float64]
 
 KINDS = ("udp", "udpin", "udpout", "tcp")
 """Of connections: `udp` (or `udpin`) listens on a port, the others connect to one."""
 
-GUIDED, RTL, LAND, BRAKE = 4, 6, 9, 17
-"""Modes of ArduCopter."""
-
 _SET_MODE, _ARM, _TAKE_OFF, _INTERVAL = 176, 400, 22, 511
-_ARDUPILOT, _ARMED, _CUSTOM_MODE = 3, 128, 1
+_ARMED, _CUSTOM_MODE = 128, 1
 _POSITION_MESSAGE, _POSITION_HZ = 33, 10
 _RELATIVE_FRAME = 6
 _TYPE_MASK = 0b1001_1100_0000
@@ -35,6 +33,7 @@ class VehicleLink:
         name: The UAS that it flies.
         place_m: (3,) where it says it is; None before it has [m].
         heard_s: When it was heard last, by the clock of the caller; None: never [s].
+        autopilot: What it is, once it has said.
         mode: Its mode; None before it has said.
         armed: Whether it is armed.
 
@@ -51,6 +50,7 @@ class VehicleLink:
         self.name, self.address, self._frame = name, address, frame
         self.place_m: FloatArray | None = None
         self.heard_s: float | None = None
+        self.autopilot = ARDUPILOT
         self.mode: int | None = None
         self.armed = False
         self._system = 1
@@ -63,18 +63,20 @@ class VehicleLink:
             now_s: Time by the caller's clock [s].
 
         Raises:
-            InputError: It is no ArduPilot.
+            InputError: Its autopilot is none of `AUTOPILOTS`.
         """
         while (message := self._link.recv_match(blocking=False)) is not None:
             kind = message.get_type()
             if message.get_srcComponent() != 1:
                 continue
             if kind == "HEARTBEAT":
-                if message.autopilot != _ARDUPILOT:
+                if message.autopilot not in AUTOPILOTS:
+                    known = " and ".join(one.name for one in AUTOPILOTS.values())
                     raise InputError(
-                        f"--connect {self.name}={self.address}: is no ArduPilot (autopilot "
-                        f"{message.autopilot}); stream knows only its modes"
+                        f"--connect {self.name}={self.address}: is autopilot "
+                        f"{message.autopilot}; stream knows only the modes of {known}"
                     )
+                self.autopilot = AUTOPILOTS[message.autopilot]
                 self._system = message.get_srcSystem()
                 self.mode = int(message.custom_mode)
                 self.armed = bool(message.base_mode & _ARMED)
@@ -85,6 +87,11 @@ class VehicleLink:
                     self.place_m = self._frame.to_ned(*degrees, 1e-3 * message.relative_alt)
                     self.heard_s = now_s
 
+    @property
+    def takes_targets(self) -> bool:
+        """Whether it is in the mode in which it flies by targets."""
+        return self.mode == self.autopilot.targets
+
     def beat(self) -> None:
         """Say that a ground station is here, and ask for positions often enough."""
         self._link.mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -92,7 +99,7 @@ class VehicleLink:
 
     def set_mode(self, mode: int) -> None:
         """Ask for a mode."""
-        self._command(_SET_MODE, _CUSTOM_MODE, mode)
+        self._command(_SET_MODE, _CUSTOM_MODE, *self.autopilot.mode_params(mode))
 
     def arm(self) -> None:
         """Ask it to arm."""
