@@ -1,4 +1,4 @@
-"""The routes that the whole fleet is on: built before take-off, and again when something happens."""
+"""The routes of the whole fleet: built before take-off, and again when something happens."""
 
 from __future__ import annotations
 
@@ -63,9 +63,7 @@ class FleetRoutes:
     def update(self, swarm: SwarmState) -> None:
         """Go on to this sample; build the routes again where they are no longer right."""
         self._blocked = self._renew(swarm)
-        flown_to = {
-            swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)
-        }
+        flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
         self._attempts.update(swarm, flown_to, self._blocked)
 
     def of(self, u: int) -> NDArray[np.int64]:

@@ -14,7 +14,6 @@ from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layout import order_groups, route_networks
 from uas_coverage_agents.route.leg_flight import (
     AHEAD,
-    DOWN,
     EAST,
     IS_HOME,
     NORTH,

@@ -84,8 +84,10 @@ class RouteVelocityRunner:
                 flown.append(u)
             else:
                 commands[swarm.names[u]] = guided
-        for u, values in zip(flown, self.velocities(flown), strict=True):
-            commands[swarm.names[u]] = Velocity(*values.tolist(), self.routes.mode(u))
+        values = self.velocities(flown).tolist() if flown else []
+        for u, (north_mps, east_mps, altitude_m) in zip(flown, values, strict=True):
+            mode = self.routes.mode(u)
+            commands[swarm.names[u]] = Velocity(north_mps, east_mps, altitude_m, mode)
         return commands
 
     def velocities(self, flown: Sequence[int]) -> NDArray[np.float64]:

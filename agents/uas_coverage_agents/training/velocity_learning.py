@@ -3,16 +3,18 @@
 `learned-route` is the teacher: it builds the routes, and says in every state that the pupil comes
 to which velocity it would fly there, after simulating eighty of them. The pupil, one network,
 learns to say the same without simulating anything (DAgger: Ross, Gordon, Bagnell 2011). In the
-first round the teacher flies, in the others the pupil. Nothing here is tuned on the set `test`.
+first round the teacher flies, in the second either, then the pupil. Nothing here is tuned on the
+set `test`.
 """
 
 import argparse
-import csv
 import platform
 import time
 from collections.abc import Sequence
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -29,8 +31,7 @@ from uas_coverage_agents.policy import (
     save_policy,
 )
 from uas_coverage_agents.policy.route_networks import RouteNetworks
-from uas_coverage_agents.policy.tensors import Tensors
-from uas_coverage_agents.route.layers import layers_of
+from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
 from uas_coverage_agents.route.planner import SHIPPED as TEACHER
 from uas_coverage_agents.route.velocity_layout import (
@@ -40,90 +41,243 @@ from uas_coverage_agents.route.velocity_layout import (
     velocity_networks,
 )
 from uas_coverage_agents.route.velocity_runner import RouteVelocityRunner, velocity_observation
-from uas_coverage_agents.training.scenarios import VALIDATION, town
+from uas_coverage_agents.training import curve
+from uas_coverage_agents.training.checkpoint import CurvePoint
+from uas_coverage_agents.training.scenarios import town, validation_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly, score
 from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import COMMAND_DTYPE
 
-HIDDEN = (96, 96)
-ROUNDS, TOWNS_PER_ROUND = 6, 40
-EPOCHS, LAST_EPOCHS, BATCH, RATE = 12, 40, 256, 2e-3
-TRAINING = Towns(first_seed=1_000_000, n_uas=(1, 6), n_waypoints=(20, 60), n_obstacles=(5, 20))
+CURVE_MISSIONS, SCORE_MISSIONS = 12, 100
 
 
-class Pupil(RouteVelocityRunner):
+class DaggerSettings(StrictModel):
+    """How long is flown and learned.
+
+    Attributes:
+        towns: In which is flown; each round and each training flies others.
+        rounds: Of flying, and of learning from all that was flown so far.
+        towns_per_round: How many.
+        led: Share of the steps that the teacher flies, in the first rounds; later ones: none.
+        samples: Sets of routes that are built.
+        hidden: Widths of the layers between.
+        epochs: Of learning, in each round.
+        last_epochs: In the last.
+        batch: Steps that are learned from at once.
+        rate: At which is learned at first.
+        beta: Error above which the loss (smooth L1) is linear.
+    """
+
+    towns: Towns = Towns(
+        first_seed=1_000_000, n_uas=(1, 6), n_waypoints=(20, 60), n_obstacles=(5, 20)
+    )
+    rounds: int = 7
+    towns_per_round: int = 30
+    led: tuple[float, ...] = (1.0, 0.5)
+    samples: int = 8
+    hidden: tuple[int, ...] = (96, 96)
+    epochs: int = 12
+    last_epochs: int = 40
+    batch: int = 256
+    rate: float = 2e-3
+    beta: float = 0.1
+
+    @property
+    def family(self) -> ScenarioFamily:
+        """What is trained on."""
+        return ScenarioFamily(name="generated", towns=self.towns)
+
+
+class Lesson(NamedTuple):
+    """What was seen, and the outputs that the teacher would have given: (N, ...) each."""
+
+    rows: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+
+
+class TaughtRunner(RouteVelocityRunner):
     """Flies, and notes what it saw and what the teacher would have flown there.
 
     Args:
-        policy: Of the pupil.
+        policy: Of the interface "route-velocity".
         teacher: Of the interface "route".
-        led: Whether the teacher's commands are flown instead.
+        led: Share of the steps that the teacher flies.
+        samples: Sets of routes that are built.
+        rng: Draws the steps.
+
+    Attributes:
+        lessons: What was noted, one for each step.
     """
 
-    def __init__(self, policy: Policy, teacher: Policy, *, led: bool) -> None:
-        super().__init__(policy, Assistants(), samples=8)
-        network = teacher.description.network
-        assert isinstance(network, RouteNetworks)
-        self._flight = layers_of(network.flight, teacher.tensors, "flight.")
-        self._command, self._led = np.zeros(1, COMMAND_DTYPE)[0], led
-        self.noted: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+    def __init__(
+        self, policy: Policy, teacher: Policy, led: float, samples: int, rng: np.random.Generator
+    ) -> None:
+        super().__init__(policy, Assistants(), samples)
+        self._teacher = _flight_of(teacher)
+        self._command = np.zeros(1, COMMAND_DTYPE)[0]
+        self._led, self._rng = led, rng
+        self.lessons: list[Lesson] = []
 
     def velocities(self, flown: Sequence[int]) -> NDArray[np.float64]:
-        """Those of whoever leads."""
+        """Those of the teacher, where it leads, or of the network."""
         taught = np.array([self._taught(u) for u in flown]).reshape(-1, 3)
         speeds_mps = self.routes.view.arena.uas[flown]["speed_mps"]
-        self.noted.append((self.rows[flown], outputs_of(taught, self.frames[flown], speeds_mps)))
-        return taught if self._led else super().velocities(flown)
+        outputs = outputs_of(taught, self.frames[flown], speeds_mps)
+        self.lessons.append(Lesson(self.rows[flown], outputs))
+        return taught if self._rng.random() < self._led else super().velocities(flown)
 
-    def _taught(self, u: int) -> tuple[float, ...]:
+    def _taught(self, u: int) -> list[float]:
         view, n = self.routes.view, min(len(self.routes.of(u)), AHEAD)
         x, reference = view.state.x[u], view.state.reference[u]
-        known = steer_along(
-            view.arena, u, x, reference, self.ahead[u], n, self._flight, self._command
-        )
-        if known:
-            return tuple(self._command["values"][:3].tolist())
+        if steer_along(view.arena, u, x, reference, self.ahead[u], n, self._teacher, self._command):
+            return self._command["values"][:3].tolist()
         velocity = velocity_of(view.arena, view.state, u, self.routes.onwards(u))
-        return velocity.north_mps, velocity.east_mps, velocity.altitude_m
+        return [velocity.north_mps, velocity.east_mps, velocity.altitude_m]
 
 
-def fresh_network() -> nn.Sequential:
-    """The pupil before training: it flies straight on at full speed."""
-    widths = (N_VELOCITY, *HIDDEN)
+class VelocityTraining:
+    """One training: the network, its teacher, and what was noted so far.
+
+    Args:
+        seed: Of network, samples and towns.
+        settings: How long is flown and learned.
+    """
+
+    def __init__(self, seed: int, settings: DaggerSettings | None = None) -> None:
+        torch.set_num_threads(1)
+        torch.manual_seed(seed)
+        self.settings = settings or DaggerSettings()
+        self.seed, self.teacher = seed, load_policy(TEACHER)
+        self._rng = np.random.default_rng(seed)
+        self._network = fresh_network(self.settings.hidden)
+        self._rows = torch.zeros((0, N_VELOCITY))
+        self._outputs = torch.zeros((0, OUTPUTS))
+        self._began = time.process_time(), time.monotonic()
+
+    @property
+    def steps(self) -> int:
+        """Velocities that were taught so far."""
+        return len(self._rows)
+
+    def fly_and_note(self, number: int) -> None:
+        """Fly the towns of a round, home without return mode."""
+        settings = self.settings
+        led = settings.led[number] if number < len(settings.led) else 0.0
+        runner = TaughtRunner(self.policy(), self.teacher, led, settings.samples, self._rng)
+        first = (self.seed * settings.rounds + number) * settings.towns_per_round
+        for k in range(first, first + settings.towns_per_round):
+            scenario = town(settings.towns, k)
+            rollout(scenario, runner, return_mode=False, safety_filter=True, seed=k)
+        rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
+        self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
+        self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
+
+    def fit(self, number: int) -> None:
+        """Fit the network to all that was noted, after a round."""
+        settings = self.settings
+        last = number == settings.rounds - 1
+        epochs = settings.last_epochs if last else settings.epochs
+        optimiser = torch.optim.Adam(self._network.parameters())
+        for epoch in range(epochs):
+            optimiser.param_groups[0]["lr"] = settings.rate * (1.01 - epoch / epochs)
+            for batch in torch.randperm(len(self._rows)).split(settings.batch):
+                given = self._network(self._rows[batch])
+                loss = nn.functional.smooth_l1_loss(given, self._outputs[batch], beta=settings.beta)
+                optimiser.zero_grad()
+                loss.backward()
+                optimiser.step()
+
+    def policy(self) -> Policy:
+        """What flies now; its orders are the teacher's."""
+        modules = [module for module in self._network if isinstance(module, nn.Linear)]
+        tensors = {n: t for n, t in self.teacher.tensors.items() if not n.startswith("flight.")}
+        for k, module in enumerate(modules):
+            for part in ("weight", "bias"):
+                array = getattr(module, part).detach().numpy().astype(np.float64)
+                tensors[f"flight.layers.{k}.{part}"] = array
+        description = PolicyDescription(
+            interface="route-velocity",
+            network=velocity_networks(_networks_of(self.teacher).order, self.settings.hidden),
+            observation=velocity_observation(),
+            scenarios=self.settings.family,
+            training=Training(
+                algorithm="DAgger, taught by learned-route",
+                settings=self.settings.model_dump(mode="json"),
+                seed=self.seed,
+                steps=self.steps,
+                process_s=round(time.process_time() - self._began[0], 1),
+                wall_s=round(time.monotonic() - self._began[1], 1),
+                machine=f"{platform.machine()}, {platform.system()}",
+            ),
+            versions={name: version(name) for name in ("numpy", "torch")},
+        )
+        return Policy(description, tensors)
+
+
+def fresh_network(hidden: tuple[int, ...]) -> nn.Sequential:
+    """A network that flies straight on at full speed."""
     layers: list[nn.Module] = []
-    for below, above in zip(widths, widths[1:], strict=False):
+    for below, above in pairwise((N_VELOCITY, *hidden)):
         layers += [nn.Linear(below, above), nn.ReLU()]
-    last = nn.Linear(widths[-1], OUTPUTS)
+    last = nn.Linear(hidden[-1], OUTPUTS)
     with torch.no_grad():
         last.weight.zero_()
         last.bias.copy_(torch.tensor([1.0, 0.0, 0.0]))
     return nn.Sequential(*layers, last)
 
 
-def tensors_of(network: nn.Sequential, teacher: Tensors) -> dict[str, NDArray[np.float64]]:
-    """Those of the pupil's policy: the orders are the teacher's."""
-    modules = [module for module in network if isinstance(module, nn.Linear)]
-    own = {
-        f"flight.layers.{k}.{part}": getattr(module, part).detach().numpy().astype(np.float64)
-        for k, module in enumerate(modules)
-        for part in ("weight", "bias")
-    }
-    return {**{n: t for n, t in teacher.items() if not n.startswith("flight.")}, **own}
+def point_of(policy: Policy, towns: Sequence[Scenario]) -> CurvePoint:
+    """How a policy flies some towns, with both assistants."""
+    means = dict(zip(MEASURES, fly(policy, towns).mean(axis=0).tolist(), strict=True))
+    training = policy.description.training
+    return CurvePoint(
+        steps=training.steps,
+        process_s=training.process_s,
+        wall_s=training.wall_s,
+        **{name: mean for name, mean in means.items() if name in CurvePoint.model_fields},
+    )
 
 
-def fit(network: nn.Sequential, rows: torch.Tensor, outputs: torch.Tensor, epochs: int) -> float:
-    """Fit the outputs; the mean loss of the last epoch."""
-    optimiser = torch.optim.Adam(network.parameters(), RATE)
-    mean = 0.0
-    for epoch in range(epochs):
-        optimiser.param_groups[0]["lr"] = RATE * (1.01 - epoch / epochs)
-        losses = []
-        for batch in torch.randperm(len(rows)).split(BATCH):
-            loss = nn.functional.smooth_l1_loss(network(rows[batch]), outputs[batch], beta=0.1)
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
-            losses.append(loss.item())
-        mean = float(np.mean(losses))
-    return mean
+def _networks_of(policy: Policy) -> RouteNetworks:
+    network = policy.description.network
+    if not isinstance(network, RouteNetworks):
+        raise ValueError(f"network.kind is {network.kind!r}, not 'routes'")
+    return network
+
+
+def _flight_of(teacher: Policy) -> Layers:
+    return layers_of(_networks_of(teacher).flight, teacher.tensors, "flight.")
+
+
+def train(training: VelocityTraining, directory: Path, missions: int) -> None:
+    """Fly, learn, and again; leaves `policy/`, `learning_curve.csv` and `.png` in the directory."""
+    unseen = validation_scenarios(training.settings.family, max(missions, CURVE_MISSIONS))
+    points = [point_of(training.policy(), unseen[:CURVE_MISSIONS])]
+    for number in range(training.settings.rounds):
+        training.fly_and_note(number)
+        training.fit(number)
+        points.append(point_of(training.policy(), unseen[:CURVE_MISSIONS]))
+        curve.write(points, directory)
+        print(f"round {number + 1} of {training.settings.rounds}: {points[-1]}", flush=True)
+    policy = training.policy()
+    scored = score(fly(policy, unseen[:missions]), "generated, validation")
+    described = policy.description.model_copy(update={"score": scored})
+    save_policy(directory / "policy", described, policy.tensors)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Train, score and save."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
+    asked = parser.parse_args(argv)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    train(VelocityTraining(asked.seed), asked.out, asked.missions)
+
+
+if __name__ == "__main__":
+    main()
