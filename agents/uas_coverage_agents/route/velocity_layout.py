@@ -33,8 +33,10 @@ OUTPUTS = 3
 """Velocity along and across over top speed, and altitude above the place aimed at over 10 m."""
 
 _LENGTH_M, _SPEED_MPS, _TILT_RAD, _CLIMB_MPS, _RADIUS_M, _RISE_M = 50.0, 12.0, 0.44, 3.0, 15.0, 10.0
-_NEAR_M, _RAY_M, _MOST = 10.0, 40.0, 3.0
-_RAYS_RAD = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0])
+_NEAR_M, _RAY_M, _MOST = 10.0, 60.0, 3.0
+_AHEAD_RAD = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0])
+_FLIGHT_RAD = np.radians([-40.0, -20.0, -10.0, 0.0, 10.0, 20.0, 40.0])
+_STILL_MPS = 0.5
 _PLACES = AHEAD - 1
 
 
@@ -67,13 +69,16 @@ SURROUNDINGS = Group(
     "surroundings",
     1,
     (
-        Feature("rays", len(_RAYS_RAD), 0.0, 1.0, "1 - free way / 40 m, 60 to -60 degrees ahead"),
+        Feature("ahead", len(_AHEAD_RAD), 0.0, 1.0, "1 - free way / 60 m, -60° to 60° off along"),
+        Feature("flight", len(_FLIGHT_RAD), 0.0, 1.0, "likewise, -40° to 40° off the velocity"),
         _scaled("rise", 1, "how far above is the least altitude on the way / 10 m"),
         Feature("pace", 1, 0.0, 1.0, "speed that leaves time to climb there / top speed"),
     ),
 )
 GROUPS = (OWN, PLACES, SURROUNDINGS)
 N_VELOCITY = sum(group.size for group in GROUPS)
+RAYS = slice(N_VELOCITY - SURROUNDINGS.size, N_VELOCITY - 2)
+"""Columns that say how near fixed obstacles and the fence are."""
 
 _OWN, _PLACE, _AROUND = OWN.columns, PLACES.columns, SURROUNDINGS.columns
 _WIDTH, _FIRST_PLACE, _FIRST_AROUND = PLACES.width, OWN.size, OWN.size + PLACES.size
@@ -116,6 +121,15 @@ def outputs_of(
     level = values[:, :2] / speeds_mps[:, None]
     along, across = (level * frames[:, 0:2]).sum(axis=1), (level * frames[:, 2:4]).sum(axis=1)
     return np.column_stack([along, across, (values[:, 2] - frames[:, 4]) / _RISE_M])
+
+
+@allocating_kernel
+def _look_around(arena, x, north, east, side, angles_rad, row):
+    """Write how little is free in directions off one, the positive ones on the positive side."""
+    for k in range(angles_rad.shape[0]):
+        along, across = math.cos(angles_rad[k]), side * math.sin(angles_rad[k])
+        dx, dy = along * north - across * east, along * east + across * north
+        row[k] = 1.0 - free_way(arena, x[X], x[Y], x[Z], dx, dy, 0.0, _RAY_M) / _RAY_M
 
 
 @allocating_kernel
@@ -172,11 +186,11 @@ def look_along(arena, i, x, reference, targets, n_targets, row, frame):
         row[at + _PLACE.home] = ahead[k, IS_HOME]
         bx, by, bz = aims_m[k, 0], aims_m[k, 1], aims_m[k, 2]
     at = _FIRST_AROUND
-    for ray in range(_RAYS_RAD.shape[0]):
-        cosine, sine = math.cos(_RAYS_RAD[ray]), math.sin(_RAYS_RAD[ray])
-        north, east = cosine * ex + sine * px, cosine * ey + sine * py
-        free_m = free_way(arena, x[X], x[Y], x[Z], north, east, 0.0, _RAY_M)
-        row[at + _AROUND.rays + ray] = 1.0 - free_m / _RAY_M
+    _look_around(arena, x, ex, ey, side, _AHEAD_RAD, row[at + _AROUND.ahead :])
+    speed = math.hypot(x[VX], x[VY])
+    if speed > _STILL_MPS:
+        ex, ey = x[VX] / speed, x[VY] / speed
+    _look_around(arena, x, ex, ey, side, _FLIGHT_RAD, row[at + _AROUND.flight :])
     row[at + _AROUND.rise] = (floor_m + x[Z]) / _RISE_M
     row[at + _AROUND.pace] = min(1.0, speed_mps / arena.uas[i].speed_mps)
     for f in range(N_VELOCITY):

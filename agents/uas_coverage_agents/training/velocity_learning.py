@@ -37,6 +37,7 @@ from uas_coverage_agents.route.planner import SHIPPED as TEACHER
 from uas_coverage_agents.route.velocity_layout import (
     N_VELOCITY,
     OUTPUTS,
+    RAYS,
     outputs_of,
     velocity_networks,
 )
@@ -69,6 +70,7 @@ class DaggerSettings(StrictModel):
         batch: Steps that are learned from at once.
         rate: At which is learned at first.
         beta: Error above which the loss (smooth L1) is linear.
+        near_weight: Further weight of steps at the foot of an obstacle, where an error costs a UAS.
     """
 
     towns: Towns = Towns(
@@ -84,6 +86,7 @@ class DaggerSettings(StrictModel):
     batch: int = 256
     rate: float = 2e-3
     beta: float = 0.1
+    near_weight: float = 3.0
 
     @property
     def family(self) -> ScenarioFamily:
@@ -180,14 +183,18 @@ class VelocityTraining:
         settings = self.settings
         last = number == settings.rounds - 1
         epochs = settings.last_epochs if last else settings.epochs
+        near = self._rows[:, RAYS].amax(dim=1, keepdim=True)
+        weight = 1.0 + settings.near_weight * near
         optimiser = torch.optim.Adam(self._network.parameters())
         for epoch in range(epochs):
             optimiser.param_groups[0]["lr"] = settings.rate * (1.01 - epoch / epochs)
             for batch in torch.randperm(len(self._rows)).split(settings.batch):
                 given = self._network(self._rows[batch])
-                loss = nn.functional.smooth_l1_loss(given, self._outputs[batch], beta=settings.beta)
+                errors = nn.functional.smooth_l1_loss(
+                    given, self._outputs[batch], beta=settings.beta, reduction="none"
+                )
                 optimiser.zero_grad()
-                loss.backward()
+                (weight[batch] * errors).mean().backward()
                 optimiser.step()
 
     def policy(self) -> Policy:
@@ -254,6 +261,7 @@ def _flight_of(teacher: Policy) -> Layers:
 
 def train(training: VelocityTraining, directory: Path, missions: int) -> None:
     """Fly, learn, and again; leaves `policy/`, `learning_curve.csv` and `.png` in the directory."""
+    directory.mkdir(parents=True, exist_ok=True)
     unseen = validation_scenarios(training.settings.family, max(missions, CURVE_MISSIONS))
     points = [point_of(training.policy(), unseen[:CURVE_MISSIONS])]
     for number in range(training.settings.rounds):
@@ -275,7 +283,6 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
     asked = parser.parse_args(argv)
-    asked.out.mkdir(parents=True, exist_ok=True)
     train(VelocityTraining(asked.seed), asked.out, asked.missions)
 
 
