@@ -109,7 +109,8 @@ def test_it_looks_straight_on_at_full_speed_before_training():
 
 def test_where_the_teacher_leads_its_own_flight_is_flown_and_noted(town):
     training = VelocityTraining(seed=0)
-    runner = TaughtRunner(training.policy(), training.teacher, 1.0, 8, np.random.default_rng(0))
+    rng, settings = np.random.default_rng(0), DaggerSettings(samples=8)
+    runner = TaughtRunner(training.policy(), training.teacher, 1.0, settings, rng)
     led = rollout(town, runner, return_mode=False, safety_filter=True)
     own = rollout(town, LearnedRoute(LearnedRouteOptions(samples=8)), safety_filter=True)
     np.testing.assert_allclose(led.x, own.x, atol=1e-6)

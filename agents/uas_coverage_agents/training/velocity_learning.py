@@ -52,7 +52,7 @@ from uas_coverage_env.flight import Assistants, rollout
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import COMMAND_DTYPE
 
-CURVE_MISSIONS, SCORE_MISSIONS = 12, 100
+CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
 
 
 class DaggerSettings(StrictModel):
@@ -63,6 +63,7 @@ class DaggerSettings(StrictModel):
         rounds: Of flying, and of learning from all that was flown so far.
         towns_per_round: How many.
         led: Share of the steps that the teacher flies, in the first rounds; later ones: none.
+        asked: Share of the other steps in which it is asked; neighbouring ones say much the same.
         samples: Sets of routes that are built.
         hidden: Widths of the layers between.
         epochs: Of learning, in each round.
@@ -76,9 +77,10 @@ class DaggerSettings(StrictModel):
     towns: Towns = Towns(
         first_seed=1_000_000, n_uas=(1, 6), n_waypoints=(20, 60), n_obstacles=(5, 20)
     )
-    rounds: int = 7
-    towns_per_round: int = 30
+    rounds: int = 6
+    towns_per_round: int = 40
     led: tuple[float, ...] = (1.0, 0.5)
+    asked: float = 0.5
     samples: int = 8
     hidden: tuple[int, ...] = (96, 96)
     epochs: int = 12
@@ -86,7 +88,7 @@ class DaggerSettings(StrictModel):
     batch: int = 256
     rate: float = 2e-3
     beta: float = 0.1
-    near_weight: float = 3.0
+    near_weight: float = 6.0
 
     @property
     def family(self) -> ScenarioFamily:
@@ -108,29 +110,37 @@ class TaughtRunner(RouteVelocityRunner):
         policy: Of the interface "route-velocity".
         teacher: Of the interface "route".
         led: Share of the steps that the teacher flies.
-        samples: Sets of routes that are built.
+        settings: How often it is asked in others.
         rng: Draws the steps.
 
     Attributes:
-        lessons: What was noted, one for each step.
+        lessons: What was noted, one for each step in which it was asked.
     """
 
     def __init__(
-        self, policy: Policy, teacher: Policy, led: float, samples: int, rng: np.random.Generator
+        self,
+        policy: Policy,
+        teacher: Policy,
+        led: float,
+        settings: DaggerSettings,
+        rng: np.random.Generator,
     ) -> None:
-        super().__init__(policy, Assistants(), samples)
+        super().__init__(policy, Assistants(), settings.samples)
         self._teacher = _flight_of(teacher)
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
-        self._led, self._rng = led, rng
+        self._led, self._asked, self._rng = led, settings.asked, rng
         self.lessons: list[Lesson] = []
 
     def velocities(self, flown: Sequence[int]) -> NDArray[np.float64]:
         """Those of the teacher, where it leads, or of the network."""
-        taught = np.array([self._taught(u) for u in flown]).reshape(-1, 3)
+        leads, asked = self._rng.random(2) < (self._led, self._asked)
+        if not (leads or asked):
+            return super().velocities(flown)
+        taught = np.array([self._taught(u) for u in flown])
         speeds_mps = self.routes.view.arena.uas[flown]["speed_mps"]
         outputs = outputs_of(taught, self.frames[flown], speeds_mps)
         self.lessons.append(Lesson(self.rows[flown], outputs))
-        return taught if self._rng.random() < self._led else super().velocities(flown)
+        return taught if leads else super().velocities(flown)
 
     def _taught(self, u: int) -> list[float]:
         view, n = self.routes.view, min(len(self.routes.of(u)), AHEAD)
@@ -169,11 +179,12 @@ class VelocityTraining:
         """Fly the towns of a round, home without return mode."""
         settings = self.settings
         led = settings.led[number] if number < len(settings.led) else 0.0
-        runner = TaughtRunner(self.policy(), self.teacher, led, settings.samples, self._rng)
+        runner = TaughtRunner(self.policy(), self.teacher, led, settings, self._rng)
         first = (self.seed * settings.rounds + number) * settings.towns_per_round
         for k in range(first, first + settings.towns_per_round):
             scenario = town(settings.towns, k)
-            rollout(scenario, runner, return_mode=False, safety_filter=True, seed=k)
+            # without the filter, states come up in which it would have had to help
+            rollout(scenario, runner, return_mode=False, safety_filter=k % 2 == 0, seed=k)
         rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
         self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
         self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
