@@ -110,7 +110,7 @@ class TaughtRunner(RouteVelocityRunner):
         policy: Of the interface "route-velocity".
         teacher: Of the interface "route".
         led: Share of the steps that the teacher flies.
-        settings: How often it is asked in others.
+        settings: Of routes, and how often the teacher is asked in other steps.
         rng: Draws the steps.
 
     Attributes:
