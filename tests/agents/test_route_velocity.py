@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from uas_coverage_agents.policy import Mlp, Towns, load_policy, save_policy
 from uas_coverage_agents.policy.planner import PolicyPlanner
+from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.leg_flight import AHEAD
 from uas_coverage_agents.route.planner import LearnedRoute, LearnedRouteOptions
 from uas_coverage_agents.route.velocity_layout import (
@@ -138,6 +139,7 @@ def test_a_training_leaves_a_policy_that_flies_and_the_same_seed_the_same(town, 
 def test_a_policy_with_another_network_or_observation_is_refused_in_one_line(tmp_path):
     policy = load_policy(SHIPPED)
     network, described = policy.description.network, policy.description
+    assert isinstance(network, RouteNetworks)
     deeper = network.flight.model_copy(update={"activation": "tanh"})
     other = described.model_copy(update={"network": network.model_copy(update={"flight": deeper})})
     save_policy(tmp_path / "network", other, policy.tensors)
