@@ -4,8 +4,8 @@
     python benchmarks/learners.py ppo --seeds 3  # one learner
     python benchmarks/learners.py --publish      # and ship the policy of seed 0
 
-Trains each learner with each seed by `uas-coverage train` (a finished training is not repeated, a
-killed one goes on), flies 100 unseen towns with and without the safety filter, beside
+Trains each learner with each seed (a finished training is not repeated, a killed one of
+`uas-coverage train` goes on), flies 100 unseen towns with and without the safety filter, beside
 nearest-waypoint on the same towns, and fills what stands between the marks of agents/README.md.
 """
 
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from uas_coverage_agents.policy import Policy, load_policy
-from uas_coverage_agents.training import curve
+from uas_coverage_agents.training import curve, velocity_learning
 from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.training.scenarios import VALIDATION, town
@@ -49,19 +49,30 @@ class Study:
     """What is trained and published.
 
     Attributes:
-        config: Name of the configuration.
+        config: Name of the configuration; with a module, of its place in the README.
         shipped: Name of the planner that flies the policy of seed 0; empty: none.
         assisted: Whether filter and return mode fly along.
+        module: That trains, where it is not `uas-coverage train`.
+        alone: Whether it is also flown without filter and return mode.
     """
 
     config: str
     shipped: str = ""
     assisted: bool = True
+    module: str = ""
+    alone: bool = False
+
+    @property
+    def command(self) -> str:
+        """What trains it, without the seed."""
+        train = f"uas-coverage train {self.config}"
+        return f"python -m {self.module} OUT" if self.module else train
 
 
 STUDIES = (
     Study("maskable-ppo", "learned-waypoint"),
-    Study("ppo", "learned-velocity"),
+    Study("route-velocity", "learned-velocity", module=velocity_learning.__name__, alone=True),
+    Study("ppo"),
     Study("sac"),
     Study("ppo-end-to-end", assisted=False),
 )
@@ -101,13 +112,17 @@ def trained(study: Study, seed: int, folder: Path) -> Path:
     directory = folder / f"{study.config}-{seed}"
     if not (directory / "policy" / "policy.json").exists():
         script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
-        command = ["train", study.config, "--seed", str(seed), "--out", str(directory)]
-        subprocess.run([sys.executable, "-c", script, *command], check=True)
+        command = ["-c", script, "train", study.config, "--out", str(directory)]
+        if study.module:
+            command = ["-m", study.module, str(directory)]
+        subprocess.run([sys.executable, *command, "--seed", str(seed)], check=True)
     return directory
 
 
 def untrained(study: Study) -> Policy:
     """What a study begins with; where it is trained does not matter."""
+    if study.module:
+        return velocity_learning.VelocityTraining(seed=0).policy()
     config = load_config(study.config, changes=["scenarios.pool=1", "lanes=1"])
     return TrainingRun.untrained(TrainingJob(study.config, config, seed=0)).policy()
 
@@ -131,7 +146,7 @@ def report(
         for policy in (untrained(study), *policies)
     ]
     lines = [
-        f"`uas-coverage train {study.config} --seed 0` and the other seeds, "
+        f"`{study.command} --seed 0` and the other seeds, "
         f"scored by `python benchmarks/learners.py {study.config} "
         f"--seeds {len(directories)} --missions {len(towns)}`; {machine()}.",
         "",
@@ -150,6 +165,11 @@ def report(
         for policy in policies:
             name = f"seed {policy.description.training.seed}, filter off"
             bare = fly(policy, towns, safety_filter=False, return_mode=True)
+            lines.append(table_row(name, policy, bare, None))
+    if study.alone:
+        for policy in policies:
+            name = f"seed {policy.description.training.seed}, filter and return mode off"
+            bare = fly(policy, towns, safety_filter=False, return_mode=False)
             lines.append(table_row(name, policy, bare, None))
     runs = {f"seed {k}": curve_of(directory) for k, directory in enumerate(directories)}
     PICTURES.mkdir(parents=True, exist_ok=True)

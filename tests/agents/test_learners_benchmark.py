@@ -13,6 +13,7 @@ from uas_coverage_env import generate_scenario
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
+import end_to_end
 import fleets
 import learners
 
@@ -56,12 +57,13 @@ def test_a_report_tells_what_was_flown_with_and_without_the_filter(readme, tmp_p
     towns = [generate_scenario(900_600, n_uas=1, n_waypoints=2, n_obstacles=1)]
     reference = learners.nearest_waypoint(towns)
     assert reference[0, MEASURES.index("coverage")] == 1.0
-    study = learners.Study("ppo", "learned-velocity")
+    study = learners.Study("ppo", "learned-velocity", alone=True)
     text = learners.report(study, [directory], towns, reference)
     assert "`nearest-waypoint` | " in text
     assert "| before training | " in text
     assert "| seed 0 = `learned-velocity` |" in text
     assert "| seed 0, filter off |" in text
+    assert "| seed 0, filter and return mode off |" in text
     assert (tmp_path / "pictures" / "learning-ppo.png").exists()
 
 
@@ -90,3 +92,22 @@ def test_fleets_of_any_size_have_their_row_and_their_place_in_the_readme():
     assert len(cells) == len(fleets.HEAD)
     assert cells[:3] == ["8", "`learned-waypoint`", "50.00"]
     assert cells[-2:] == ["-50.0", "-50.0"]
+
+
+def test_a_study_names_the_command_that_trains_it_and_where_it_begins():
+    routes = next(study for study in learners.STUDIES if study.config == "route-velocity")
+    assert routes.command == "python -m uas_coverage_agents.training.velocity_learning OUT"
+    assert learners.Study("ppo").command == "uas-coverage train ppo"
+    assert learners.untrained(routes).description.training.steps == 0
+
+
+def test_what_flies_alone_is_told_for_ever_more_obstacles():
+    text = learners.README.read_text(encoding="utf-8")
+    assert text.count(f"<!-- {end_to_end.NAME} -->") == 1
+    assert not end_to_end.towns_of("none", 1)[0].obstacles
+    assert 5 <= len(end_to_end.towns_of("5 to 20", 1)[0].obstacles) <= 20
+    town = generate_scenario(900_600, n_uas=1, n_waypoints=2, n_obstacles=0)
+    result = end_to_end.flown([town])
+    assert result[0, :3].tolist() == [100.0, 100.0, 0.0]
+    cells = end_to_end.row("none", result).strip("|").split("|")
+    assert len(cells) == len(end_to_end.HEAD)

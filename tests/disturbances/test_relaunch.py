@@ -7,6 +7,7 @@ import pytest
 from eventful import event, field
 from small_worlds import mover, waypoint
 from uas_coverage_agents.route.planner import LearnedRoute
+from uas_coverage_agents.velocity.planner import LearnedVelocity
 from uas_coverage_agents.waypoint.planner import LearnedWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
@@ -31,6 +32,7 @@ PLANNERS = {
     "trajectory": lambda: Trajectory(Trajectory.Options(orders=1, moves=20_000, programs=20)),
     "learned-waypoint": lambda: LearnedWaypoint(LearnedWaypoint.Options(simulations=4)),
     "learned-route": lambda: LearnedRoute(LearnedRoute.Options(samples=4)),
+    "learned-velocity": LearnedVelocity,
 }
 
 

@@ -17,8 +17,10 @@ from uas_coverage_env.env import (
     observation_bounds,
     observation_columns,
 )
+from uas_coverage_env.env.observation.surroundings import free_way
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.vehicle import DOD, PHI, U_TH, VX, WX
+from uas_coverage_env.world import build_arena
 
 
 def flown(scenario, steps=12, seed=3, **settings):
@@ -269,6 +271,7 @@ def test_rays_end_at_obstacles_and_fence():
         # towards the north-western forest and the western houses
         north = {"uas_1": np.array([0.7, 0.4, -0.2]), "uas_2": np.array([-0.1, 0.5, -0.9])}
         observations, *_ = env.step(north)
+    arena = build_arena(scenario)
     half = math.sqrt(0.5)
     level = [(1, 0), (half, half), (0, 1), (-half, half), (-1, 0), (-half, -half), (0, -1)]
     level.append((half, -half))
@@ -279,6 +282,9 @@ def test_rays_end_at_obstacles_and_fence():
         for ray, direction in zip(rays, directions, strict=True):
             free_m = marched(scenario, position_m, direction)
             assert 80 * (1 - ray) == pytest.approx(free_m, abs=0.03)
+            for look_m in (80.0, 5.0):
+                found_m = free_way(arena, *position_m, *direction, look_m)
+                assert found_m == pytest.approx(min(80 * (1 - ray), look_m), abs=1e-3)
         inside_m = -scenario.fence.signed_distance(position_m) - 0.5
         fence = feature(observations[agent], "surroundings", "fence").item()
         assert fence == pytest.approx(np.clip(inside_m / 20, -1, 1), abs=1e-5)

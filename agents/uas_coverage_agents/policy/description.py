@@ -164,7 +164,7 @@ class PolicyDescription(StrictModel):
     Attributes:
         format: "uas-coverage-policy".
         version: Of the format.
-        interface: What its outputs mean: which waypoint next, a velocity, or routes.
+        interface: What its outputs mean: which waypoint next, a velocity, routes, or both of these.
         network: What computes them.
         observation: What it reads.
         scenarios: What it was trained on.
@@ -176,7 +176,7 @@ class PolicyDescription(StrictModel):
 
     format: Literal["uas-coverage-policy"] = "uas-coverage-policy"
     version: Annotated[int, Field(ge=1, le=1)] = 1
-    interface: Literal["waypoint", "velocity", "route"]
+    interface: Literal["waypoint", "velocity", "route", "route-velocity"]
     network: Network
     observation: Observation
     scenarios: ScenarioFamily

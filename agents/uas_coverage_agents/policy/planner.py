@@ -30,6 +30,7 @@ class PolicyRunner(Protocol):
 
 RUNNERS = {
     "route": "uas_coverage_agents.route.policy_runner:RouteRunner",
+    "route-velocity": "uas_coverage_agents.route.velocity_runner:RouteVelocityRunner",
     "velocity": "uas_coverage_agents.velocity.policy_runner:VelocityRunner",
     "waypoint": "uas_coverage_agents.waypoint.policy_runner:WaypointRunner",
 }

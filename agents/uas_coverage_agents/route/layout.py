@@ -76,14 +76,18 @@ _FLIGHT = {
 }
 
 
-def observed_groups() -> tuple[Group, ...]:
-    """The numbers in their order; leg times are told in units of the mission, `unit_s`."""
+def order_groups() -> tuple[Group, ...]:
+    """What the order networks read; leg times are told in units of the mission, `unit_s`."""
     unused = dict.fromkeys(range(len(_CHOICE) + len(_HOME), N_ORDER), "0")
     return (
         _group("waypoint", _CHOICE | _WAYPOINT),
         _group("home", _CHOICE | _HOME | unused),
-        _group("flight", _FLIGHT),
     )
+
+
+def observed_groups() -> tuple[Group, ...]:
+    """All numbers in their order."""
+    return (*order_groups(), _group("flight", _FLIGHT))
 
 
 def route_networks(hidden: int) -> RouteNetworks:

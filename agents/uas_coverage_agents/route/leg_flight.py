@@ -256,6 +256,44 @@ def _over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
 
 
 @allocating_kernel
+def places_ahead(arena, i, x, targets, n_targets, ahead):
+    """Write the next places of UAS i: a corner on the way past obstacles, waypoints, then home.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x: (14,) its state.
+        targets: (AHEAD,) the next waypoints of its route.
+        n_targets: How many of them.
+        ahead: (AHEAD, 5) written.
+
+    Returns:
+        Kind of the first leg (see `route`); altitude at which it passes over what is low [m]; the
+        speed that leaves time to climb there [m/s].
+    """
+    target = targets[0] if n_targets > 0 else arena.waypoints.shape[0] + i
+    to_m = arena.waypoints[targets[0]].position_m if n_targets > 0 else arena.uas[i].home_m
+    end_x, end_y, _, leg = route(arena, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
+    needed_m, speed_mps = _over_roofs(arena, x, end_x, end_y, -to_m[2], arena.uas[i], leg)
+    ahead[:] = 0.0
+    n = 0
+    if leg == ROUND_CORNER:
+        ahead[0, NORTH], ahead[0, EAST] = end_x, end_y
+        ahead[0, DOWN] = min(to_m[2], x[Z]) if n_targets > 0 else x[Z]
+        ahead[0, RADIUS] = _CORNER_M
+        n = 1
+    for k in range(n, AHEAD):
+        if k - n < n_targets:
+            waypoint = arena.waypoints[targets[k - n]]
+            ahead[k, :3] = waypoint.position_m
+            ahead[k, RADIUS] = waypoint.radius_m
+        else:
+            ahead[k, :3] = arena.uas[i].home_m
+            ahead[k, IS_HOME] = 1.0
+    return leg, needed_m, speed_mps
+
+
+@allocating_kernel
 def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
     """Write the velocity that flies UAS i along its route.
 
@@ -274,35 +312,18 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
         not, the world's guidance knows better.
     """
     rules, uas = arena.rules[0], arena.uas[i]
-    ahead = np.zeros((AHEAD, 5))
-    target = targets[0] if n_targets > 0 else arena.waypoints.shape[0] + i
-    to_m = arena.waypoints[targets[0]].position_m if n_targets > 0 else uas.home_m
-    end_x, end_y, _, leg = route(arena, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
+    ahead = np.empty((AHEAD, 5))
+    leg, needed_m, speed_mps = places_ahead(arena, i, x, targets, n_targets, ahead)
     if leg == NO_WAY:
         return False
     path_m = np.empty((rules.lookahead_steps + _HELD, 3))
-    needed_m, speed_mps = _over_roofs(arena, x, end_x, end_y, -to_m[2], uas, leg)
-    n = 0
-    if leg == ROUND_CORNER:
-        ahead[0, NORTH], ahead[0, EAST] = end_x, end_y
-        ahead[0, DOWN] = min(to_m[2], x[Z]) if n_targets > 0 else x[Z]
-        ahead[0, RADIUS] = _CORNER_M
-        n = 1
-    elif n_targets == 0:
+    if ahead[0, IS_HOME] > 0.0:
         values = np.empty(3)
         towards_home(arena.vehicles[i], uas, rules, x, reference, values, command)
         altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
         share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
         write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)
         return _is_safe(arena, i, x, reference, command, 1, path_m)
-    for k in range(n, AHEAD):
-        if k - n < n_targets:
-            waypoint = arena.waypoints[targets[k - n]]
-            ahead[k, :3] = waypoint.position_m
-            ahead[k, RADIUS] = waypoint.radius_m
-        else:
-            ahead[k, :3] = uas.home_m
-            ahead[k, IS_HOME] = 1.0
     aims_m = np.empty((AHEAD, 3))
     commands, costs = np.empty((N_VELOCITIES, 3)), np.empty(N_VELOCITIES)
     weigh(

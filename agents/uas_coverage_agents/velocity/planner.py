@@ -9,7 +9,7 @@ SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-velocity"
 
 
 class LearnedVelocity(PolicyPlanner):
-    """Flies each UAS with velocities from a trained network that sees only what is around it."""
+    """Plans the routes of the fleet; one trained network commands the velocity of each UAS."""
 
     def __init__(self, options: AssistedOptions | None = None) -> None:
         super().__init__(options, SHIPPED)

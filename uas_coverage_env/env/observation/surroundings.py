@@ -75,6 +75,32 @@ def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
     return free_m if misses | (enters_m >= leaves_m) else enters_m
 
 
+@kernel
+def free_way(arena, x, y, z, dx, dy, dz, free_m):
+    """How far a ray in any direction is free of fixed obstacles and fence, at most free_m [m].
+
+    Args:
+        arena: The arena.
+        x: North of its origin [m].
+        y: East of it [m].
+        z: Down of it [m].
+        dx: Unit vector of its direction, north.
+        dy: East.
+        dz: Down.
+        free_m: How far it looks [m].
+    """
+    normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
+    for h in range(rules.fence_first, rules.fence_last):
+        slope = normals[h, 0] * dx + normals[h, 1] * dy + normals[h, 2] * dz
+        if slope > 0.0:
+            d = normals[h, 0] * x + normals[h, 1] * y + normals[h, 2] * z + offsets_m[h]
+            free_m = min(free_m, max(0.0, -d) / slope)
+    for o in range(arena.obstacles.shape[0]):
+        first, last = arena.obstacles[o].first_face, arena.obstacles[o].last_face
+        free_m = _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m)
+    return free_m
+
+
 @inlined_kernel
 def _both_ways(inside_m, slope, free_m, ahead, behind):
     """Shorten two opposite rays where a plane cuts them, inside_m away; slope is the first's."""

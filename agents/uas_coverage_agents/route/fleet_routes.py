@@ -1,0 +1,143 @@
+"""The routes of the whole fleet: built before take-off, and again when something happens."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_agents.route.layers import Layers
+from uas_coverage_agents.route.mission import MissionMaker
+from uas_coverage_agents.route.order import build, no_record, route_workspace
+from uas_coverage_env.mission import (
+    Approach,
+    Attempts,
+    Handover,
+    MissionBrief,
+    Recall,
+    WorldView,
+    first_sight,
+)
+from uas_coverage_env.world import LANDED, Command, GoTo, SwarmState
+
+BoolArray = NDArray[np.bool_]
+SAMPLES = 64
+"""Routes that are built before the best are flown; the first without noise."""
+
+_NOISE = 1.0
+_AGAIN_STEPS = 10
+
+
+class FleetRoutes:
+    """The routes of all UAS; a plan that is kept while it is right.
+
+    Args:
+        brief: The mission.
+        seed: Of the noise of samples.
+        score: `Layers` that score a waypoint.
+        home_score: `Layers` that score home.
+        samples: Sets of routes that are built; the cheapest by estimated times are flown.
+
+    Attributes:
+        view: The world as the planner sees it, at the latest update.
+    """
+
+    def __init__(
+        self, brief: MissionBrief, seed: int, score: Layers, home_score: Layers, samples: int
+    ) -> None:
+        self._score, self._home_score, self._samples = score, home_score, samples
+        self.view, self._missions = WorldView(brief), MissionMaker(brief)
+        self._attempts, self._approach = Attempts(brief), Approach(brief)
+        self._handover = Handover(brief)
+        n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
+        self._workspace, self._record = route_workspace(), no_record()
+        self._routes = np.full((n_uas, n_waypoints), -1)
+        self._lengths = np.zeros(n_uas, np.int64)
+        self._rng = np.random.default_rng(seed)
+        self._built_for: tuple[BoolArray, ...] | None = None
+        self._built_at = -_AGAIN_STEPS
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
+        self._blocked = self._renew(first_sight(brief))
+
+    def update(self, swarm: SwarmState) -> None:
+        """Go on to this sample; build the routes again where they are no longer right."""
+        self._blocked = self._renew(swarm)
+        flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
+        self._attempts.update(swarm, flown_to, self._blocked)
+
+    def of(self, u: int) -> NDArray[np.int64]:
+        """The waypoints that UAS u still has to visit, in order; home comes after them."""
+        return self._routes[u, : self._lengths[u]]
+
+    def guided(self, swarm: SwarmState, u: int) -> Command | None:
+        """The command where guidance flies a UAS: home, to what is hard to reach or blocked."""
+        if swarm.returning[u] or self._returns[u]:
+            return GoTo(None)
+        if self._lengths[u] == 0:
+            return None if swarm.departed[u] else GoTo(None)
+        target = int(self._routes[u, 0])
+        if self._attempts.is_hard(u, target):
+            return self._approach.command(swarm, u, target)
+        return GoTo(target, mode="covering") if self._blocked[target] else None
+
+    def onwards(self, u: int) -> GoTo:
+        """Guidance along the route, where nothing else knows a way."""
+        return GoTo(int(self._routes[u, 0]), mode="covering") if self._lengths[u] else GoTo(None)
+
+    def mode(self, u: int) -> Literal["covering", "return"]:
+        """What UAS u flies for."""
+        return "covering" if self._lengths[u] else "return"
+
+    def _renew(self, swarm: SwarmState) -> BoolArray:
+        self.view.update(swarm)
+        blocked = self.view.blocked()
+        wanted = self._attempts.wanted(swarm.uncovered)
+        if swarm.uncovered.any():
+            # the rule of return mode, which need not be on
+            self._returns = self._recall.update(swarm, self.view)
+        works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
+        self._forget_covered(swarm.uncovered, works)
+        if self._has_to_build(swarm, wanted, blocked, works):
+            self._build(swarm, wanted, blocked, works)
+            self._built_for, self._built_at = (wanted & blocked, works), swarm.step
+        return blocked
+
+    def _has_to_build(
+        self, swarm: SwarmState, wanted: BoolArray, blocked: BoolArray, works: BoolArray
+    ) -> bool:
+        if self._built_for is None:
+            return True
+        was_blocked, worked = self._built_for
+        left_out = wanted.copy()
+        for u in np.flatnonzero(works):
+            left_out[self._routes[u, : self._lengths[u]]] = False
+        landed = (swarm.status == LANDED) & ~left_out.any()
+        changed = (works != worked) & ~landed
+        # what is covered is no longer blocked; that changes nothing
+        turned = wanted & (blocked != was_blocked)
+        late = left_out.any() and swarm.step - self._built_at >= _AGAIN_STEPS
+        return bool(changed.any() or turned.any() or late)
+
+    def _forget_covered(self, uncovered: BoolArray, works: BoolArray) -> None:
+        for u in range(len(self._lengths)):
+            route = self._routes[u, : self._lengths[u]]
+            kept = route[uncovered[route]] if works[u] else route[:0]
+            if len(kept) < len(route):
+                self._routes[u, : len(kept)] = kept
+                self._lengths[u] = len(kept)
+
+    def _build(
+        self, swarm: SwarmState, wanted: BoolArray, blocked: BoolArray, works: BoolArray
+    ) -> None:
+        mission = self._missions.mission(swarm, works, blocked)
+        routes, lengths = self._routes.copy(), self._lengths.copy()
+        best_s = np.inf
+        for sample in range(max(self._samples, 1)):
+            cost_s = build(
+                mission, self._score, self._home_score, wanted, _NOISE if sample else 0.0,
+                self._rng, self._workspace, self._record, routes, lengths,
+            )  # fmt: skip
+            if cost_s < best_s:
+                best_s = cost_s
+                self._routes[:], self._lengths[:] = routes, lengths

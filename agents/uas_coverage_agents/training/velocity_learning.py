@@ -1,0 +1,301 @@
+"""Train velocities along routes: `python -m uas_coverage_agents.training.velocity_learning OUT`.
+
+`learned-route` is the teacher: it builds the routes, and says in every state that the pupil comes
+to which velocity it would fly there, after simulating eighty of them. The pupil, one network,
+learns to say the same without simulating anything (DAgger: Ross, Gordon, Bagnell 2011). In the
+first round the teacher flies, in the second either, then the pupil. Nothing here is tuned on the
+set `test`.
+"""
+
+import argparse
+import platform
+import time
+from collections.abc import Sequence
+from importlib.metadata import version
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from uas_coverage_agents.policy import (
+    Policy,
+    PolicyDescription,
+    ScenarioFamily,
+    Towns,
+    Training,
+    load_policy,
+    save_policy,
+)
+from uas_coverage_agents.policy.route_networks import RouteNetworks
+from uas_coverage_agents.route.layers import Layers, layers_of
+from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
+from uas_coverage_agents.route.planner import SHIPPED as TEACHER
+from uas_coverage_agents.route.velocity_layout import (
+    N_VELOCITY,
+    OUTPUTS,
+    RAYS,
+    outputs_of,
+    velocity_networks,
+)
+from uas_coverage_agents.route.velocity_runner import RouteVelocityRunner, velocity_observation
+from uas_coverage_agents.training import curve
+from uas_coverage_agents.training.checkpoint import CurvePoint
+from uas_coverage_agents.training.scenarios import town, validation_scenarios
+from uas_coverage_agents.training.score import MEASURES, fly, score
+from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_env.files.strict_toml import StrictModel
+from uas_coverage_env.flight import Assistants, rollout
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world import COMMAND_DTYPE
+
+CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
+
+
+class DaggerSettings(StrictModel):
+    """How long is flown and learned.
+
+    Attributes:
+        towns: In which is flown; each round and each training flies others.
+        rounds: Of flying, and of learning from all that was flown so far.
+        towns_per_round: How many.
+        led: Share of the steps that the teacher flies, in the first rounds; later ones: none.
+        asked: Share of the other steps in which it is asked; neighbouring ones say much the same.
+        samples: Sets of routes that are built.
+        hidden: Widths of the layers between.
+        epochs: Of learning, in each round.
+        last_epochs: In the last.
+        batch: Steps that are learned from at once.
+        rate: At which is learned at first.
+        beta: Error above which the loss (smooth L1) is linear.
+        near_weight: Further weight of steps at the foot of an obstacle, where an error costs a UAS.
+    """
+
+    towns: Towns = Towns(
+        first_seed=1_000_000, n_uas=(1, 6), n_waypoints=(20, 60), n_obstacles=(5, 20)
+    )
+    rounds: int = 6
+    towns_per_round: int = 40
+    led: tuple[float, ...] = (1.0, 0.5)
+    asked: float = 0.5
+    samples: int = 8
+    hidden: tuple[int, ...] = (96, 96)
+    epochs: int = 12
+    last_epochs: int = 40
+    batch: int = 256
+    rate: float = 2e-3
+    beta: float = 0.1
+    near_weight: float = 6.0
+
+    @property
+    def family(self) -> ScenarioFamily:
+        """What is trained on."""
+        return ScenarioFamily(name="generated", towns=self.towns)
+
+
+class Lesson(NamedTuple):
+    """What was seen, and the outputs that the teacher would have given: (N, ...) each."""
+
+    rows: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+
+
+class TaughtRunner(RouteVelocityRunner):
+    """Flies, and notes what it saw and what the teacher would have flown there.
+
+    Args:
+        policy: Of the interface "route-velocity".
+        teacher: Of the interface "route".
+        led: Share of the steps that the teacher flies.
+        settings: Of routes, and how often the teacher is asked in other steps.
+        rng: Draws the steps.
+
+    Attributes:
+        lessons: What was noted, one for each step in which it was asked.
+    """
+
+    def __init__(
+        self,
+        policy: Policy,
+        teacher: Policy,
+        led: float,
+        settings: DaggerSettings,
+        rng: np.random.Generator,
+    ) -> None:
+        super().__init__(policy, Assistants(), settings.samples)
+        self._teacher = _flight_of(teacher)
+        self._command = np.zeros(1, COMMAND_DTYPE)[0]
+        self._led, self._asked, self._rng = led, settings.asked, rng
+        self.lessons: list[Lesson] = []
+
+    def velocities(self, flown: Sequence[int]) -> NDArray[np.float64]:
+        """Those of the teacher, where it leads, or of the network."""
+        leads, asked = self._rng.random(2) < (self._led, self._asked)
+        if not (leads or asked):
+            return super().velocities(flown)
+        taught = np.array([self._taught(u) for u in flown])
+        speeds_mps = self.routes.view.arena.uas[flown]["speed_mps"]
+        outputs = outputs_of(taught, self.frames[flown], speeds_mps)
+        self.lessons.append(Lesson(self.rows[flown], outputs))
+        return taught if leads else super().velocities(flown)
+
+    def _taught(self, u: int) -> list[float]:
+        view, n = self.routes.view, min(len(self.routes.of(u)), AHEAD)
+        x, reference = view.state.x[u], view.state.reference[u]
+        if steer_along(view.arena, u, x, reference, self.ahead[u], n, self._teacher, self._command):
+            return self._command["values"][:3].tolist()
+        velocity = velocity_of(view.arena, view.state, u, self.routes.onwards(u))
+        return [velocity.north_mps, velocity.east_mps, velocity.altitude_m]
+
+
+class VelocityTraining:
+    """One training: the network, its teacher, and what was noted so far.
+
+    Args:
+        seed: Of network, samples and towns.
+        settings: How long is flown and learned.
+    """
+
+    def __init__(self, seed: int, settings: DaggerSettings | None = None) -> None:
+        torch.set_num_threads(1)
+        torch.manual_seed(seed)
+        self.settings = settings or DaggerSettings()
+        self.seed, self.teacher = seed, load_policy(TEACHER)
+        self._rng = np.random.default_rng(seed)
+        self._network = fresh_network(self.settings.hidden)
+        self._rows = torch.zeros((0, N_VELOCITY))
+        self._outputs = torch.zeros((0, OUTPUTS))
+        self._began = time.process_time(), time.monotonic()
+
+    @property
+    def steps(self) -> int:
+        """Velocities that were taught so far."""
+        return len(self._rows)
+
+    def fly_and_note(self, number: int) -> None:
+        """Fly the towns of a round, home without return mode."""
+        settings = self.settings
+        led = settings.led[number] if number < len(settings.led) else 0.0
+        runner = TaughtRunner(self.policy(), self.teacher, led, settings, self._rng)
+        first = (self.seed * settings.rounds + number) * settings.towns_per_round
+        for k in range(first, first + settings.towns_per_round):
+            scenario = town(settings.towns, k)
+            # without the filter, states come up in which it would have had to help
+            rollout(scenario, runner, return_mode=False, safety_filter=k % 2 == 0, seed=k)
+        rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
+        self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
+        self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
+
+    def fit(self, number: int) -> None:
+        """Fit the network to all that was noted, after a round."""
+        settings = self.settings
+        last = number == settings.rounds - 1
+        epochs = settings.last_epochs if last else settings.epochs
+        near = self._rows[:, RAYS].amax(dim=1, keepdim=True)
+        weight = 1.0 + settings.near_weight * near
+        optimiser = torch.optim.Adam(self._network.parameters())
+        for epoch in range(epochs):
+            optimiser.param_groups[0]["lr"] = settings.rate * (1.01 - epoch / epochs)
+            for batch in torch.randperm(len(self._rows)).split(settings.batch):
+                given = self._network(self._rows[batch])
+                errors = nn.functional.smooth_l1_loss(
+                    given, self._outputs[batch], beta=settings.beta, reduction="none"
+                )
+                optimiser.zero_grad()
+                (weight[batch] * errors).mean().backward()
+                optimiser.step()
+
+    def policy(self) -> Policy:
+        """What flies now; its orders are the teacher's."""
+        modules = [module for module in self._network if isinstance(module, nn.Linear)]
+        tensors = {n: t for n, t in self.teacher.tensors.items() if not n.startswith("flight.")}
+        for k, module in enumerate(modules):
+            for part in ("weight", "bias"):
+                array = getattr(module, part).detach().numpy().astype(np.float64)
+                tensors[f"flight.layers.{k}.{part}"] = array
+        description = PolicyDescription(
+            interface="route-velocity",
+            network=velocity_networks(_networks_of(self.teacher).order, self.settings.hidden),
+            observation=velocity_observation(),
+            scenarios=self.settings.family,
+            training=Training(
+                algorithm="DAgger, taught by learned-route",
+                settings=self.settings.model_dump(mode="json"),
+                seed=self.seed,
+                steps=self.steps,
+                process_s=round(time.process_time() - self._began[0], 1),
+                wall_s=round(time.monotonic() - self._began[1], 1),
+                machine=f"{platform.machine()}, {platform.system()}",
+            ),
+            versions={name: version(name) for name in ("numpy", "torch")},
+        )
+        return Policy(description, tensors)
+
+
+def fresh_network(hidden: tuple[int, ...]) -> nn.Sequential:
+    """A network that flies straight on at full speed."""
+    layers: list[nn.Module] = []
+    for below, above in pairwise((N_VELOCITY, *hidden)):
+        layers += [nn.Linear(below, above), nn.ReLU()]
+    last = nn.Linear(hidden[-1], OUTPUTS)
+    with torch.no_grad():
+        last.weight.zero_()
+        last.bias.copy_(torch.tensor([1.0, 0.0, 0.0]))
+    return nn.Sequential(*layers, last)
+
+
+def point_of(policy: Policy, towns: Sequence[Scenario]) -> CurvePoint:
+    """How a policy flies some towns, with both assistants."""
+    means = dict(zip(MEASURES, fly(policy, towns).mean(axis=0).tolist(), strict=True))
+    training = policy.description.training
+    return CurvePoint(
+        steps=training.steps,
+        process_s=training.process_s,
+        wall_s=training.wall_s,
+        **{name: mean for name, mean in means.items() if name in CurvePoint.model_fields},
+    )
+
+
+def _networks_of(policy: Policy) -> RouteNetworks:
+    network = policy.description.network
+    if not isinstance(network, RouteNetworks):
+        raise ValueError(f"network.kind is {network.kind!r}, not 'routes'")
+    return network
+
+
+def _flight_of(teacher: Policy) -> Layers:
+    return layers_of(_networks_of(teacher).flight, teacher.tensors, "flight.")
+
+
+def train(training: VelocityTraining, directory: Path, missions: int) -> None:
+    """Fly, learn, and again; leaves `policy/`, `learning_curve.csv` and `.png` in the directory."""
+    directory.mkdir(parents=True, exist_ok=True)
+    unseen = validation_scenarios(training.settings.family, max(missions, CURVE_MISSIONS))
+    points = [point_of(training.policy(), unseen[:CURVE_MISSIONS])]
+    for number in range(training.settings.rounds):
+        training.fly_and_note(number)
+        training.fit(number)
+        points.append(point_of(training.policy(), unseen[:CURVE_MISSIONS]))
+        curve.write(points, directory)
+        print(f"round {number + 1} of {training.settings.rounds}: {points[-1]}", flush=True)
+    policy = training.policy()
+    scored = score(fly(policy, unseen[:missions]), "generated, validation")
+    described = policy.description.model_copy(update={"score": scored})
+    save_policy(directory / "policy", described, policy.tensors)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Train, score and save."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
+    asked = parser.parse_args(argv)
+    train(VelocityTraining(asked.seed), asked.out, asked.missions)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""`learned-velocity`: routes as its plan, and one network that commands velocities along them."""
+
+import numpy as np
+import pytest
+from uas_coverage_agents.policy import Mlp, Towns, load_policy, save_policy
+from uas_coverage_agents.policy.planner import PolicyPlanner
+from uas_coverage_agents.policy.route_networks import RouteNetworks
+from uas_coverage_agents.route.leg_flight import AHEAD
+from uas_coverage_agents.route.planner import LearnedRoute, LearnedRouteOptions
+from uas_coverage_agents.route.velocity_layout import (
+    GROUPS,
+    N_FRAME,
+    N_VELOCITY,
+    OWN,
+    PLACES,
+    commanded,
+    look_along,
+    outputs_of,
+)
+from uas_coverage_agents.training.velocity_learning import (
+    DaggerSettings,
+    TaughtRunner,
+    VelocityTraining,
+    train,
+)
+from uas_coverage_agents.velocity.planner import SHIPPED
+
+from uas_coverage_env import generate_scenario, rollout
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.vehicle import VX, VY, X, Y, Z
+from uas_coverage_env.world import build_arena
+
+
+@pytest.fixture(scope="module")
+def town():
+    return generate_scenario(seed=5, n_uas=2, n_waypoints=8, n_obstacles=2)
+
+
+def _seen(arena, x, reference, targets):
+    row, frame = np.zeros(N_VELOCITY), np.zeros(N_FRAME)
+    look_along(arena, 0, x, reference, targets, len(targets), row, frame)
+    return row, frame
+
+
+def _in_the_open(turn):
+    """What is seen amid four waypoints; `turn` maps north and east to other directions."""
+    scenario = generate_scenario(seed=5, n_uas=1, n_waypoints=AHEAD, n_obstacles=0)
+    arena = build_arena(scenario)
+    middle_m = scenario.fence.vertices_m[:, :2].mean(axis=0)
+    waypoints = arena.waypoints.copy()
+    for w, place_m in enumerate([(30.0, 5.0), (45.0, 30.0), (10.0, 40.0), (0.0, 0.0)]):
+        waypoints[w]["position_m"][:2] = middle_m + turn @ place_m
+        waypoints[w]["position_m"][2] = -12.0 - w
+    x = np.zeros(14)
+    x[X], x[Y] = middle_m
+    x[Z] = -15.0
+    velocity_mps = turn @ (6.0, -2.0)
+    x[VX], x[VY] = velocity_mps
+    return _seen(arena._replace(waypoints=waypoints), x, velocity_mps, np.arange(AHEAD))
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([[1.0, 0.0], [0.0, -1.0]])],
+    ids=["turned", "mirrored"],
+)
+def test_what_it_sees_depends_neither_on_where_north_is_nor_on_the_left(turn):
+    row, frame = _in_the_open(np.eye(2))
+    other, other_frame = _in_the_open(turn)
+    np.testing.assert_allclose(other, row, atol=1e-9)
+    outputs = np.array([[0.7, -0.2, 0.3]])
+    (here,), (there,) = (
+        commanded(outputs, f[None], np.array([12.0])) for f in (frame, other_frame)
+    )
+    np.testing.assert_allclose(there[:2], turn @ here[:2], atol=1e-9)
+    assert there[2] == pytest.approx(here[2])
+
+
+def test_the_first_place_is_straight_ahead_and_the_second_on_the_positive_side():
+    row, _ = _in_the_open(np.eye(2))
+    places = row[OWN.size : OWN.size + PLACES.size].reshape(PLACES.repeats, PLACES.width)
+    way, across = PLACES.columns.way, PLACES.columns.way + 1
+    assert places[0, across] == pytest.approx(0.0, abs=1e-12)
+    assert places[0, way] > 0.0
+    assert places[1, across] >= 0.0
+    assert sum(group.size for group in GROUPS) == N_VELOCITY
+
+
+def test_outputs_are_what_they_command_and_back():
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0.0, 6.0, 5)
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    frames = np.column_stack([along, along[:, 1], -along[:, 0], rng.uniform(5.0, 40.0, 5)])
+    outputs, speeds_mps = rng.normal(size=(5, 3)), rng.uniform(8.0, 12.0, 5)
+    back = outputs_of(commanded(outputs, frames, speeds_mps), frames, speeds_mps)
+    np.testing.assert_allclose(back, outputs, atol=1e-12)
+
+
+def test_it_looks_straight_on_at_full_speed_before_training():
+    training = VelocityTraining(seed=0)
+    row, frame = _in_the_open(np.eye(2))
+    policy = training.policy()
+    network = policy.description.network
+    outputs = policy.forward(np.concatenate([np.zeros(network.inputs - N_VELOCITY), row]))
+    values = commanded(outputs[None, -3:], frame[None], np.array([12.0]))[0]
+    np.testing.assert_allclose(values[:2], 12.0 * frame[:2])
+    assert values[2] == frame[4]
+
+
+def test_where_the_teacher_leads_its_own_flight_is_flown_and_noted(town):
+    training = VelocityTraining(seed=0)
+    rng, settings = np.random.default_rng(0), DaggerSettings(samples=8)
+    runner = TaughtRunner(training.policy(), training.teacher, 1.0, settings, rng)
+    led = rollout(town, runner, return_mode=False, safety_filter=True)
+    own = rollout(town, LearnedRoute(LearnedRouteOptions(samples=8)), safety_filter=True)
+    np.testing.assert_allclose(led.x, own.x, atol=1e-6)
+    rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
+    assert len(rows) == len(outputs) > led.steps
+    assert np.abs(outputs[:, :2]).max() <= 1.0 + 1e-9
+
+
+def test_a_training_leaves_a_policy_that_flies_and_the_same_seed_the_same(town, tmp_path):
+    towns = Towns(first_seed=1_000_000, n_uas=(1, 1), n_waypoints=(4, 4), n_obstacles=(0, 1))
+    small = DaggerSettings(towns=towns, rounds=2, towns_per_round=1, epochs=1, last_epochs=2)
+    weights = []
+    for name in ("first", "again"):
+        train(VelocityTraining(3, small), tmp_path / name, missions=2)
+        policy = load_policy(tmp_path / name / "policy")
+        weights.append(policy.description.weights_sha256)
+        assert policy.description.score.missions == 2
+        assert policy.description.training.steps > 20
+        assert (tmp_path / name / "learning_curve.csv").read_text().count("\n") == 4
+    assert weights[0] == weights[1]
+    flight = rollout(town, PolicyPlanner(None, tmp_path / "first" / "policy"), max_steps=5)
+    assert flight.steps == 5
+
+
+def test_a_policy_with_another_network_or_observation_is_refused_in_one_line(tmp_path):
+    policy = load_policy(SHIPPED)
+    network, described = policy.description.network, policy.description
+    assert isinstance(network, RouteNetworks)
+    deeper = network.flight.model_copy(update={"activation": "tanh"})
+    other = described.model_copy(update={"network": network.model_copy(update={"flight": deeper})})
+    save_policy(tmp_path / "network", other, policy.tensors)
+    with pytest.raises(InputError, match="cannot be flown: its networks do not fit"):
+        PolicyPlanner(None, tmp_path / "network")
+    layout = described.observation.model_copy(update={"layout": "routes_v1"})
+    save_policy(
+        tmp_path / "layout", described.model_copy(update={"observation": layout}), policy.tensors
+    )
+    with pytest.raises(InputError, match="its observation is not that of this version"):
+        PolicyPlanner(None, tmp_path / "layout")
+    plain = Mlp(inputs=described.observation.size, hidden=(4,), outputs=3, activation="relu")
+    rng = np.random.default_rng(0)
+    save_policy(
+        tmp_path / "plain",
+        described.model_copy(update={"network": plain}),
+        {name: rng.normal(size=shape) for name, shape in plain.shapes().items()},
+    )
+    with pytest.raises(InputError, match="'mlp', not 'routes'"):
+        PolicyPlanner(None, tmp_path / "plain")
+
+
+@pytest.mark.parametrize("alone", [False, True], ids=["assisted", "alone"])
+def test_it_covers_a_town_comes_home_and_takes_a_fifth_less_than_the_nearest_waypoint(town, alone):
+    assistants = {"safety_filter": not alone, "return_mode": not alone}
+    flight = rollout(town, "learned-velocity", **assistants)
+    nearest = rollout(town, "nearest-waypoint")
+    assert coverage(flight) == 1.0
+    assert home(flight).all()
+    assert not flight.violations
+    assert energy_Wh(flight).sum() < 0.8 * energy_Wh(nearest).sum()
