@@ -94,6 +94,38 @@ def straight_directions(legs: Legs) -> FloatArray:
     return np.divide(way_m, length_m, out=np.zeros_like(way_m), where=length_m > 1e-9)
 
 
+def halved(legs: Legs, reach_m: FloatArray, step_m: float) -> Legs:
+    """Steps up to, and from the middle of legs between waypoints, in place of half of their steps.
+
+    Args:
+        legs: Of the mission.
+        reach_m: (n+1,) how far so many steps lead at most.
+        step_m: How far a step beyond the middle may end.
+    """
+    n = len(legs.before)
+    way_m = 0.5 * np.linalg.norm(legs.centre_m[None, :n] - legs.centre_m[:n, None], axis=2)
+    way_m -= legs.radius_m[:n, None]
+    before, after = legs.before.copy(), legs.after.copy()
+    before[:, :n] = np.searchsorted(reach_m, np.maximum(way_m - step_m, 0.0))
+    after[:, :n] = np.searchsorted(reach_m, np.maximum(way_m, 0.0))
+    return legs._replace(before=np.minimum(before, LONGEST), after=np.minimum(after, LONGEST))
+
+
+def end_costs(legs: Legs, turning: Turning, directions: FloatArray) -> FloatArray:
+    """(W, N) of setting off and landing, with the half of the leg next to a home; else zero."""
+    n, n_nodes = legs.before.shape
+    uas = (n_nodes - n) // 2
+    starts, ends = slice(n, n + uas), slice(n + uas, None)
+    half_m = 0.5 * np.einsum(
+        "ijx,ijx->ij", directions, legs.centre_m[None] - legs.centre_m[:n, None]
+    )
+    cost = np.zeros((n, n_nodes))
+    cost[:, starts] = turning.per_m * half_m[:, starts] + turning.start[legs.start_steps]
+    cost[:, ends] = turning.per_m * (half_m[:, ends] - legs.radius_m[ends])
+    cost[:, ends] += turning.landing[legs.landing_steps]
+    return cost
+
+
 class Triples(NamedTuple):
     """What a visit costs by the nodes visited before and after.
 

@@ -47,10 +47,10 @@ def least_routes(
         most: So many UAS fly at most; None: all may.
         cuts: What else is known of the routes.
     """
-    return _Program(cost, idle, most, cuts).solved()
+    return Program(cost, idle, most, cuts).solved()
 
 
-class _Program:
+class Program:
     """Column generation over triples, and cuts against routes that do not reach a home."""
 
     def __init__(
@@ -77,20 +77,71 @@ class _Program:
 
     def solved(self) -> float:
         """The best bound; more rounds only improve it."""
-        best, _ = self._bound(np.zeros(self._n_rows), np.zeros(len(self._cuts)))
+        self.duals = np.zeros(self._n_rows), np.zeros(len(self._cuts))
+        best, _ = self._bound(*self.duals)
         for _ in range(_ROUNDS):
-            solved = self._solve()
+            solved = self._solve(self._triples, self._cost[tuple(self._triples.T)])
             if solved is None:
                 break
-            value, share, duals, cut_duals = solved
+            value, share, duals, cut_duals, _ = solved
             bound, reduced = self._bound(duals, cut_duals)
-            best = max(best, bound)
+            if bound > best:
+                best, self.duals = bound, (duals, cut_duals)
             cuts = self._violated(share)
             added = self._add(reduced) if value - bound > _ENOUGH * abs(value) else False
             if not cuts and not added:
                 break
             self._cuts += cuts
         return best
+
+    def set_cost(self, cost: FloatArray) -> None:
+        self._cost = cost
+
+    def likely(self, reduced: FloatArray, most: float) -> IntArray:
+        """(M, 3) triples of no more than a reduced cost."""
+        upper = np.triu(np.ones(reduced.shape[1:], dtype=bool))
+        return np.argwhere((reduced < most) & upper)
+
+    def better_prices(self, flights, carried, centre, box):
+        """Prices at the middles of legs, for the flights known so far."""
+        n, nodes = self._n, self._nodes_count()
+        known = np.zeros((n, nodes, nodes), bool)
+        for j, i, k in carried._known:
+            known[j, min(i, k), max(i, k)] = True
+        plain = self._triples[~known[tuple(self._triples.T)]]
+        j, i, k = flights.triple.T
+        flown = np.stack([j, np.minimum(i, k), np.maximum(i, k)], axis=1)
+        triples = np.concatenate([plain, flown])
+        costs = np.concatenate([carried.base[tuple(plain.T)], flights.raw])
+        column = len(plain) + np.arange(len(flown))
+        place = np.full((n, n), -1)
+        arcs = []
+        first, second = i < n, k < n
+        pairs = np.concatenate([np.stack([i[first], j[first]], 1), np.stack([j[second], k[second]], 1)])
+        arcs = np.unique(pairs, axis=0)
+        place[tuple(arcs.T)] = np.arange(len(arcs))
+        six = np.arange(6)
+        rows, cols, vals = [], [], []
+        for which, sign, side, a, b in ((first, -1.0, 0, i, j), (second, 1.0, 1, j, k)):
+            at = place[a[which], b[which]]
+            rows.append((6 * at[:, None] + six).ravel())
+            cols.append(np.repeat(column[which], 6))
+            vals.append(sign * flights.state[which, side].reshape(-1, 6).ravel())
+        mid = centre[tuple(arcs.T)].reshape(-1)
+        half = np.tile(np.repeat(box, 2), len(arcs))
+        slack = np.concatenate([mid + half, half - mid])
+        solved = self._solve(
+            triples, costs,
+            ((np.concatenate(rows), np.concatenate(cols), np.concatenate(vals)), 6 * len(arcs), slack),
+        )
+        price = centre.copy()
+        if solved is not None:
+            self.model = solved[0]
+            price[tuple(arcs.T)] = solved[4].reshape(-1, 3, 2)
+        return price
+
+    def _nodes_count(self):
+        return self._n_nodes
 
     def _first(self) -> IntArray:
         """Triples of the cheapest neighbours of each waypoint, and of the homes."""
@@ -109,9 +160,9 @@ class _Program:
         """Of an edge in its equation: its two ends see it with opposite signs."""
         return np.where(waypoint < neighbour, 1, -1)
 
-    def _solve(self) -> tuple[float, FloatArray, FloatArray, FloatArray] | None:
+    def _solve(self, triples, costs, carried=None):
         """Value, shares of the triples, prices of the equations and of the cuts; None: none."""
-        waypoint, *neighbours = self._triples.T
+        waypoint, *neighbours = triples.T
         columns = np.arange(len(waypoint))
         entries: list[tuple[IntArray, IntArray, FloatArray]]
         entries = [(waypoint, columns, np.ones(len(waypoint)))]
@@ -121,20 +172,32 @@ class _Program:
         used = len(columns) + np.arange(self._uas)
         homes = self._n_rows - 2 * self._uas + np.arange(2 * self._uas)
         entries.append((homes, np.tile(used, 2), -np.ones(2 * self._uas)))
+        n_more = 0
+        slack = np.zeros(0)
+        if carried is not None:
+            (row, column, value), n_more, slack = carried
+            entries.append((self._n_rows + row, column, value))
         row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-        shape = self._n_rows, len(columns) + self._uas + len(self._cuts)
+        n_cuts = len(self._cuts)
+        basic = len(columns) + self._uas + n_cuts
+        if n_more:  # prices within their box
+            k = np.arange(n_more)
+            row = np.concatenate([row, self._n_rows + k, self._n_rows + k])
+            column = np.concatenate([column, basic + k, basic + n_more + k])
+            value = np.concatenate([value, np.ones(n_more), -np.ones(n_more)])
+        shape = self._n_rows + n_more, basic + 2 * n_more
         equations = coo_matrix((value, (row, column)), shape).tocsr()
-        right = np.zeros(self._n_rows)
+        right = np.zeros(shape[0])
         right[: self._n] = 1.0
         kept = np.flatnonzero(np.diff(equations.indptr))
-        cost = np.append(self._cost[tuple(self._triples.T)], np.full(self._uas, -self._idle))
-        cost = np.append(cost, np.full(len(self._cuts), self._penalty))
+        cost = np.append(costs, np.full(self._uas, -self._idle))
+        cost = np.concatenate([cost, np.full(n_cuts, self._penalty), slack])
         bounds = np.zeros((len(cost), 2))
         bounds[:, 1] = 1.0
-        bounds[shape[1] - len(self._cuts) :, 1] = np.inf
+        bounds[basic - n_cuts :, 1] = np.inf
         found = linprog(
             cost,
-            A_ub=self._inequalities(shape[1]),
+            A_ub=self._inequalities(triples, shape[1]),
             b_ub=[self._most, *(-2.0 * cut.routes for cut in self._cuts)],
             A_eq=equations[kept],
             b_eq=right[kept],
@@ -143,17 +206,19 @@ class _Program:
         )
         if not found.success:  # these triples do not suffice
             return None
-        duals = np.zeros(self._n_rows)
+        duals = np.zeros(shape[0])
         duals[kept] = found.eqlin.marginals
         cut_duals = np.maximum(-found.ineqlin.marginals[1:], 0.0)
-        return float(found.fun), found.x[: len(columns)], duals, cut_duals
+        share = found.x[: len(columns)]
+        return float(found.fun), share, duals[: self._n_rows], cut_duals, duals[self._n_rows :]
 
-    def _inequalities(self, n_columns: int) -> csr_matrix:
+    def _inequalities(self, triples, n_columns: int) -> csr_matrix:
         """UAS that fly; then, negative, the edges that leave each set, by their ends within it."""
-        waypoint, a, b = self._triples.T
+        waypoint, a, b = triples.T
+        n = len(waypoint) + self._uas
         rows = np.zeros((1 + len(self._cuts), n_columns))
-        rows[0, len(waypoint) : len(waypoint) + self._uas] = 1.0
-        rows[1:, len(waypoint) + self._uas :] = -np.eye(len(self._cuts))  # at a penalty
+        rows[0, len(waypoint) : n] = 1.0
+        rows[1:, n : n + len(self._cuts)] = -np.eye(len(self._cuts))  # at a penalty
         for row, cut in zip(rows[1:], self._cuts, strict=True):
             inside = self._nodes(cut)
             leave = (~inside[a]).astype(float) + ~inside[b]
