@@ -28,6 +28,7 @@ _LIKELY = 0.05  # share of the cost of a step that a triple may cost too much
 
 class _Leg(NamedTuple):
     """A way between two nodes."""
+
     half_m: float
     options: tuple[Half, ...]
 
@@ -58,6 +59,7 @@ class Carried:
         self._cut[:, :n] = (d > radius[:n, None]) & (d > radius[None, :n])
         self._largest = passing.motion.largest
         self.price = np.zeros((n, n, 3, 2))  # on the way from i to j
+        self._z: dict[int, FloatArray] = {}
         self._known: dict[tuple[int, int, int], int] = {}
         self._triple = np.zeros((0, 3), int)  # directed
         self._case = np.zeros((0,), int)
@@ -126,42 +128,60 @@ class Carried:
         keys = self._triple @ np.array([self._nodes**2, self._nodes, 1])
         upper: dict[int, float] = flights.upper(price_of=self.price)
         most = np.array([upper.get(key, np.inf) for key in keys.tolist()])
-        todo = np.flatnonzero((lower < most + 0.5) & (changed > 1e-9) | ~np.isfinite(self._value))
+        todo = np.flatnonzero((lower < most + 0.0) & (changed > 1e-9) | ~np.isfinite(self._value))
         groups: dict[tuple[Half, Half], list[int]] = {}
         for case in todo.tolist():
             groups.setdefault(self._halves[case], []).append(case)
         for halves, cases in groups.items():
-            rows = np.array(cases)
-            j, i, k = self._triple[rows].T
-            along = np.stack([-self._along[j, i], self._along[j, k]], axis=1)
-            per_m = self._passing.costs.per_m
-            passed = self._passing.least(
-                halves,
-                Passages(
-                    self._legs.radius_m[j],
-                    along,
-                    np.stack([self._half_m[j, i], self._half_m[j, k]], axis=1),
-                    per_m * along,
-                    price[rows],
-                ),
-            )
-            extra = self._extra[j, i] + self._extra[j, k]
-            self._value[rows] = passed.cost + extra
-            self._at[rows] = price[rows]
-            lower[rows] = self._value[rows]
-            raw = passed.paid + extra + per_m * (
-                np.einsum("na,na->n", along[:, 0], passed.place_m[:, 0])
-                - np.einsum("na,na->n", along[:, 1], passed.place_m[:, 1])
-            )
-            flights.add(self._triple[rows], raw, passed.state)
+            warm = [case for case in cases if case in self._z]
+            for cases in (warm, [case for case in cases if case not in self._z]):
+                if not cases:
+                    continue
+                rows = np.array(cases)
+                begin = np.array([self._z[case] for case in cases]) if cases is warm else None
+                j, i, k = self._triple[rows].T
+                plain = self.base[j, i, k]
+                enough = np.minimum(plain + 2.0 * self._passing.costs.step, most[rows] + 20.0)
+                along = np.stack([-self._along[j, i], self._along[j, k]], axis=1)
+                per_m = self._passing.costs.per_m
+                passed = self._passing.least(
+                    halves,
+                    Passages(
+                        self._legs.radius_m[j],
+                        along,
+                        np.stack([self._half_m[j, i], self._half_m[j, k]], axis=1),
+                        per_m * along,
+                        price[rows],
+                        enough,
+                    ),
+                    begin,
+                )
+                for row, z in zip(rows.tolist(), passed.z):
+                    self._z[row] = z
+                extra = self._extra[j, i] + self._extra[j, k]
+                self._value[rows] = passed.cost + extra
+                self._at[rows] = price[rows]
+                lower[rows] = self._value[rows]
+                raw = (
+                    passed.paid
+                    + extra
+                    + per_m
+                    * (
+                        np.einsum("na,na->n", along[:, 0], passed.place_m[:, 0])
+                        - np.einsum("na,na->n", along[:, 1], passed.place_m[:, 1])
+                    )
+                )
+                flights.add(self._triple[rows], raw, passed.state)
         self.evaluated = len(todo)
         # all triples: what they cost without prices, less what these may be worth
         n, nodes = self._n, self._nodes
         worth = np.zeros((n, nodes))
         into = self._support(self.price)  # (i, j)
         cost = np.full((n, nodes, nodes), np.inf)
-        before = np.zeros((n, nodes)); before[:, :n] = into.T
-        after = np.zeros((n, nodes)); after[:, :n] = into
+        before = np.zeros((n, nodes))
+        before[:, :n] = into.T
+        after = np.zeros((n, nodes))
+        after[:, :n] = into
         directed = self.base - before[:, :, None] - after[:, None, :]
         j, i, k = self._triple.T
         if len(j):
@@ -213,7 +233,7 @@ class Flights:
 def priced_routes(carried: Carried, idle: float, cuts, rounds=ROUNDS, show=None) -> float:
     flights = Flights(carried._nodes, carried._n)
     scale = carried._passing.costs.step / carried._largest  # price that is worth a step
-    box = 0.15
+    box = 0.04
     best, centre = -np.inf, carried.price.copy()
     program = Program(carried.base, idle, None, cuts)
     for r in range(rounds):
@@ -230,6 +250,14 @@ def priced_routes(carried: Carried, idle: float, cuts, rounds=ROUNDS, show=None)
         before = len(carried._known)
         carried.explore(used)
         if show:
-            show(r, value, best, carried.evaluated, len(carried._known) - before, box, len(flights.raw))
+            show(
+                r,
+                value,
+                best,
+                carried.evaluated,
+                len(carried._known) - before,
+                box,
+                len(flights.raw),
+            )
         carried.price = program.better_prices(flights, carried, centre, box * scale)
     return best

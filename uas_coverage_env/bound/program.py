@@ -117,7 +117,9 @@ class Program:
         place = np.full((n, n), -1)
         arcs = []
         first, second = i < n, k < n
-        pairs = np.concatenate([np.stack([i[first], j[first]], 1), np.stack([j[second], k[second]], 1)])
+        pairs = np.concatenate(
+            [np.stack([i[first], j[first]], 1), np.stack([j[second], k[second]], 1)]
+        )
         arcs = np.unique(pairs, axis=0)
         place[tuple(arcs.T)] = np.arange(len(arcs))
         six = np.arange(6)
@@ -131,8 +133,13 @@ class Program:
         half = np.tile(np.repeat(box, 2), len(arcs))
         slack = np.concatenate([mid + half, half - mid])
         solved = self._solve(
-            triples, costs,
-            ((np.concatenate(rows), np.concatenate(cols), np.concatenate(vals)), 6 * len(arcs), slack),
+            triples,
+            costs,
+            (
+                (np.concatenate(rows), np.concatenate(cols), np.concatenate(vals)),
+                6 * len(arcs),
+                slack,
+            ),
         )
         price = centre.copy()
         if solved is not None:
