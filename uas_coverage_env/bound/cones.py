@@ -16,10 +16,10 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 _LAST = 0.02  # weight of the barrier, in costs
 _SHARPER = 0.3
 _DONE = 0.6  # share of a Newton step after which the barrier is lowered
-_NEAR = 0.98  # share of the way to the nearest limit that is tried
+_NEAR = 0.7  # share of the way to the nearest limit that is tried
 _TRIED = 6
 _GAP = 1.0  # that is left, in costs
-_ITERATIONS = 60
+_ITERATIONS = 120
 
 
 @allocating_kernel
