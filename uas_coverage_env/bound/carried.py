@@ -1,270 +1,238 @@
-"""The least cost of routes where what a flight carries from one turn to the next has a price.
+"""The least cost of routes where the velocity in the middle of each leg has a price.
 
-See docs/bound.md, "Prices for what is carried".
+See docs/bound.md, "From the middle of a leg to the next".
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix
 
-from uas_coverage_env.bound.legs import Legs, end_costs, straight_directions
+from uas_coverage_env.bound.legs import Legs, end_costs, straight_directions, with_middles
 from uas_coverage_env.bound.passing import Half, Passages, Passing, at_least, exactly, some
-from uas_coverage_env.bound.program import Program
+from uas_coverage_env.bound.program import Columns, Cut, Program
+from uas_coverage_env.bound.turning import Turning
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
-ROUNDS = 12
+_ROUNDS = 14  # in which prices are sought
+_SURE = 6  # rounds in which triples that only seemed to matter are looked at
 _MORE = 2  # numbers of steps beyond the least that are told apart
-_LONGEST = 4  # steps next to a visit
-_NEXT_TO_MIDDLE = 2
-_LIKELY = 1.5  # share of the cost of a step that a triple may cost too much
-
-
-class _Leg(NamedTuple):
-    """A way between two nodes."""
-
-    half_m: float
-    options: tuple[Half, ...]
+_MOST_STEPS = 5  # that are counted without a gap
+_VISIT, _MIDDLE = 4, 2  # steps next to either end of a gap, at most
+_LIKELY = 5.0  # J: a triple that misses the least reduced cost by more may be left out
+_WIDE = 2.0  # steps: a flight that costs so much more than its triple is not looked at closely
+_RANGE = 0.1  # of a price in the first round, over that at which full speed is worth a step
+_GROW, _SHRINK = 1.2, 0.6
 
 
 class Carried:
-    """Prices of velocity, tilt and rate at the middle of legs, and what triples cost by them.
+    """Prices, and what triples cost by them.
 
     Args:
-        legs: Of the mission.
+        legs: Of the mission, with the steps to their middles.
         passing: Of the vehicle.
-        cost: (W, N, N) of all triples without these prices.
+        turning: Of the vehicle.
+        plain: (W, N, N) costs of all triples without these prices.
         reach_m: (n+1,) how far so many steps lead at most.
-        from_home: (W, N) further cost of a leg that comes from there or leads there.
     """
 
-    def __init__(self, legs, passing, cost, reach_m, turning) -> None:
-        self._legs, self._passing = legs, passing
-        self.base = cost
-        n, nodes = legs.before.shape
-        self._n, self._nodes = n, nodes
+    def __init__(
+        self, legs: Legs, passing: Passing, turning: Turning, plain: FloatArray, reach_m: FloatArray
+    ) -> None:
+        self._legs, self._passing, self._plain, self._reach_m = legs, passing, plain, reach_m
+        self._n, self._n_nodes = legs.before.shape
         self._along = straight_directions(legs)
-        self._half_m = 0.5 * np.linalg.norm(legs.centre_m[None] - legs.centre_m[:n, None], axis=2)
-        self._extra = end_costs(legs, turning, self._along)
-        self._reach_m = reach_m
-        radius = legs.radius_m
-        self._cut = np.zeros((n, nodes), bool)
-        d = self._half_m[:, :n]
-        self._cut[:, :n] = (d > radius[:n, None]) & (d > radius[None, :n])
-        self._largest = passing.motion.largest
-        self.price = np.zeros((n, n, 3, 2))  # on the way from i to j
-        self._z: dict[int, FloatArray] = {}
-        self._known: dict[tuple[int, int, int], int] = {}
-        self._triple = np.zeros((0, 3), int)  # directed
-        self._case = np.zeros((0,), int)
+        way_m = legs.centre_m[None] - legs.centre_m[: self._n, None]
+        self._half_m = 0.5 * np.linalg.norm(way_m, axis=2)
+        self._ends = end_costs(legs, turning, self._along)
+        self._priced = with_middles(legs)
+        self._price = np.zeros((self._n, self._n_nodes, 2))
+        """Of a m/s in the middle of a leg, from waypoint to waypoint."""
+        self._known: set[tuple[int, int, int]] = set()
+        # triples in the order of flight, by numbers of steps, with what they cost at which prices
+        self._triple = np.zeros((0, 3), dtype=np.int64)
         self._halves: list[tuple[Half, Half]] = []
-        self._value = np.zeros(0)
-        self._at = np.zeros((0, 2, 3, 2))
+        self._cost = np.zeros(0)
+        self._at = np.zeros((0, 2, 2))
+        self._flown: dict[int, FloatArray] = {}
+        # flights: triple in the order of flight, cost without prices, velocities
+        self._flights = np.zeros((0, 3), dtype=np.int64)
+        self._paid = np.zeros(0)
+        self._velocity = np.zeros((0, 2, 2))
 
-    def options(self, at: int, node: int, after: bool) -> tuple[Half, ...]:
-        steps = int((self._legs.after if after else self._legs.before)[at, node])
-        if not self._cut[at, node]:
-            return (some(steps),)
-        way = self._half_m[at, node] - self._legs.radius_m[at]
-        if not after:
-            way -= self._passing.costs.step_m
-        least = int(np.searchsorted(self._reach_m, max(way, 0.0)))
-        if after:
-            least = max(least, 1)
-        found = []
-        if least + _MORE <= 5:
-            found = [exactly(least + k) for k in range(_MORE + 1)]
-            least += _MORE + 1
-        middle = min(_NEXT_TO_MIDDLE, max(least - 1, 1))
-        if least < 2:
-            return (*found, some(0))
-        return (*found, at_least(middle, min(least - middle, _LONGEST)))
+    def least_routes(self, idle: float, cuts: Sequence[Cut]) -> float:
+        """A lower bound on the cost of routes that visit every waypoint once.
 
-    def explore(self, triples: IntArray) -> None:
-        """Take in triples (undirected: waypoint, node, node)."""
-        new = []
-        for j, a, b in triples.tolist():
-            for i, k in ((a, b), (b, a)):
-                if (j, i, k) in self._known or not self._flies(i, k):
-                    continue
-                self._known[j, i, k] = 1
-                for first in self.options(j, i, False):
-                    for second in self.options(j, k, True):
-                        new.append((j, i, k))
-                        self._halves.append((first, second))
-        if new:
-            self._triple = np.concatenate([self._triple, np.array(new)])
-            more = len(new)
-            self._value = np.append(self._value, np.full(more, -np.inf))
-            self._at = np.concatenate([self._at, np.zeros((more, 2, 3, 2))])
+        Args:
+            idle: Cost of a UAS that stays at home.
+            cuts: What else is known of the routes.
+        """
+        program = Program(self._plain, idle, cuts)
+        best, around = -math.inf, self._price
+        width = _RANGE * self._passing.costs.step / self._passing.motion.largest[0]
+        for _ in range(_ROUNDS):
+            value = self._solved(program, sure=False)
+            if value > best:
+                best, around, width = value, self._price, width * _GROW
+            else:
+                width *= _SHRINK
+            self._explore(program.likely(_LIKELY))
+            self._price = self._better_price(program, around, width)
+        self._price = around
+        best = -math.inf
+        for _ in range(_SURE):
+            best = max(best, self._solved(program, sure=True))
+            if not self._explore(program.likely(_LIKELY)):
+                break
+        return best
 
-    def _flies(self, i: int, k: int) -> bool:
-        uas = (self._nodes - self._n) // 2
-        return i < self._n + uas and (k < self._n or k >= self._n + uas)
+    def _solved(self, program: Program, sure: bool) -> float:
+        program.cost = self._costs(sure)
+        return program.solved()
 
-    def _prices(self, triple: IntArray) -> FloatArray:
-        j, i, k = triple.T
-        price = np.zeros((len(triple), 2, 3, 2))
-        inner = i < self._n
-        price[inner, 0] = self.price[i[inner], j[inner]]
-        inner = k < self._n
-        price[inner, 1] = self.price[j[inner], k[inner]]
-        return price
+    def _costs(self, sure: bool) -> FloatArray:
+        """(W, N, N) what all triples cost at least at the prices.
 
-    def _support(self, price: FloatArray) -> FloatArray:
-        return np.linalg.norm(price, axis=-1) @ self._largest
-
-    def evaluate(self, flights, certify=True) -> FloatArray:
-        """(W, N, N) lower bounds of all triples at the prices."""
-        price = self._prices(self._triple)
-        changed = self._support(price - self._at).sum(axis=1)
-        lower = self._value - changed
-        keys = self._triple @ np.array([self._nodes**2, self._nodes, 1])
-        upper: dict[int, float] = flights.upper(price_of=self.price)
-        most = np.array([upper.get(key, np.inf) for key in keys.tolist()])
-        todo = np.flatnonzero((lower < most + 0.0) & (changed > 1e-9) | ~np.isfinite(self._value))
-        groups: dict[tuple[Half, Half], list[int]] = {}
-        for case in todo.tolist():
-            groups.setdefault(self._halves[case], []).append(case)
-        for halves, cases in groups.items():
-            warm = [case for case in cases if case in self._z]
-            for cases in (warm, [case for case in cases if case not in self._z]):
-                if not cases:
-                    continue
-                rows = np.array(cases)
-                begin = np.array([self._z[case] for case in cases]) if cases is warm else None
-                j, i, k = self._triple[rows].T
-                plain = self.base[j, i, k]
-                enough = np.minimum(plain + 2.0 * self._passing.costs.step, most[rows] + 20.0)
-                along = np.stack([-self._along[j, i], self._along[j, k]], axis=1)
-                per_m = self._passing.costs.per_m
-                passed = self._passing.least(
-                    halves,
-                    Passages(
-                        self._legs.radius_m[j],
-                        along,
-                        np.stack([self._half_m[j, i], self._half_m[j, k]], axis=1),
-                        per_m * along,
-                        price[rows],
-                        enough,
-                    ),
-                    begin,
-                )
-                for row, z in zip(rows.tolist(), passed.z):
-                    self._z[row] = z
-                extra = self._extra[j, i] + self._extra[j, k]
-                self._value[rows] = passed.cost + extra
-                self._at[rows] = price[rows]
-                lower[rows] = self._value[rows]
-                raw = (
-                    passed.paid
-                    + extra
-                    + per_m
-                    * (
-                        np.einsum("na,na->n", along[:, 0], passed.place_m[:, 0])
-                        - np.einsum("na,na->n", along[:, 1], passed.place_m[:, 1])
-                    )
-                )
-                good = np.isfinite(raw) & (passed.cost + extra < enough)
-                flights.add(self._triple[rows][good], raw[good], passed.state[good])
-        self.evaluated = len(todo)
-        # all triples: what they cost without prices, less what these may be worth
-        n, nodes = self._n, self._nodes
-        worth = np.zeros((n, nodes))
-        into = self._support(self.price)  # (i, j)
-        cost = np.full((n, nodes, nodes), np.inf)
-        before = np.zeros((n, nodes))
-        before[:, :n] = into.T
-        after = np.zeros((n, nodes))
-        after[:, :n] = into
-        sure = self.base - before[:, :, None] - after[:, None, :]
-        directed = sure if certify else self.base.copy()
-        j, i, k = self._triple.T
-        if len(j):
-            found = np.full((n, nodes, nodes), np.inf)
-            np.minimum.at(found, (j, i, k), lower)
-            directed = np.where(np.isfinite(found), np.maximum(found, sure), directed)
-        uas = (nodes - n) // 2
-        flies = np.zeros((nodes, nodes), bool)
-        flies[: n + uas] = True
-        flies[:, n : n + uas] = False
-        directed = np.where(flies, directed, np.inf)
+        Args:
+            sure: Also those that have not been looked at, which is left out of the search.
+        """
+        cost = self._cost_of_flights()
+        worth = np.linalg.norm(self._price, axis=2) * self._passing.motion.largest[0]
+        into = np.zeros_like(worth)
+        into[:, : self._n] = worth[:, : self._n].T
+        least = self._plain - into[:, :, None] - worth[:, None]
+        found = np.full_like(least, np.inf)
+        np.minimum.at(found, tuple(self._triple.T), cost)
+        directed = np.where(
+            np.isfinite(found), np.maximum(found, least), least if sure else self._plain
+        )
+        directed = np.where(self._flown_so(), directed, np.inf)
         return np.minimum(directed, directed.transpose(0, 2, 1))
 
+    def _flown_so(self) -> NDArray[np.bool_]:
+        """(N, N) whether a node may come before another: no start is flown to, no end left."""
+        uas = (self._n_nodes - self._n) // 2
+        node = np.arange(self._n_nodes)
+        before, after = node < self._n + uas, (node < self._n) | (node >= self._n + uas)
+        return before[:, None] & after
 
-class Flights:
-    """Flights past waypoints: columns of the program."""
+    def _explore(self, triples: IntArray) -> bool:
+        """Look at further triples; whether there are any."""
+        flown_so, new, before = self._flown_so(), [], len(self._halves)
+        for j, *ends in triples.tolist():
+            for i, k in (ends, ends[::-1]):
+                if (j, i, k) not in self._known and flown_so[i, k]:
+                    self._known.add((j, i, k))
+                    pairs = [
+                        (first, second)
+                        for first in self._options(j, i, after=False)
+                        for second in self._options(j, k, after=True)
+                    ]
+                    self._halves += pairs
+                    new += [(j, i, k)] * len(pairs)
+        more = len(self._halves) - before
+        self._triple = np.concatenate([self._triple, np.array(new, dtype=np.int64).reshape(-1, 3)])
+        self._cost = np.append(self._cost, np.full(more, -np.inf))
+        self._at = np.concatenate([self._at, np.zeros((more, 2, 2))])
+        return more > 0
 
-    def __init__(self, nodes: int, waypoints: int) -> None:
-        self._nodes, self._n = nodes, waypoints
-        self.triple = np.zeros((0, 3), int)
-        self.raw = np.zeros(0)
-        self.state = np.zeros((0, 2, 3, 2))
+    def _options(self, waypoint: int, node: int, after: bool) -> list[Half]:
+        """The numbers of steps of half a leg, all together."""
+        counted = self._legs.after if after else self._legs.before
+        if not self._priced[waypoint, node]:
+            return [some(int(counted[waypoint, node]))]
+        way_m = self._half_m[waypoint, node] - self._legs.radius_m[waypoint]
+        way_m -= 0.0 if after else self._passing.costs.step_m
+        least, found = int(np.searchsorted(self._reach_m, max(way_m, 0.0))), []
+        if least + _MORE <= _MOST_STEPS:
+            found = [exactly(least + k) for k in range(_MORE + 1)]
+            least += _MORE + 1
+        return [*found, at_least(_MIDDLE, min(least - _MIDDLE, _VISIT))]
 
-    def add(self, triple, raw, state) -> None:
-        self.triple = np.concatenate([self.triple, triple])
-        self.raw = np.append(self.raw, raw)
-        self.state = np.concatenate([self.state, state])
+    def _prices_of(self, triple: IntArray) -> FloatArray:
+        """(M, 2, 2) at both middles."""
+        j, i, k = triple.T
+        before = np.where((i < self._n)[:, None], self._price[np.minimum(i, self._n - 1), j], 0.0)
+        return np.stack([before, self._price[j, k]], axis=1)
 
-    def values(self, price_of) -> FloatArray:
-        j, i, k = self.triple.T
-        value = self.raw.copy()
-        inner = i < self._n
-        value[inner] += (price_of[i[inner], j[inner]] * self.state[inner, 0]).sum(axis=(1, 2))
-        inner = k < self._n
-        value[inner] -= (price_of[j[inner], k[inner]] * self.state[inner, 1]).sum(axis=(1, 2))
-        return value
+    def _cost_of_flights(self) -> FloatArray:
+        """Lower bounds of all cases; those that may be the least of their triple are new."""
+        price = self._prices_of(self._triple)
+        change = np.linalg.norm(price - self._at, axis=2).sum(axis=1)
+        cost = self._cost - change * self._passing.motion.largest[0]
+        known = np.full(self._plain.shape, np.inf)
+        sides = np.einsum("mea,mea->me", self._prices_of(self._flights), self._velocity)
+        np.minimum.at(known, tuple(self._flights.T), self._paid + sides[:, 0] - sides[:, 1])
+        enough = self._plain + _WIDE * self._passing.costs.step
+        enough = np.minimum(known, enough)[tuple(self._triple.T)]
+        groups: dict[tuple[tuple[Half, Half], bool], list[int]] = {}
+        for case in np.flatnonzero((cost < enough) & ((change > 0.0) | np.isinf(cost))).tolist():
+            groups.setdefault((self._halves[case], case in self._flown), []).append(case)
+        for (halves, again), cases in groups.items():
+            cost[cases] = self._passed(halves, np.array(cases), price[cases], enough[cases], again)
+        return cost
 
-    def upper(self, price_of) -> dict[int, float]:
-        if not len(self.raw):
-            return {}
-        value = self.values(price_of)
-        keys = self.triple @ np.array([self._nodes**2, self._nodes, 1])
-        found: dict[int, float] = {}
-        for key, one in zip(keys.tolist(), value.tolist(), strict=True):
-            found[key] = min(one, found.get(key, np.inf))
-        return found
+    def _passed(
+        self,
+        halves: tuple[Half, Half],
+        cases: IntArray,
+        price: FloatArray,
+        enough: FloatArray,
+        again: bool,
+    ) -> FloatArray:
+        """Costs of cases with the same numbers of steps; flights that come close are kept."""
+        j, i, k = self._triple[cases].T
+        along = np.stack([-self._along[j, i], self._along[j, k]], axis=1)
+        half_m = np.stack([self._half_m[j, i], self._half_m[j, k]], axis=1)
+        per_m = self._passing.costs.per_m
+        ends = self._ends[j, i] + self._ends[j, k]
+        passages = Passages(
+            self._legs.radius_m[j], along, half_m, per_m * along, price, enough - ends
+        )
+        begin = np.array([self._flown[case] for case in cases.tolist()]) if again else None
+        passed = self._passing.least(halves, passages, begin)
+        self._flown.update(zip(cases.tolist(), passed.z, strict=True))
+        ahead_m = np.einsum("mea,mea->me", along, passed.place_m)
+        paid = passed.paid + ends + per_m * (ahead_m[:, 0] - ahead_m[:, 1])
+        good = np.isfinite(paid) & (passed.cost + ends < enough)
+        self._flights = np.concatenate([self._flights, self._triple[cases][good]])
+        self._paid = np.append(self._paid, paid[good])
+        self._velocity = np.concatenate([self._velocity, passed.velocity_mps[good]])
+        self._cost[cases], self._at[cases] = passed.cost + ends, price
+        return passed.cost + ends
 
-
-def priced_routes(carried: Carried, idle: float, cuts, rounds=ROUNDS, show=None) -> float:
-    flights = Flights(carried._nodes, carried._n)
-    scale = carried._passing.costs.step / carried._largest  # price that is worth a step
-    box = 0.1
-    best, centre = -np.inf, carried.price.copy()
-    program = Program(carried.base, idle, None, cuts)
-    import os
-    mask = np.array(eval(os.environ.get("MASK", "[1,0,0]")))[:, None]
-    scale = scale[:, None] * mask
-    box = float(os.environ.get("BOX", "0.3"))
-    price = carried.price
-    for r in range(rounds):
-        carried.price = price
-        certify = r >= rounds - 4
-        if certify:
-            carried.price = centre
-            if r == rounds - 4: best = -np.inf
-        cost = carried.evaluate(flights, certify)
-        program.set_cost(cost)
-        value = program.solved()
-        _, reduced = program._bound(*program.duals)
-        reduced = reduced - reduced.min(axis=(1, 2), keepdims=True)
-        used = program.likely(reduced, 5.0)
-        if value > best or r == 1:
-            best, centre = value, carried.price.copy()
-            box *= 1.2
-        else:
-            box *= 0.6
-        before = len(carried._known)
-        carried.explore(used)
-        if show:
-            show(r, value, best, carried.evaluated, len(carried._known) - before, box, len(flights.raw))
-        if not certify:
-            price = program.better_prices(flights, carried, centre, (box * scale)[:, 0])
-            print('   model', getattr(program, 'model', 0) / 3600)
-    return best
+    def _better_price(self, program: Program, around: FloatArray, width: float) -> FloatArray:
+        """The best prices for the flights that are known, not far from others."""
+        if not len(self._paid):
+            return around
+        j, i, k = self._flights.T
+        rows, columns, carried, legs = [], [], [], []
+        for side, sign, a, b in ((0, -1.0, i, j), (1, 1.0, j, k)):
+            flight = np.flatnonzero(self._priced[j, i if side == 0 else k])
+            legs.append(self._n_nodes * a[flight] + b[flight])
+            columns.append(flight)
+            carried.append(sign * self._velocity[flight, side])
+        used, place = np.unique(np.concatenate(legs), return_inverse=True)
+        rows = (2 * place[:, None] + np.arange(2)).ravel()
+        at = np.divmod(used, self._n_nodes)
+        middle = around[at].ravel()
+        triples = np.stack([j, np.minimum(i, k), np.maximum(i, k)], axis=1)
+        found = program.prices(
+            Columns(
+                self._plain,
+                triples,
+                self._paid,
+                (rows, np.repeat(np.concatenate(columns), 2), np.concatenate(carried).ravel()),
+                middle - width,
+                middle + width,
+            )
+        )
+        price = around.copy()
+        if found is not None:
+            price[at] = found.reshape(-1, 2)
+        return price

@@ -18,8 +18,7 @@ from uas_coverage_env.bound.turning import Motion
 FloatArray = NDArray[np.float64]
 
 _FIRST, _WARM = 30.0, 1.0  # weights of the barrier, in costs
-_MISSED = 10.0  # price of missing a middle, over that of a metre
-_AT_ONCE = 1024
+_MISSED = 10.0  # price of missing a middle, over that of a metre: no higher ones are of use
 
 
 class Half(NamedTuple):
@@ -61,7 +60,7 @@ class Passages(NamedTuple):
         along: (N, 2, 2) unit vectors along the leg before and the leg after.
         half_m: (N, 2) from the waypoint to the middle of each.
         price: (N, 2, 2) of a metre, from above: a vector for each leg, of length per_m.
-        state_price: (N, 2, 3, 2) of velocity, tilt and rate at each middle.
+        velocity_price: (N, 2, 2) of a m/s at each middle: a vector.
         enough: (N,) a bound above which it does not matter how good it is.
     """
 
@@ -69,7 +68,7 @@ class Passages(NamedTuple):
     along: FloatArray
     half_m: FloatArray
     price: FloatArray
-    state_price: FloatArray
+    velocity_price: FloatArray
     enough: FloatArray
 
 
@@ -79,14 +78,14 @@ class Passed(NamedTuple):
     Attributes:
         cost: (N,) lower bounds.
         place_m: (N, 2, 2) position at each middle, relative to the middle, less the potential.
-        state: (N, 2, 3, 2) velocity, tilt and rate there.
+        velocity_mps: (N, 2, 2) there.
         paid: (N,) what that flight pays for its steps.
         z: (N, size) that flight, to begin the next search with.
     """
 
     cost: FloatArray
     place_m: FloatArray
-    state: FloatArray
+    velocity_mps: FloatArray
     paid: FloatArray
     z: FloatArray
 
@@ -116,7 +115,7 @@ class _Shape(NamedTuple):
 
     steps: int
     rows: FloatArray
-    """(K + J, 2, size) whose norms are limited, or cost; first the variables themselves, in pairs."""
+    """(K + J, 2, size) norms that are limited, or cost; first the variables, in pairs."""
     largest: FloatArray
     """(K,) the first of them is that of the waypoint."""
     weights: FloatArray
@@ -125,8 +124,8 @@ class _Shape(NamedTuple):
     """(3, 2, size) position at both ends, and a step before the last, from the waypoint."""
     carried: FloatArray
     """(2, 2, size) the same less the potential."""
-    state: FloatArray
-    """(2, 3, 2, size) velocity, tilt and rate at both ends."""
+    velocity: FloatArray
+    """(2, 2, size) at both ends."""
     axis: FloatArray
     """(K + J, size / 2) the rows along one axis, of the variables along this axis."""
 
@@ -151,21 +150,12 @@ class Passing:
         Args:
             halves: Steps counted before and after the visit.
             passages: N of them.
+            begin: (N, size) flights to begin the search with, from an earlier one.
         """
         if halves not in self._shapes:
             self._shapes[halves] = self._shape(halves)
         shape = self._shapes[halves]
-        n = len(passages.radius_m)
-        parts = [
-            self._least(
-                shape,
-                halves,
-                Passages(*(part[k : k + _AT_ONCE] for part in passages)),
-                None if begin is None else begin[k : k + _AT_ONCE],
-            )
-            for k in range(0, n, _AT_ONCE)
-        ]
-        return Passed(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        return self._least(shape, halves, passages, begin)
 
     def _shape(self, halves: tuple[Half, Half]) -> _Shape:
         """The flight, step by step."""
@@ -178,7 +168,8 @@ class Passing:
         size = 2 * pairs
         variables = np.eye(size).reshape(pairs, 2, size)
         fresh = iter(range(4, pairs))  # after the place of the visit, and what it misses
-        largest = np.full(pairs, costs.across_m)
+        potential_m = float(np.abs(motion.potential) @ motion.largest)
+        largest = np.full(pairs, costs.across_m + 2.0 * potential_m)
         limits: list[tuple[FloatArray, float]] = []
         priced = [(row, _MISSED * costs.per_m) for row in variables[1:4]]
 
@@ -223,15 +214,21 @@ class Passing:
             np.array([weight for _, weight in priced]),
             places,
             places[:2] - np.einsum("i,eiax->eax", motion.potential, state),
-            state,
+            state[:, 0],
             np.ascontiguousarray(axis),
         )
 
-    def _least(self, shape, halves: tuple[Half, Half], passages: Passages, begin) -> Passed:
+    def _least(
+        self,
+        shape: _Shape,
+        halves: tuple[Half, Half],
+        passages: Passages,
+        begin: FloatArray | None,
+    ) -> Passed:
         costs, sides = self.costs, np.array([1.0, -1.0])
         n, size = len(passages.radius_m), shape.rows.shape[2]
         cost = np.einsum("e,nea,eax->nx", sides, passages.price, shape.carried)
-        cost += np.einsum("e,neia,eiax->nx", sides, passages.state_price, shape.state)
+        cost += np.einsum("e,nea,eax->nx", sides, passages.velocity_price, shape.velocity)
         fixed = shape.steps * costs.step
         fixed += np.einsum("nea,nea,ne->n", passages.price, passages.along, passages.half_m)
         # the last step leads past the middle: the sample before it is short of it
@@ -268,7 +265,7 @@ class Passing:
         return Passed(
             value + fixed,
             place_m,
-            np.einsum("eiax,nx->neia", shape.state, z),
+            np.einsum("eax,nx->nea", shape.velocity, z),
             shape.steps * costs.step + np.linalg.norm(flown, axis=2) @ shape.weights,
             z,
         )

@@ -35,6 +35,35 @@ class Cut(NamedTuple):
     routes: int
 
 
+class Columns(NamedTuple):
+    """Flights past a waypoint, and what they carry from leg to leg.
+
+    Attributes:
+        plain: (W, N, N) costs of the triples without any.
+        triples: (M, 3) of each.
+        cost: (M,) without the prices of what it carries.
+        carried: Rows below R, columns below M, and how much of it.
+        least, most: (R,) the range of its price.
+    """
+
+    plain: FloatArray
+    triples: IntArray
+    cost: FloatArray
+    carried: tuple[IntArray, IntArray, FloatArray]
+    least: FloatArray
+    most: FloatArray
+
+
+class _Solved(NamedTuple):
+    """Value, shares of the triples, prices of the equations, of the cuts, and of the carried."""
+
+    value: float
+    share: FloatArray
+    duals: FloatArray
+    cut_duals: FloatArray
+    carried: FloatArray
+
+
 def least_routes(
     cost: FloatArray, idle: float = 0.0, most: int | None = None, cuts: Sequence[Cut] = ()
 ) -> float:
@@ -47,16 +76,16 @@ def least_routes(
         most: So many UAS fly at most; None: all may.
         cuts: What else is known of the routes.
     """
-    return Program(cost, idle, most, cuts).solved()
+    return Program(cost, idle, cuts, most).solved()
 
 
 class Program:
     """Column generation over triples, and cuts against routes that do not reach a home."""
 
     def __init__(
-        self, cost: FloatArray, idle: float, most: int | None, cuts: Sequence[Cut]
+        self, cost: FloatArray, idle: float, cuts: Sequence[Cut], most: int | None = None
     ) -> None:
-        self._cost, self._idle = cost, idle
+        self.cost, self._idle = cost, idle
         self._n, self._n_nodes = cost.shape[:2]
         self._uas = (self._n_nodes - self._n) // 2
         self._most = self._uas if most is None else min(most, self._uas)
@@ -77,16 +106,15 @@ class Program:
 
     def solved(self) -> float:
         """The best bound; more rounds only improve it."""
-        self.duals = np.zeros(self._n_rows), np.zeros(len(self._cuts))
-        best, _ = self._bound(*self.duals)
+        best, self._reduced = self._bound(np.zeros(self._n_rows), np.zeros(len(self._cuts)))
         for _ in range(_ROUNDS):
-            solved = self._solve(self._triples, self._cost[tuple(self._triples.T)])
+            solved = self._solve(self._triples, self.cost[tuple(self._triples.T)])
             if solved is None:
                 break
             value, share, duals, cut_duals, _ = solved
             bound, reduced = self._bound(duals, cut_duals)
             if bound > best:
-                best, self.duals = bound, (duals, cut_duals)
+                best, self._reduced = bound, reduced
             cuts = self._violated(share)
             added = self._add(reduced) if value - bound > _ENOUGH * abs(value) else False
             if not cuts and not added:
@@ -94,67 +122,34 @@ class Program:
             self._cuts += cuts
         return best
 
-    def set_cost(self, cost: FloatArray) -> None:
-        self._cost = cost
-
-    def likely(self, reduced: FloatArray, most: float) -> IntArray:
-        """(M, 3) triples of no more than a reduced cost."""
+    def likely(self, most: float) -> IntArray:
+        """(M, 3) the triples that miss the least reduced cost of their waypoint by no more."""
+        reduced = self._reduced
         upper = np.triu(np.ones(reduced.shape[1:], dtype=bool))
-        return np.argwhere((reduced < most) & upper)
+        least = reduced.min(axis=(1, 2), keepdims=True)
+        return np.argwhere((reduced < least + most) & upper)
 
-    def better_prices(self, flights, carried, centre, box):
-        """Prices at the middles of legs, for the flights known so far."""
-        n, nodes = self._n, self._nodes_count()
-        known = np.zeros((n, nodes, nodes), bool)
-        for j, i, k in carried._known:
-            known[j, min(i, k), max(i, k)] = True
+    def prices(self, further: Columns) -> FloatArray | None:
+        """(R,) best prices of what the further columns carry; None: they do not suffice.
+
+        Args:
+            further: Stand in for all columns of their triples.
+        """
+        known = np.zeros(self.cost.shape, dtype=bool)
+        known[tuple(further.triples.T)] = True
         plain = self._triples[~known[tuple(self._triples.T)]]
-        j, i, k = flights.triple.T
-        flown = np.stack([j, np.minimum(i, k), np.maximum(i, k)], axis=1)
-        triples = np.concatenate([plain, flown])
-        costs = np.concatenate([carried.base[tuple(plain.T)], flights.raw])
-        column = len(plain) + np.arange(len(flown))
-        place = np.full((n, n), -1)
-        arcs = []
-        first, second = i < n, k < n
-        pairs = np.concatenate(
-            [np.stack([i[first], j[first]], 1), np.stack([j[second], k[second]], 1)]
-        )
-        arcs = np.unique(pairs, axis=0)
-        place[tuple(arcs.T)] = np.arange(len(arcs))
-        six = np.arange(6)
-        rows, cols, vals = [], [], []
-        for which, sign, side, a, b in ((first, -1.0, 0, i, j), (second, 1.0, 1, j, k)):
-            at = place[a[which], b[which]]
-            rows.append((6 * at[:, None] + six).ravel())
-            cols.append(np.repeat(column[which], 6))
-            vals.append(sign * flights.state[which, side].reshape(-1, 6).ravel())
-        mid = centre[tuple(arcs.T)].reshape(-1)
-        half = np.tile(np.repeat(box, 2), len(arcs))
-        slack = np.concatenate([mid + half, half - mid])
         solved = self._solve(
-            triples,
-            costs,
-            (
-                (np.concatenate(rows), np.concatenate(cols), np.concatenate(vals)),
-                6 * len(arcs),
-                slack,
-            ),
+            np.concatenate([plain, further.triples]),
+            np.concatenate([further.plain[tuple(plain.T)], further.cost]),
+            further,
         )
-        price = centre.copy()
-        if solved is not None:
-            self.model = solved[0]
-            price[tuple(arcs.T)] = solved[4].reshape(-1, 3, 2)
-        return price
-
-    def _nodes_count(self):
-        return self._n_nodes
+        return None if solved is None else solved.carried
 
     def _first(self) -> IntArray:
         """Triples of the cheapest neighbours of each waypoint, and of the homes."""
         found = []
         homes = np.arange(self._n, self._n_nodes)
-        for waypoint, cost in enumerate(self._cost):
+        for waypoint, cost in enumerate(self.cost):
             cheapest = np.argsort(cost[: self._n, : self._n].min(axis=1))[:_NEAREST]
             near = np.concatenate([cheapest[cheapest != waypoint], homes])
             a, b = (near[k] for k in np.triu_indices(len(near)))
@@ -167,8 +162,10 @@ class Program:
         """Of an edge in its equation: its two ends see it with opposite signs."""
         return np.where(waypoint < neighbour, 1, -1)
 
-    def _solve(self, triples, costs, carried=None):
-        """Value, shares of the triples, prices of the equations and of the cuts; None: none."""
+    def _solve(
+        self, triples: IntArray, costs: FloatArray, further: Columns | None = None
+    ) -> _Solved | None:
+        """A solution with some triples only; None: they do not suffice."""
         waypoint, *neighbours = triples.T
         columns = np.arange(len(waypoint))
         entries: list[tuple[IntArray, IntArray, FloatArray]]
@@ -179,47 +176,46 @@ class Program:
         used = len(columns) + np.arange(self._uas)
         homes = self._n_rows - 2 * self._uas + np.arange(2 * self._uas)
         entries.append((homes, np.tile(used, 2), -np.ones(2 * self._uas)))
-        n_more = 0
-        slack = np.zeros(0)
-        if carried is not None:
-            (row, column, value), n_more, slack = carried
-            entries.append((self._n_rows + row, column, value))
+        n_basic = len(columns) + self._uas + len(self._cuts)
+        cost = np.append(costs, np.full(self._uas, -self._idle))
+        cost = np.append(cost, np.full(len(self._cuts), self._penalty))
+        n_rows = self._n_rows
+        if further is not None:
+            row, column, carried = further.carried
+            entries.append((n_rows + row, len(triples) - len(further.cost) + column, carried))
+            slack = np.arange(2 * len(further.most))  # keeps the prices within their range
+            row = n_rows + slack % len(further.most)
+            sign = np.where(slack < len(further.most), 1.0, -1.0)
+            entries.append((row, n_basic + slack, sign))
+            cost = np.concatenate([cost, further.most, -further.least])
+            n_rows += len(further.most)
         row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-        n_cuts = len(self._cuts)
-        basic = len(columns) + self._uas + n_cuts
-        if n_more:  # prices within their box
-            k = np.arange(n_more)
-            row = np.concatenate([row, self._n_rows + k, self._n_rows + k])
-            column = np.concatenate([column, basic + k, basic + n_more + k])
-            value = np.concatenate([value, np.ones(n_more), -np.ones(n_more)])
-        shape = self._n_rows + n_more, basic + 2 * n_more
-        equations = coo_matrix((value, (row, column)), shape).tocsr()
-        right = np.zeros(shape[0])
+        equations = coo_matrix((value, (row, column)), (n_rows, len(cost))).tocsr()
+        right = np.zeros(n_rows)
         right[: self._n] = 1.0
         kept = np.flatnonzero(np.diff(equations.indptr))
-        cost = np.append(costs, np.full(self._uas, -self._idle))
-        cost = np.concatenate([cost, np.full(n_cuts, self._penalty), slack])
         bounds = np.zeros((len(cost), 2))
         bounds[:, 1] = 1.0
-        bounds[basic - n_cuts :, 1] = np.inf
+        bounds[n_basic - len(self._cuts) :, 1] = np.inf
         found = linprog(
             cost,
-            A_ub=self._inequalities(triples, shape[1]),
+            A_ub=self._inequalities(triples, len(cost)),
             b_ub=[self._most, *(-2.0 * cut.routes for cut in self._cuts)],
             A_eq=equations[kept],
             b_eq=right[kept],
             bounds=bounds,
             method="highs",
         )
-        if not found.success:  # these triples do not suffice
+        if not found.success:
             return None
-        duals = np.zeros(shape[0])
+        duals = np.zeros(n_rows)
         duals[kept] = found.eqlin.marginals
         cut_duals = np.maximum(-found.ineqlin.marginals[1:], 0.0)
         share = found.x[: len(columns)]
-        return float(found.fun), share, duals[: self._n_rows], cut_duals, duals[self._n_rows :]
+        equal, carried = duals[: self._n_rows], duals[self._n_rows :]
+        return _Solved(float(found.fun), share, equal, cut_duals, carried)
 
-    def _inequalities(self, triples, n_columns: int) -> csr_matrix:
+    def _inequalities(self, triples: IntArray, n_columns: int) -> csr_matrix:
         """UAS that fly; then, negative, the edges that leave each set, by their ends within it."""
         waypoint, a, b = triples.T
         n = len(waypoint) + self._uas
@@ -242,7 +238,7 @@ class Program:
         Whatever the prices: each waypoint has shares of triples that sum up to one, hence costs
         at least the least of its reduced costs.
         """
-        reduced = self._cost.copy()
+        reduced = self.cost.copy()
         edge = np.zeros((self._n, self._n_nodes))
         waypoint, neighbour = np.indices(edge.shape)
         edge = self._signs(waypoint, neighbour) * np.where(self._row >= 0, duals[self._row], 0.0)
