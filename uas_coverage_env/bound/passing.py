@@ -205,6 +205,7 @@ class Passing:
                 limits += zip(x, motion.largest, strict=True)
         state = np.stack([first, x])
         places = variables[0] + np.stack([-at_visit, place - at_visit, last - at_visit])
+        priced = [(row, weight) for row, weight in priced if weight > 0.0]
         rows = np.concatenate([variables, *(row[None] for row, _ in limits + priced)])
         axis = rows[:, 0, ::2]  # both axes alike
         return _Shape(
