@@ -1,5 +1,7 @@
 """What passing a waypoint costs at least, against passes that are flown."""
 
+import itertools
+
 import numpy as np
 import pytest
 from bound_missions import plain
@@ -93,7 +95,7 @@ def passes(mission, bound, flight):
     first = (away <= mission.waypoints[0].radius_m + 1e-6).argmax(axis=0)
     order = sorted((int(first[k]), int(rows[k])) for k in range(len(rows)))
     middles = []
-    for (begin, i), (end, j) in zip(order, order[1:], strict=False):
+    for (begin, i), (end, j) in itertools.pairwise(order):
         if not carried._priced[i, j]:
             middles.append(None)
             continue

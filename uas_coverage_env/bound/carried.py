@@ -53,6 +53,7 @@ class Carried:
         self._priced = with_middles(legs)
         self._price = np.zeros((self._n, self._n_nodes, 2))
         """Of a m/s in the middle of a leg, from waypoint to waypoint."""
+        self._sought = False
         self._known: set[tuple[int, int, int]] = set()
         # triples in the order of flight, by numbers of steps, with what they cost at which prices
         self._triple = np.zeros((0, 3), dtype=np.int64)
@@ -72,7 +73,18 @@ class Carried:
             idle: Cost of a UAS that stays at home.
             cuts: What else is known of the routes.
         """
-        program = Program(self._plain, idle, cuts)
+        if not self._sought:
+            self._seek(Program(self._plain, idle, ()))
+            self._sought = True
+        program, best = Program(self._plain, idle, cuts), -math.inf
+        for _ in range(_SURE):
+            best = max(best, self._solved(program, sure=True))
+            if not self._explore(program.likely(_LIKELY)):
+                break
+        return best
+
+    def _seek(self, program: Program) -> None:
+        """Find prices."""
         best, around = -math.inf, self._price
         width = _RANGE * self._passing.costs.step / self._passing.motion.largest[0]
         for _ in range(_ROUNDS):
@@ -84,12 +96,6 @@ class Carried:
             self._explore(program.likely(_LIKELY))
             self._price = self._better_price(program, around, width)
         self._price = around
-        best = -math.inf
-        for _ in range(_SURE):
-            best = max(best, self._solved(program, sure=True))
-            if not self._explore(program.likely(_LIKELY)):
-                break
-        return best
 
     def _solved(self, program: Program, sure: bool) -> float:
         program.cost = self._costs(sure)

@@ -86,6 +86,8 @@ class MissionBound:
             steps: Of flights with at most so many steps; None: of all flights.
         """
         needed = () if steps is None else self._needed(steps)
+        if needed:
+            self.energy_Wh()  # first, so that its prices do not depend on what was asked before
         if needed not in self._energy:
             self._energy[needed] = self._least_energy_J(needed) / _J_PER_WH
         return max(self._energy[needed], self.energy_Wh()) if needed else self._energy[needed]
