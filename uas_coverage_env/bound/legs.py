@@ -15,6 +15,7 @@ from uas_coverage_env.bound.turning import LONGEST, LONGEST_START, Turning
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 _LANDING = 2  # steps: more change little
 
@@ -94,6 +95,49 @@ def straight_directions(legs: Legs) -> FloatArray:
     return np.divide(way_m, length_m, out=np.zeros_like(way_m), where=length_m > 1e-9)
 
 
+def with_middles(legs: Legs) -> BoolArray:
+    """(W, N) the legs whose middle, seen from above, lies between the circles of two waypoints."""
+    n = len(legs.before)
+    half_m = 0.5 * np.linalg.norm(legs.centre_m[None] - legs.centre_m[:n, None], axis=2)
+    found = (half_m > legs.radius_m) & (half_m > legs.radius_m[:n, None])
+    found[:, n:] = False
+    return found
+
+
+def steps_to_middles(legs: Legs, reach_m: FloatArray, step_m: float) -> Legs:
+    """The legs with the steps up to their middle, and from it, in place of half of their steps.
+
+    Args:
+        legs: Of the mission.
+        reach_m: (n+1,) how far so many steps lead at most.
+        step_m: The first sample beyond a middle is so far from it at most.
+    """
+    n, middle = len(legs.before), with_middles(legs)
+    way_m = 0.5 * np.linalg.norm(legs.centre_m[None] - legs.centre_m[:n, None], axis=2)
+    way_m -= legs.radius_m[:n, None]
+    before = np.searchsorted(reach_m, np.maximum(way_m - step_m, 0.0))
+    after = np.searchsorted(reach_m, np.maximum(way_m, 0.0))
+    return legs._replace(
+        before=np.where(middle, np.minimum(before, LONGEST), legs.before),
+        after=np.where(middle, np.minimum(after, LONGEST), legs.after),
+    )
+
+
+def end_costs(legs: Legs, turning: Turning, directions: FloatArray) -> FloatArray:
+    """(W, N) of setting off and landing, with the half of the leg next to a home; else zero."""
+    n, n_nodes = legs.before.shape
+    uas = (n_nodes - n) // 2
+    starts, ends = slice(n, n + uas), slice(n + uas, None)
+    half_m = 0.5 * np.einsum(
+        "ijx,ijx->ij", directions, legs.centre_m[None] - legs.centre_m[:n, None]
+    )
+    cost = np.zeros((n, n_nodes))
+    cost[:, starts] = turning.per_m * half_m[:, starts] + turning.start[legs.start_steps]
+    cost[:, ends] = turning.per_m * (half_m[:, ends] - legs.radius_m[ends])
+    cost[:, ends] += turning.landing[legs.landing_steps]
+    return cost
+
+
 class Triples(NamedTuple):
     """What a visit costs by the nodes visited before and after.
 
@@ -129,13 +173,8 @@ def triples(legs: Legs, turning: Turning, directions: FloatArray) -> Triples:
     way_m = half_m[:, :, None] + half_m[:, None] - legs.radius_m[waypoint] * size
     turn = turning.turn_cost(legs.before[:, :, None], legs.after[:, None], half_angle)
     cost = turning.per_m * way_m + turn
-    whole_m = 2.0 * half_m
-    cost[:, starts] += (
-        turning.per_m * half_m[:, starts] + turning.start[legs.start_steps]
-    )[:, :, None]  # fmt: skip
-    landed = turning.landing[legs.landing_steps]
-    landed += turning.per_m * (whole_m[:, ends] - half_m[:, ends] - legs.radius_m[ends])
-    cost[:, :, ends] += landed[:, None]
+    ends_cost = end_costs(legs, turning, directions)
+    cost += ends_cost[:, :, None] + ends_cost[:, None]
     # from the end of a route to a waypoint, and from a waypoint to its start, nothing flies
     cost[:, ends] = cost[:, :, starts] = np.inf
     cost[:, starts, ends] += np.where(np.eye(uas, dtype=bool), 0.0, np.inf)

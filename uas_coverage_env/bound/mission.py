@@ -8,10 +8,19 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.bound.legs import Legs, Places, legs_between, straight_directions, triples
+from uas_coverage_env.bound.carried import Carried
+from uas_coverage_env.bound.legs import (
+    Legs,
+    Places,
+    legs_between,
+    steps_to_middles,
+    straight_directions,
+    triples,
+)
+from uas_coverage_env.bound.passing import Costs, Passing
 from uas_coverage_env.bound.prices import STEPS, Ends, cheapest, energy_prices
 from uas_coverage_env.bound.program import Cut, least_routes
-from uas_coverage_env.bound.turning import Turning, turning_of_fleet
+from uas_coverage_env.bound.turning import Turning, motion_of, turning_of_fleet
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
@@ -40,7 +49,9 @@ class MissionBound:
         reason = _why_not(scenario)
         if reason:
             raise ValueError(f"{scenario.name}: no bound, {reason}")
-        heights_m = np.array(scenario.geofence.vertices_m)[:, 2]
+        corners_m = np.array(scenario.geofence.vertices_m)
+        heights_m = corners_m[:, 2]
+        self._across_m = float(np.linalg.norm(np.ptp(corners_m, axis=0)))
         ends = Ends(
             scenario.dt_s,
             scenario.landing_distance_m,
@@ -75,6 +86,8 @@ class MissionBound:
             steps: Of flights with at most so many steps; None: of all flights.
         """
         needed = () if steps is None else self._needed(steps)
+        if needed:
+            self.energy_Wh()  # first, so that its prices do not depend on what was asked before
         if needed not in self._energy:
             self._energy[needed] = self._least_energy_J(needed) / _J_PER_WH
         return max(self._energy[needed], self.energy_Wh()) if needed else self._energy[needed]
@@ -91,6 +104,8 @@ class MissionBound:
             for size in range(n, max(smallest, routes) - 1, -max(1, n // _SIZES))
         ]
         routes_J = least_routes(self._cost(self._prices_turning), step_J, cuts=cuts)
+        if self._carried is not None:
+            routes_J = max(routes_J, self._carried.least_routes(step_J, cuts))
         return max(idle_J + routes_J * (1.0 - _ROUNDING), 0.0)
 
     def _needed(self, steps: int) -> tuple[int, ...]:
@@ -152,6 +167,19 @@ class MissionBound:
     def _legs(self) -> Legs:
         turning = self._steps_turning
         return legs_between(self._places, turning.reach_m, turning.reach_from_rest_m)
+
+    @cached_property
+    def _carried(self) -> Carried | None:
+        """Where the velocity between waypoints has a price; None: several kinds of vehicles."""
+        if len(set(self._vehicles)) > 1:
+            return None
+        turning, reach_m = self._prices_turning, self._prices_turning.reach_m
+        prices, step_m = self._prices, float(reach_m[1])
+        costs = Costs(prices.step, prices.mps, prices.rad, turning.per_m, step_m, self._across_m)
+        legs = steps_to_middles(self._legs, reach_m, step_m)
+        passing = Passing(motion_of(self._vehicles[0], self._ends.dt_s), costs)
+        plain = triples(legs, turning, straight_directions(legs)).cost
+        return Carried(legs, passing, turning, plain, reach_m)
 
     def _cost(self, turning: Turning) -> FloatArray:
         return triples(self._legs, turning, straight_directions(self._legs)).cost

@@ -35,6 +35,35 @@ class Cut(NamedTuple):
     routes: int
 
 
+class Columns(NamedTuple):
+    """Flights past a waypoint, and what they carry from leg to leg.
+
+    Attributes:
+        plain: (W, N, N) costs of the triples without any.
+        triples: (M, 3) of each.
+        cost: (M,) without the prices of what it carries.
+        carried: Rows below R, columns below M, and how much of it.
+        least, most: (R,) the range of its price.
+    """
+
+    plain: FloatArray
+    triples: IntArray
+    cost: FloatArray
+    carried: tuple[IntArray, IntArray, FloatArray]
+    least: FloatArray
+    most: FloatArray
+
+
+class _Solved(NamedTuple):
+    """Value, shares of the triples, prices of the equations, of the cuts, and of the carried."""
+
+    value: float
+    share: FloatArray
+    duals: FloatArray
+    cut_duals: FloatArray
+    carried: FloatArray
+
+
 def least_routes(
     cost: FloatArray, idle: float = 0.0, most: int | None = None, cuts: Sequence[Cut] = ()
 ) -> float:
@@ -47,16 +76,16 @@ def least_routes(
         most: So many UAS fly at most; None: all may.
         cuts: What else is known of the routes.
     """
-    return _Program(cost, idle, most, cuts).solved()
+    return Program(cost, idle, cuts, most).solved()
 
 
-class _Program:
+class Program:
     """Column generation over triples, and cuts against routes that do not reach a home."""
 
     def __init__(
-        self, cost: FloatArray, idle: float, most: int | None, cuts: Sequence[Cut]
+        self, cost: FloatArray, idle: float, cuts: Sequence[Cut], most: int | None = None
     ) -> None:
-        self._cost, self._idle = cost, idle
+        self.cost, self._idle = cost, idle
         self._n, self._n_nodes = cost.shape[:2]
         self._uas = (self._n_nodes - self._n) // 2
         self._most = self._uas if most is None else min(most, self._uas)
@@ -77,14 +106,15 @@ class _Program:
 
     def solved(self) -> float:
         """The best bound; more rounds only improve it."""
-        best, _ = self._bound(np.zeros(self._n_rows), np.zeros(len(self._cuts)))
+        best, self._reduced = self._bound(np.zeros(self._n_rows), np.zeros(len(self._cuts)))
         for _ in range(_ROUNDS):
-            solved = self._solve()
+            solved = self._solve(self._triples, self.cost[tuple(self._triples.T)])
             if solved is None:
                 break
-            value, share, duals, cut_duals = solved
+            value, share, duals, cut_duals, _ = solved
             bound, reduced = self._bound(duals, cut_duals)
-            best = max(best, bound)
+            if bound > best:
+                best, self._reduced = bound, reduced
             cuts = self._violated(share)
             added = self._add(reduced) if value - bound > _ENOUGH * abs(value) else False
             if not cuts and not added:
@@ -92,11 +122,34 @@ class _Program:
             self._cuts += cuts
         return best
 
+    def likely(self, most: float) -> IntArray:
+        """(M, 3) the triples that miss the least reduced cost of their waypoint by no more."""
+        reduced = self._reduced
+        upper = np.triu(np.ones(reduced.shape[1:], dtype=bool))
+        least = reduced.min(axis=(1, 2), keepdims=True)
+        return np.argwhere((reduced < least + most) & upper)
+
+    def prices(self, further: Columns) -> FloatArray | None:
+        """(R,) best prices of what the further columns carry; None: they do not suffice.
+
+        Args:
+            further: Stand in for all columns of their triples.
+        """
+        known = np.zeros(self.cost.shape, dtype=bool)
+        known[tuple(further.triples.T)] = True
+        plain = self._triples[~known[tuple(self._triples.T)]]
+        solved = self._solve(
+            np.concatenate([plain, further.triples]),
+            np.concatenate([further.plain[tuple(plain.T)], further.cost]),
+            further,
+        )
+        return None if solved is None else solved.carried
+
     def _first(self) -> IntArray:
         """Triples of the cheapest neighbours of each waypoint, and of the homes."""
         found = []
         homes = np.arange(self._n, self._n_nodes)
-        for waypoint, cost in enumerate(self._cost):
+        for waypoint, cost in enumerate(self.cost):
             cheapest = np.argsort(cost[: self._n, : self._n].min(axis=1))[:_NEAREST]
             near = np.concatenate([cheapest[cheapest != waypoint], homes])
             a, b = (near[k] for k in np.triu_indices(len(near)))
@@ -109,9 +162,11 @@ class _Program:
         """Of an edge in its equation: its two ends see it with opposite signs."""
         return np.where(waypoint < neighbour, 1, -1)
 
-    def _solve(self) -> tuple[float, FloatArray, FloatArray, FloatArray] | None:
-        """Value, shares of the triples, prices of the equations and of the cuts; None: none."""
-        waypoint, *neighbours = self._triples.T
+    def _solve(
+        self, triples: IntArray, costs: FloatArray, further: Columns | None = None
+    ) -> _Solved | None:
+        """A solution with some triples only; None: they do not suffice."""
+        waypoint, *neighbours = triples.T
         columns = np.arange(len(waypoint))
         entries: list[tuple[IntArray, IntArray, FloatArray]]
         entries = [(waypoint, columns, np.ones(len(waypoint)))]
@@ -121,39 +176,52 @@ class _Program:
         used = len(columns) + np.arange(self._uas)
         homes = self._n_rows - 2 * self._uas + np.arange(2 * self._uas)
         entries.append((homes, np.tile(used, 2), -np.ones(2 * self._uas)))
+        n_basic = len(columns) + self._uas + len(self._cuts)
+        cost = np.append(costs, np.full(self._uas, -self._idle))
+        cost = np.append(cost, np.full(len(self._cuts), self._penalty))
+        n_rows = self._n_rows
+        if further is not None:
+            row, column, carried = further.carried
+            entries.append((n_rows + row, len(triples) - len(further.cost) + column, carried))
+            slack = np.arange(2 * len(further.most))  # keeps the prices within their range
+            row = n_rows + slack % len(further.most)
+            sign = np.where(slack < len(further.most), 1.0, -1.0)
+            entries.append((row, n_basic + slack, sign))
+            cost = np.concatenate([cost, further.most, -further.least])
+            n_rows += len(further.most)
         row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-        shape = self._n_rows, len(columns) + self._uas + len(self._cuts)
-        equations = coo_matrix((value, (row, column)), shape).tocsr()
-        right = np.zeros(self._n_rows)
+        equations = coo_matrix((value, (row, column)), (n_rows, len(cost))).tocsr()
+        right = np.zeros(n_rows)
         right[: self._n] = 1.0
         kept = np.flatnonzero(np.diff(equations.indptr))
-        cost = np.append(self._cost[tuple(self._triples.T)], np.full(self._uas, -self._idle))
-        cost = np.append(cost, np.full(len(self._cuts), self._penalty))
         bounds = np.zeros((len(cost), 2))
         bounds[:, 1] = 1.0
-        bounds[shape[1] - len(self._cuts) :, 1] = np.inf
+        bounds[n_basic - len(self._cuts) :, 1] = np.inf
         found = linprog(
             cost,
-            A_ub=self._inequalities(shape[1]),
+            A_ub=self._inequalities(triples, len(cost)),
             b_ub=[self._most, *(-2.0 * cut.routes for cut in self._cuts)],
             A_eq=equations[kept],
             b_eq=right[kept],
             bounds=bounds,
             method="highs",
         )
-        if not found.success:  # these triples do not suffice
+        if not found.success:
             return None
-        duals = np.zeros(self._n_rows)
+        duals = np.zeros(n_rows)
         duals[kept] = found.eqlin.marginals
         cut_duals = np.maximum(-found.ineqlin.marginals[1:], 0.0)
-        return float(found.fun), found.x[: len(columns)], duals, cut_duals
+        share = found.x[: len(columns)]
+        equal, carried = duals[: self._n_rows], duals[self._n_rows :]
+        return _Solved(float(found.fun), share, equal, cut_duals, carried)
 
-    def _inequalities(self, n_columns: int) -> csr_matrix:
+    def _inequalities(self, triples: IntArray, n_columns: int) -> csr_matrix:
         """UAS that fly; then, negative, the edges that leave each set, by their ends within it."""
-        waypoint, a, b = self._triples.T
+        waypoint, a, b = triples.T
+        n = len(waypoint) + self._uas
         rows = np.zeros((1 + len(self._cuts), n_columns))
-        rows[0, len(waypoint) : len(waypoint) + self._uas] = 1.0
-        rows[1:, len(waypoint) + self._uas :] = -np.eye(len(self._cuts))  # at a penalty
+        rows[0, len(waypoint) : n] = 1.0
+        rows[1:, n : n + len(self._cuts)] = -np.eye(len(self._cuts))  # at a penalty
         for row, cut in zip(rows[1:], self._cuts, strict=True):
             inside = self._nodes(cut)
             leave = (~inside[a]).astype(float) + ~inside[b]
@@ -170,7 +238,7 @@ class _Program:
         Whatever the prices: each waypoint has shares of triples that sum up to one, hence costs
         at least the least of its reduced costs.
         """
-        reduced = self._cost.copy()
+        reduced = self.cost.copy()
         edge = np.zeros((self._n, self._n_nodes))
         waypoint, neighbour = np.indices(edge.shape)
         edge = self._signs(waypoint, neighbour) * np.where(self._row >= 0, duals[self._row], 0.0)
