@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from own_disturbances import NOT_FINITE, RETURNS, gusts, push, weak_rotors
-from small_worlds import meadow
+from small_worlds import meadow, waypoint
 
 from uas_coverage_env import World
 from uas_coverage_env.disturbances import Disturbance, constant_wind, disturbances_of
@@ -233,6 +233,7 @@ def test_numbers_that_are_not_finite_end_the_flight_with_a_line():
 
 
 def test_what_is_no_disturbance_is_refused():
+    again = waypoint((150.0, 150.0, -20.0)) | {"again_after_s": (30.0,)}
     cases = [
         (lambda: World(meadow(), disturbances=push(0.0, 0.0, 0.0)), "give a tuple"),  # type: ignore
         (lambda: World(meadow(), disturbances=("wind",)), "no Disturbance"),  # type: ignore
@@ -242,6 +243,7 @@ def test_what_is_no_disturbance_is_refused():
         (lambda: World(meadow(), seed=-1), "seed is -1"),
         (lambda: flown(World(meadow(), disturbances=(RETURNS,)), 1), "_returns cannot be compiled"),
         (lambda: pool_worlds([windy(meadow(), mean_mps=1.0, from_deg=0.0)]), "the air is still"),
+        (lambda: pool_worlds([meadow(waypoints=(again,))]), "again_after_s"),
     ]
     for case, match in cases:
         with pytest.raises(ValueError, match=match):

@@ -41,7 +41,8 @@ def pool_worlds(
         slots: The disturbances of each, see `in_slots`; None: for callers that fly in still air.
 
     Raises:
-        ValueError: There is no scenario, or one has disturbances and `slots` is None.
+        ValueError: There is no scenario, or `slots` is None and one has disturbances,
+            events, or waypoints that are asked for again.
     """
     if not scenarios:
         raise ValueError("there is no scenario to fly; give at least one")
@@ -51,9 +52,11 @@ def pool_worlds(
         disturbed = [scenario.name for scenario in scenarios if disturbances_of(scenario)]
         if disturbed:
             raise ValueError(f"scenario {disturbed[0]} has disturbances; here the air is still")
-        eventful = [scenario.name for scenario in scenarios if is_eventful(scenario)]
-        if eventful:
-            raise ValueError(f"scenario {eventful[0]} has events or [sensing]; here is neither")
+        changing = [s.name for s in scenarios if is_eventful(s) or s.asks_again]
+        if changing:
+            raise ValueError(
+                f"scenario {changing[0]} has events, [sensing] or again_after_s; here is none of it"
+            )
         slots = [()] * len(scenarios)
     for scenario, disturbances in zip(scenarios, slots, strict=True):
         arena = build_arena(scenario, measured_m=measured_m, disturbances=disturbances)
