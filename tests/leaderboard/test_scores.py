@@ -132,8 +132,10 @@ def test_accomplished_lpv_flights_have_a_bound():
         row("meadow", steps=42, dynamics="nonlinear"),
         row("elsewhere"),
     ]
-    bounds = bounds_of(rows, {"meadow": mission})
+    told = []
+    bounds = bounds_of(rows, {"meadow": mission}, told=lambda *counts: told.append(counts))
     assert list(bounds) == [("meadow", 40)]
+    assert told == [(0, 1), (1, 1)]
     assert bounds["meadow", 40] > 0.0
 
 

@@ -3,7 +3,7 @@
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -19,6 +19,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     FLOWN,
     Backend,
+    Bounds,
     Comparison,
     Entry,
     Row,
@@ -39,7 +40,7 @@ from uas_coverage_env.leaderboard import (
     write,
 )
 from uas_coverage_env.leaderboard import table as tables
-from uas_coverage_env.scenario import warnings
+from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.simulation import Dynamics
 
 _REFERENCE = "nearest-waypoint"
@@ -145,7 +146,7 @@ def compare(
         sys.stderr.write(f"error: nothing was flown: {one_line(trouble)}\n")
         raise typer.Exit(FAILED)
     how = f"{_all_or(side_by_side)} side by side"
-    bounds = bounds_of(rows, sweep.scenarios)
+    bounds = bounds_shown(rows, sweep.scenarios, screen, side_by_side)
     comparison = Comparison.of(rows, len(entries), reference, command, how, bounds)
     names = write(comparison, out)
     _report(screen, comparison, out, names)
@@ -214,6 +215,23 @@ def fly_sweep(
     except WorkerLostError as error:
         return f"{error}; the same command goes on"
     return ""
+
+
+def bounds_shown(
+    rows: Sequence[Row], scenarios: Mapping[str, Scenario], screen: Console, jobs: int
+) -> Bounds:
+    """The lower bounds of a sweep, some seconds each; shows how far they are."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    shown = screen.is_terminal
+    with ProgressBar(*columns, console=screen, disable=not shown, transient=True) as bar:
+        task = bar.add_task("lower bounds", total=None)
+
+        def told(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+            if not shown and done == 0 and total > 1:
+                screen.print(f"lower bounds of {total} scenarios")
+
+        return bounds_of(rows, scenarios, jobs=jobs, told=told)
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from uas_coverage_env.cli.compare import fly_sweep
+from uas_coverage_env.cli.compare import bounds_shown, fly_sweep
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
@@ -20,7 +20,6 @@ from uas_coverage_env.leaderboard import (
     FLOWN,
     Row,
     Sweep,
-    bounds_of,
     failures,
     jobs_of,
     kept_as,
@@ -85,7 +84,7 @@ def front(
         source = source_of(sweep.players.values())
         trouble = fly_sweep(entries, store, screen, side_by_side, "process", source, out / FLIGHTS)
         rows = store.rows()
-    bounds = bounds_of(rows, sweep.scenarios)
+    bounds = bounds_shown(rows, sweep.scenarios, screen, side_by_side)
     keys = [text.partition("=")[0].strip() for text in asked]
     found = {}
     for name, scenario in sweep.scenarios.items():
