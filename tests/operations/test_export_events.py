@@ -53,8 +53,8 @@ def test_a_plan_takes_off_at_the_start_and_lands_where_its_closed_home_sends_it(
     assert math.dist(place_of(land), OTHER_M[:2]) < 0.01
     frame = LocalFrame(HERE)
     home, rally = plan["mission"]["plannedHomePosition"], plan["rallyPoints"]["points"][0]
-    assert math.dist(frame.to_ned(*home[:2], 0.0)[:2], START_M[:2]) < 0.01
-    assert math.dist(frame.to_ned(*rally[:2], 0.0)[:2], OTHER_M[:2]) < 0.01
+    assert math.dist(frame.to_ned(home[0], home[1], 0.0)[:2], START_M[:2]) < 0.01
+    assert math.dist(frame.to_ned(rally[0], rally[1], 0.0)[:2], OTHER_M[:2]) < 0.01
     if autopilot == "ardupilot":
         assert "RALLY_INCL_HOME,0\n" in made.files["uas_1.param"]
     assert any("uas_1 lands 110 m from where it takes off" in note for note in made.notes)

@@ -87,7 +87,7 @@ COMMANDS = (
     CommandEntry(
         "stream",
         at(f"{_CLI}.stream:stream"),
-        "Fly a plan in time on ArduPilot vehicles, by MAVLink position targets (extra `ops`).",
+        "Fly a plan in time on ArduPilot or PX4, by MAVLink position targets (extra `ops`).",
     ),
     CommandEntry(
         "import-log",

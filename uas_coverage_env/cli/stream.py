@@ -43,7 +43,7 @@ def stream(
         bool, typer.Option("--overwrite", help="Replace --track where it exists.")
     ] = False,
 ) -> None:
-    """Fly a plan in time on ArduPilot or PX4 vehicles, by MAVLink position targets (extra `ops`).
+    """Fly a plan in time on ArduPilot or PX4, by MAVLink position targets (extra `ops`).
 
     Ctrl-C gives all vehicles the mode of --on-abort; a second one ends at once.
     """
