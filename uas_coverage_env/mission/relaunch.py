@@ -26,7 +26,7 @@ class Relaunch:
     (`Handover`), or are on their way home in return mode. Then each goes that reaches an open
     waypoint and comes home again with the charge that it has, and stands clear of everything.
     Where nothing has been covered since, and no UAS was lost, they do not go a second time. When a
-    waypoint is asked for again they go at once, whoever is at work: it is no UAS's work yet.
+    waypoint is asked for again they go at once, even while others work: it is on no route yet.
 
     Args:
         brief: The mission as it is now.
