@@ -8,6 +8,8 @@ import pytest
 from leaderboard_rows import failed_row, row
 from small_worlds import meadow, waypoint
 
+from uas_coverage_env.cli import compare
+from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     Comparison,
@@ -137,6 +139,15 @@ def test_accomplished_lpv_flights_have_a_bound():
     assert list(bounds) == [("meadow", 40)]
     assert told == [(0, 1), (1, 1)]
     assert bounds["meadow", 40] > 0.0
+
+
+def test_ctrl_c_leaves_out_the_bounds_and_not_what_was_flown(monkeypatch, capsys):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(compare, "bounds_of", stopped)
+    assert compare.bounds_shown([row("meadow")], {}, console(), 1) == {}
+    assert capsys.readouterr().err.startswith("warning: lower bounds: stopped by hand")
 
 
 def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):

@@ -220,7 +220,10 @@ def fly_sweep(
 def bounds_shown(
     rows: Sequence[Row], scenarios: Mapping[str, Scenario], screen: Console, jobs: int
 ) -> Bounds:
-    """The lower bounds of a sweep, some seconds each; shows how far they are."""
+    """The lower bounds of a sweep, some seconds each; shows how far they are.
+
+    Ctrl-C leaves them out: what was flown is told of without them.
+    """
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     shown = screen.is_terminal
     with ProgressBar(*columns, console=screen, disable=not shown, transient=True) as bar:
@@ -231,7 +234,11 @@ def bounds_shown(
             if not shown and done == 0 and total > 1:
                 screen.print(f"lower bounds of {total} scenarios")
 
-        return bounds_of(rows, scenarios, jobs=jobs, told=told)
+        try:
+            return bounds_of(rows, scenarios, jobs=jobs, told=told)
+        except KeyboardInterrupt:
+            sys.stderr.write("warning: lower bounds: stopped by hand; the same command goes on\n")
+            return {}
 
 
 @contextmanager
