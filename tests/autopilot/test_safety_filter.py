@@ -271,3 +271,17 @@ def test_the_filter_also_keeps_the_nonlinear_plant_clear():
             assert outcome["breaches"].sum() == 0
     assert np.hypot(*world.state.x[0, [VX, VY]]) > 0.0
     assert 0.0 < world.state.x[0, Y] < 200.0
+
+
+def test_the_next_state_says_whose_command_was_replaced_until_the_mission_begins_again():
+    world = World(short(generate_scenario(4001)), safety_filter=True)
+    rng, said = np.random.default_rng(1), []
+    commands = np.zeros(len(world.names), COMMAND_DTYPE)
+    for _ in range(60):
+        draw(rng, world, commands, (VELOCITY, WRENCH))
+        outcome = world.step(commands)
+        assert np.array_equal(world.swarm_state().filtered, outcome["filtered"])
+        said.append(outcome["filtered"])
+    assert {True, False} <= set(np.ravel(said).tolist())
+    world.reset()
+    assert not world.swarm_state().filtered.any()

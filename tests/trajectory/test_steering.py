@@ -7,9 +7,10 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_baselines.trajectory.steering import FAILURES, Failures
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import MODES, accomplished, coverage, home
+from uas_coverage_env.flight import MODES, accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.levels import LEVELS
+from uas_coverage_env.tasks import level_named, seeds_of
 
 STARTS_M = ((20.0, 20.0, -1.0), (180.0, 20.0, -1.0))
 
@@ -54,6 +55,20 @@ def test_in_still_air_nothing_is_steered():
     assert accomplished(flight)
     assert not flight.safety_filter
     assert {decision.fallback for decision in flight.decisions} == {False}
+
+
+@pytest.mark.parametrize("assistants", [(False, True), (True, False), (True, True)])
+def test_what_assistants_change_is_taken_for_no_disturbance(assistants):
+    return_mode, safety_filter = assistants
+    scenario = level_named("easy").scenario(seeds_of("test")[0])
+    alone, flown = rollout(scenario, planner()), planner()
+    flight = rollout(scenario, flown, return_mode=return_mode, safety_filter=safety_filter)
+    assert accomplished(flight)
+    assert not flight.violations
+    assert any(decision.filtered for decision in flight.decisions) == safety_filter
+    assert not flown.is_steering
+    # guidance alone takes 1.8 times the energy
+    assert float(energy_Wh(flight).sum()) < 1.35 * float(energy_Wh(alone).sum())
 
 
 def test_in_strong_wind_nothing_is_flown_as_planned_for_long():

@@ -202,7 +202,7 @@ def filter_commands(arena, state, nonlinear, outcome):
 
     Args:
         arena: The arena.
-        state: The state from which the commands are flown.
+        state: The state from which the commands are flown; filtered is written.
         nonlinear: Whether the world flies the 6-DOF plant.
         outcome: (U,) of OUTCOME_DTYPE; applied_command and filtered are written.
     """
@@ -221,6 +221,8 @@ def filter_commands(arena, state, nonlinear, outcome):
         x = state.x[i]
         reference = state.reference[i]
         fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i], state.belief[i])
+    for i in range(n_uas):
+        state.filtered[i] = False
     for rank in range(n_flying):
         i = order[rank]
         command = outcome[i].applied_command
@@ -241,4 +243,4 @@ def filter_commands(arena, state, nonlinear, outcome):
         ):
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)
         # only the filter gives this kind of command
-        outcome[i].filtered = command.kind == CLIMB
+        state.filtered[i] = outcome[i].filtered = command.kind == CLIMB

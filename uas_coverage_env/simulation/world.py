@@ -100,6 +100,7 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         again_s=np.where(
             state.due_step > step, scenario.dt_s * (state.due_step - step).astype(float), np.inf
         ),
+        filtered=state.filtered.copy(),
     )
 
 

@@ -52,6 +52,8 @@ class WorldState(NamedTuple):
     """Has been farther from its start than the landing distance."""
     returning: Annotated[NDArray[np.bool_], "U"]
     """Return mode has taken over."""
+    filtered: Annotated[NDArray[np.bool_], "U"]
+    """The safety filter replaced its last command."""
     uncovered: Annotated[NDArray[np.bool_], "W"]
     """Waypoint still to be covered."""
     step: Annotated[NDArray[np.int64], 1, Values(0, "samples")]
@@ -128,10 +130,10 @@ def as_told(arena, state):
 def _with_x(state, x):
     return WorldState(
         x, state.reference, state.belief, state.status, state.departed, state.returning,
-        state.uncovered, state.step, state.disturbance_memory, state.disturbance_random,
-        state.event_step, state.event_uas, state.event_random, state.felt, state.sensed,
-        state.told, state.delayed, state.bias, state.sensing_random, state.heard,
-        state.packs, state.due_step,
+        state.filtered, state.uncovered, state.step, state.disturbance_memory,
+        state.disturbance_random, state.event_step, state.event_uas, state.event_random,
+        state.felt, state.sensed, state.told, state.delayed, state.bias, state.sensing_random,
+        state.heard, state.packs, state.due_step,
     )  # fmt: skip
 
 
@@ -171,6 +173,8 @@ class SwarmState:
         ground_s: (U,) [s] until a UAS that swaps is ready to take off, 0 for the others; likewise.
         again_s: (W,) [s] until each waypoint is asked for again, inf where it is not, or was; empty
             where none is (`again_after_s`).
+        filtered: (U,) the safety filter replaced its last command: it is elsewhere than that would
+            have taken it, which no disturbance did; empty where it is not told.
     """
 
     time_s: float
@@ -190,6 +194,7 @@ class SwarmState:
     packs_left: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     ground_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     again_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    filtered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     @property
     def heading_rad(self) -> NDArray[np.float64]:

@@ -155,7 +155,8 @@ class Trajectory:
         if self.mission_plan is None:
             self._begin(swarm)
         self._world.update(swarm)
-        self._silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
+        away = swarm.returning | ~self._handover.workers(swarm)  # they fly without commands
+        self._silent = (swarm.status == FLYING) & away
         movers = Movers.seen(self._brief, swarm, self._silent)
         # with a fresh battery pack
         self._back = (swarm.status == FLYING) & self._down
@@ -188,6 +189,11 @@ class Trajectory:
         moves, weight = self.options.moves // 10, self.total_weight
         order = self.mission_plan.order
         return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
+
+    @property
+    def is_steering(self) -> bool:
+        """Whether UAS fly by the world's guidance, since no flight goes as planned."""
+        return self._steering is not None
 
     @property
     def total_weight(self) -> float:
@@ -258,6 +264,7 @@ class Trajectory:
     def _follow(self, swarm: SwarmState, movers: Movers) -> None:
         """Courses from where the UAS are, where that is not where they were planned to be."""
         self._failures.next_step()
+        filtered = swarm.filtered if len(swarm.filtered) else np.zeros(len(swarm.x), np.bool_)
         for u, planned in list(self._planned.items()):
             rest = planned.course.rest(swarm.step)
             if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
@@ -266,9 +273,10 @@ class Trajectory:
                 del self._planned[u]
                 continue
             off = rest.x[0, VX : VZ + 1] - swarm.x[u, VX : VZ + 1]
-            if swarm.responds[u]:  # else it flies something else
+            obeys = swarm.responds[u] and not filtered[u]  # else it flies something else
+            if obeys:
                 self._failures.see(float(np.linalg.norm(off)))
-            if not self._is_disturbed:
+            if not self._is_disturbed and not filtered[u]:
                 self._is_disturbed = True
                 self._fleet.leave_room()
                 self._planned = {}
@@ -283,7 +291,7 @@ class Trajectory:
             if new is None:
                 del self._planned[u]
             else:
-                self._failures.add(float(swarm.responds[u] * (new.course.end - planned.course.end)))
+                self._failures.add(float(obeys * (new.course.end - planned.course.end)))
                 self._planned[u] = new
 
     def _earliest(self, opens: NDArray[np.int64], later: int) -> NDArray[np.int64]:
