@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, cuda
+from numba import cuda
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
@@ -29,6 +29,7 @@ from uas_coverage_env.env.act import (
     refuse_unflyable,
     write_commands,
 )
+from uas_coverage_env.env.device import lane_on_host, on_device, on_host, with_missions, write_lane
 from uas_coverage_env.env.kernel import ACCEPTED, finish_step
 from uas_coverage_env.env.memory import (
     FIRST_OBSERVATION,
@@ -36,6 +37,7 @@ from uas_coverage_env.env.memory import (
     REWARD,
     SCRATCH,
     STATUS,
+    TABLES,
     FirstObservation,
     Learners,
     Scratch,
@@ -52,9 +54,10 @@ from uas_coverage_env.env.pool import (
 )
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
+from uas_coverage_env.env.scenes import SceneLane, change_scene
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation.pool import arena_of, lanes_of, start_of, state_of
+from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.simulation.step import (
     begin_step,
     carry_out,
@@ -89,6 +92,12 @@ class Missions(NamedTuple):
     """(N,) of what disturbances draw."""
     mission: NDArray[np.int64]
     """(N,) number of the mission since the beginning, from 0 on."""
+    scene: NDArray[np.int64]
+    """(N, 1) index in the pool of what it flies: 0, or its scene since that has changed."""
+    changes: NDArray[np.int64]
+    """(N, changes) see `SubEnvironments.changes`."""
+    due: NDArray[np.bool_]
+    """(N,) an event has happened at this sample, or a waypoint is asked for again."""
 
 
 _scratch_of = lane_view(SCRATCH, sized_by=ARENA)
@@ -96,37 +105,59 @@ _look_of = lane_view(FIRST_OBSERVATION, sized_by=ARENA)
 
 
 @kernel
+def _is_due(state):
+    """Whether anything happens at this sample that may change the scene."""
+    due = False
+    for e in range(state.event_step.shape[0]):
+        due |= state.event_step[e] == state.step[0]
+    for w in range(state.due_step.shape[0]):
+        due |= state.due_step[w] == state.step[0]
+    return due
+
+
+@kernel
 def _flies(pool, missions, lane):
     """Whether a lane flies in this step: it refuses an action, or begins a mission, where not."""
-    state = state_of(missions.worlds, lane, pool.arenas, 0)
-    learners = learners_of(missions.learners, lane, pool.arenas, 0)
+    learners = learners_of(missions.learners, lane, pool.arenas, missions.scene[lane, 0])
+    missions.due[lane] = False
     missions.refused[lane] = first_not_finite(learners.asked) != ACCEPTED
     if missions.refused[lane]:
         return False
     if missions.ended[lane]:
-        seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
-        missions.ended[lane] = False
-        missions.mission[lane] += 1
-        copy_arrays(start_of(pool.starts, 0), state)
-        arena = arena_of(pool.arenas, 0)
-        seed, mission = missions.seed[lane], missions.mission[lane]
-        begin_random(arena.disturbances, state.disturbance_random, seed, mission)
-        begin_events(arena, state, seed, mission)
-        copy_arrays(first_learners_at(pool.learners, 0), learners)
-        copy_arrays(first_observation_at(pool.first_observations, 0), seen)
-        for i in range(state.status.shape[0]):
-            missions.rewards[lane, i] = 0.0
+        _begin(pool, missions, lane)
         return False
     return True
 
 
 @kernel
+def _begin(pool, missions, lane):
+    """Begin the next mission of a lane."""
+    missions.ended[lane] = False
+    missions.mission[lane] += 1
+    missions.scene[lane, 0] = 0
+    for k in range(missions.changes.shape[1]):
+        missions.changes[lane, k] = -1
+    arena, state = arena_of(pool.arenas, 0), state_of(missions.worlds, lane, pool.arenas, 0)
+    copy_arrays(start_of(pool.starts, 0), state)
+    seed, mission = missions.seed[lane], missions.mission[lane]
+    begin_random(arena.disturbances, state.disturbance_random, seed, mission)
+    begin_events(arena, state, seed, mission)
+    learners = learners_of(missions.learners, lane, pool.arenas, 0)
+    copy_arrays(first_learners_at(pool.learners, 0), learners)
+    seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
+    copy_arrays(first_observation_at(pool.first_observations, 0), seen)
+    for i in range(state.status.shape[0]):
+        missions.rewards[lane, i] = 0.0
+
+
+@kernel
 def _decide(pool, acting, missions, lane):
     """Begin a step with the commands of the actions."""
-    state = state_of(missions.worlds, lane, pool.arenas, 0)
-    learners = learners_of(missions.learners, lane, pool.arenas, 0)
-    scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
-    arena, tables = arena_of(pool.arenas, 0), tables_at(pool.tables, 0)
+    scene = missions.scene[lane, 0]
+    state = state_of(missions.worlds, lane, pool.arenas, scene)
+    learners = learners_of(missions.learners, lane, pool.arenas, scene)
+    scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
+    arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
     seen = as_told(arena, state)
     write_commands(arena, seen, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
@@ -137,11 +168,12 @@ def _decide(pool, acting, missions, lane):
 @kernel
 def _finish(pool, paying, observing, missions, lane):
     """Reward and observe a step that was flown."""
-    state = state_of(missions.worlds, lane, pool.arenas, 0)
-    learners = learners_of(missions.learners, lane, pool.arenas, 0)
-    scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
-    arena, tables = arena_of(pool.arenas, 0), tables_at(pool.tables, 0)
-    seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
+    scene = missions.scene[lane, 0]
+    state = state_of(missions.worlds, lane, pool.arenas, scene)
+    learners = learners_of(missions.learners, lane, pool.arenas, scene)
+    scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
+    arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
+    seen = _look_of(missions.first_observations, lane, pool.arenas, scene)
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
     for i in range(state.status.shape[0]):
@@ -151,6 +183,7 @@ def _finish(pool, paying, observing, missions, lane):
         flies = flies or status == FLYING
         flies = flies or status == SWAPPING
     missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps
+    missions.due[lane] = _is_due(state)
 
 
 @kernel
@@ -165,11 +198,12 @@ def _write_with(write: Any) -> Any:
     @kernel
     def write_own(pool, acting, missions, lane):
         # before the step: an action that cannot be flown is refused as one that is not finite
-        arena = arena_of(pool.arenas, 0)
-        state = state_of(missions.worlds, lane, pool.arenas, 0)
-        tables = tables_at(pool.tables, 0)
-        learners = learners_of(missions.learners, lane, pool.arenas, 0)
-        scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
+        scene = missions.scene[lane, 0]
+        arena = arena_of(pool.arenas, scene)
+        state = state_of(missions.worlds, lane, pool.arenas, scene)
+        tables = tables_at(pool.tables, scene)
+        learners = learners_of(missions.learners, lane, pool.arenas, scene)
+        scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
         if missions.ended[lane] or first_not_finite(learners.asked) != ACCEPTED:
             return
         for i in range(state.status.shape[0]):
@@ -187,9 +221,10 @@ def _write_with(write: Any) -> Any:
 @kernel
 def _fly_as_usual(pool, missions, nonlinear, lane):
     """Fly and judge a step, with the disturbances of the package."""
-    state = state_of(missions.worlds, lane, pool.arenas, 0)
-    scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
-    carry_out(arena_of(pool.arenas, 0), state, nonlinear, None, scratch.outcome)
+    scene = missions.scene[lane, 0]
+    state = state_of(missions.worlds, lane, pool.arenas, scene)
+    scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
+    carry_out(arena_of(pool.arenas, scene), state, nonlinear, None, scratch.outcome)
 
 
 @cache  # to compile it again takes seconds
@@ -199,9 +234,10 @@ def _fly_with(kernels: tuple[Any, ...]) -> Any:
 
     @kernel
     def fly_disturbed(pool, missions, nonlinear, lane):
-        arena = arena_of(pool.arenas, 0)
-        state = state_of(missions.worlds, lane, pool.arenas, 0)
-        scratch = _scratch_of(missions.scratch, lane, pool.arenas, 0)
+        scene = missions.scene[lane, 0]
+        arena = arena_of(pool.arenas, scene)
+        state = state_of(missions.worlds, lane, pool.arenas, scene)
+        scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
         write_all_inputs(arena, state, nonlinear, scratch.outcome)
         disturb(arena, state, scratch.outcome)
         move_all(arena, state, nonlinear, scratch.outcome)
@@ -225,19 +261,6 @@ def _step_of(write: Any, fly: Any) -> Any:
                 _finish(pool, paying, observing, missions, lane)
 
     return step
-
-
-def _on_device(array: NDArray) -> Any:
-    # the simulator's own arrays are strange to what is called by its kernels; it takes plain ones
-    simulated = config.ENABLE_CUDASIM  # pyright: ignore[reportAttributeAccessIssue]
-    return array.copy() if simulated else cuda.to_device(array)
-
-
-def _all_on_device(arrays: Any) -> Any:
-    """The same named tuple, of arrays and named tuples, with its arrays on the device."""
-    if isinstance(arrays, np.ndarray):
-        return _on_device(arrays)
-    return arrays._make(map(_all_on_device, arrays))
 
 
 class CudaMissions:
@@ -282,12 +305,7 @@ class CudaMissions:
             raise ValueError(
                 "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
             )
-        pool = ScenarioPool(scenario, given)
-        if pool.changes:
-            raise ValueError(
-                f"scenario {pool.scenarios[0].name!r} has events or again_after_s by which the "
-                f"scene changes, which does not run on a GPU; take make_vec"
-            )
+        pool = ScenarioPool(scenario, given, lanes=num_envs)
         if goes_home(pool.scenarios[0]):
             raise ValueError(
                 f"scenario {pool.scenarios[0].name!r} has an event that sends UAS home, which does "
@@ -303,7 +321,7 @@ class CudaMissions:
         observing = observing_of(OBSERVATION)
         n_uas = pool.sizes["U"]
         missions = Missions(
-            lanes_of(num_envs, pool.arrays.starts),
+            STATE.zeros(pool.sizes, lanes=num_envs),
             LEARNERS.zeros(pool.sizes, lanes=num_envs),
             FIRST_OBSERVATION.zeros(pool.sizes, lanes=num_envs),
             SCRATCH.zeros(pool.sizes, lanes=num_envs),
@@ -313,15 +331,20 @@ class CudaMissions:
             np.zeros(num_envs, dtype=np.int64),
             np.arange(num_envs, dtype=np.uint64) + np.uint64(seed),
             np.zeros(num_envs, dtype=np.int64),
+            np.zeros((num_envs, 1), dtype=np.int64),
+            np.full((num_envs, pool.sizes["changes"]), -1, dtype=np.int64),
+            np.zeros(num_envs, dtype=np.bool_),
         )
         _begin_all(pool.arrays, missions)
-        self.missions: Missions = _all_on_device(missions)
+        self._pool = pool
+        self._observing = observing
+        self.missions: Missions = on_device(missions)
         self._blocks = -(-num_envs // THREADS_PER_BLOCK)
+        self._pool_there: MissionPool = on_device(pool.arrays)
         self._arguments = (
-            _all_on_device(pool.arrays),
-            _all_on_device(acting),
-            _all_on_device(paying),
-            _all_on_device(observing),
+            on_device(acting),
+            on_device(paying),
+            on_device(observing),
             self.missions,
             given.dynamics == "nonlinear",
         )
@@ -336,7 +359,36 @@ class CudaMissions:
         """
         if asked is not None:
             self.missions.learners.asked[:] = asked
-        self._launched[self._blocks, THREADS_PER_BLOCK](*self._arguments)
+        self._launched[self._blocks, THREADS_PER_BLOCK](self._pool_there, *self._arguments)
+        if self._pool.changes:
+            self._change_scenes()
+
+    def scenario_of(self, lane: int) -> Scenario:
+        """The scenario that a lane flies; where events have changed the scene, as it is now."""
+        return self._pool.scene_of(int(lane_on_host(self.missions.scene, lane)[0]))
+
+    def _change_scenes(self) -> None:
+        """Lay out anew on the host, as a batch does, the scenes that change at this sample."""
+        missions, pool = self.missions, self._pool
+        there = SceneLane(
+            missions.scene,
+            missions.changes,
+            missions.worlds,
+            missions.learners,
+            missions.first_observations.observation,
+        )
+        changed = []
+        for lane in np.flatnonzero(on_host(missions.due)).tolist():
+            here = lane_on_host(there, lane)
+            if change_scene(pool, lane, here, self._observing):
+                write_lane(there, lane, here)
+                changed.append(int(here.scene[0]))
+        if changed:
+            arenas, tables = pool.arrays.arenas, pool.arrays.tables
+            self._pool_there = self._pool_there._replace(
+                arenas=with_missions(self._pool_there.arenas, ARENA, arenas, changed),
+                tables=with_missions(self._pool_there.tables, TABLES, tables, changed),
+            )
 
 
 def _begin_all(pool: MissionPool, missions: Missions) -> None:
@@ -348,7 +400,7 @@ def _begin_all(pool: MissionPool, missions: Missions) -> None:
     )
     for arrays, first in parts:
         for array, start in zip(arrays, first, strict=True):
-            array[:] = start
+            array[:, : len(start)] = start  # lanes have room for what is added
     arena = ARENA.mission(pool.arenas, 0)
     if len(arena.disturbances) or arena.rules["eventful"][0]:
         _begin_random_of_all(pool, missions)

@@ -1,14 +1,14 @@
 """Scenes that change in a batch: those lanes are laid out anew, as a single mission is."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.batch_memory import Missions, SubEnvironments
 from uas_coverage_env.env.drawn import DrawnPool
-from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
+from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.start import look_around
 from uas_coverage_env.scenario import Scenario
@@ -16,6 +16,19 @@ from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE, WorldState
+
+
+class SceneLane(NamedTuple):
+    """What a lane flies, in arrays with room for the largest mission."""
+
+    scene: NDArray[np.int64]
+    """(1,) index in the pool."""
+    changes: NDArray[np.int64]
+    """See `SubEnvironments.changes`."""
+    world: WorldState
+    learners: Learners
+    observation: NDArray[np.float32]
+    """(U, V)."""
 
 
 def change_scenes(
@@ -34,41 +47,56 @@ def change_scenes(
         observing: What is observed.
         observation: (L, U, V); written where a scene changes.
     """
-    worlds = missions.worlds
+    worlds, learners, lanes = missions.worlds, missions.learners, missions.lanes
     happens = (worlds.event_step == worlds.step).any(axis=1)
     again = (worlds.due_step == worlds.step).any(axis=1)
-    for lane in np.flatnonzero(flew & (happens | again)).tolist():
-        _change_scene(pool, missions, lane, observing, observation[lane])
+    for k in np.flatnonzero(flew & (happens | again)).tolist():
+        lane = SceneLane(
+            lanes.scene[k : k + 1],
+            lanes.changes[k],
+            worlds._make(array[k] for array in worlds),
+            learners._make(array[k] for array in learners),
+            observation[k],
+        )
+        change_scene(pool, k, lane, observing)
 
 
-def _change_scene(
-    pool: ScenarioPool | DrawnPool,
-    missions: Missions,
-    lane: int,
-    observing: Observing,
-    observation: NDArray[np.float32],
-) -> None:
-    worlds, lanes = missions.worlds, missions.lanes
-    scene = int(lanes.scene[lane])
+def change_scene(
+    pool: ScenarioPool | DrawnPool, k: int, lane: SceneLane, observing: Observing
+) -> bool:
+    """The same for one lane, in which an event happens or a waypoint is asked for again.
+
+    Args:
+        pool: See above.
+        k: Which lane.
+        lane: What it flies; written where its scene changes.
+        observing: What is observed.
+
+    Returns:
+        Whether it changes.
+    """
+    scene = int(lane.scene[0])
     known = pool.scene_of(scene)
-    state = STATE.lane(worlds, lane, ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene)))
+    sizes = ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene))
+    state = STATE.first_rows(lane.world, sizes)
     changes = changes_due(known, state)
     if not changes:
-        return
-    n_before = int((lanes.changes[lane] >= 0).sum())
-    lanes.changes[lane, n_before : n_before + len(changes)] = changes
+        return False
+    n_before = int((lane.changes >= 0).sum())
+    lane.changes[n_before : n_before + len(changes)] = changes
     for change in changes:
         known = scene_after(known, change, state)
-    scene = lanes.scene[lane] = pool.put_scene(lane, scene, known)
+    scene = lane.scene[0] = pool.put_scene(k, scene, known)
     arena = ARENA.mission(pool.arrays.arenas, scene)
     sizes = ARENA.sizes_of(arena)
     carried = carried_over(known, arena, state)
-    state = STATE.lane(worlds, lane, sizes)
+    state = STATE.first_rows(lane.world, sizes)
     for array, each in zip(state, carried, strict=True):
         array[:] = each
     tables = TABLES.mission(pool.arrays.tables, scene)
-    learners = LEARNERS.lane(missions.learners, lane, sizes)
-    look_around(arena, state, tables, learners, observing, observation[: sizes["U"]])
+    learners = LEARNERS.first_rows(lane.learners, sizes)
+    look_around(arena, state, tables, learners, observing, lane.observation[: sizes["U"]])
+    return True
 
 
 def scenes_in(
