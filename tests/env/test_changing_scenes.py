@@ -10,6 +10,7 @@ from changing_missions import AGAIN, EVENTS, EVERYTHING, STEPS, mission
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.scenario.events import EVENT_KINDS
 
+
 def fly_beside_single_missions(scenario, singles, seeds, n_steps=2 * STEPS + 4, **settings):
     """Fly a batch and, of every lane, a single environment; both begin anew in the next step.
 
