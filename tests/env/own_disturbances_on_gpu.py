@@ -27,16 +27,14 @@ OWN = (
     weak_rotors(0.05),
     deviating(mass=0.05, drag=0.2, power=0.1),
     drained(0.01),
-    *disturbances_of(EVENTFUL),  # its motor
 )
-
-
+MOTOR = disturbances_of(EVENTFUL)
 ASKED = np.full((2, 3), 0.2)
 
 
 def compare_all():
-    """In both plants; with one tuple of disturbances, which is compiled into the step."""
+    """In both plants, beside events and without; their kernels are compiled into the step."""
     return [
-        compare(EVENTFUL, ASKED, 11, disturbances=OWN),
+        compare(EVENTFUL, ASKED, 11, disturbances=(*OWN, *MOTOR)),
         compare(GROUND, ASKED, 11, disturbances=OWN, dynamics="nonlinear", action=CLIMB_RATE),
     ]

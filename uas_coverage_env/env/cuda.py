@@ -8,23 +8,34 @@ precision; the GPU's own roots and exponentials may differ in the last digit.
 Without a GPU, numba's simulator runs it: `NUMBA_ENABLE_CUDASIM=1`, for tests.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.env.act import acting_of, is_own
+from uas_coverage_env.env.checkpoint import checked
 from uas_coverage_env.env.cuda_kernel import Missions, new_missions, step_with
-from uas_coverage_env.env.device import lane_on_host, on_device, on_host, with_missions, write_lane
+from uas_coverage_env.env.device import (
+    lane_on_host,
+    on_device,
+    on_host,
+    with_missions,
+    write,
+    write_lane,
+)
 from uas_coverage_env.env.memory import TABLES
 from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
-from uas_coverage_env.env.scenes import SceneLane, change_scene
+from uas_coverage_env.env.scenes import SceneLane, change_scene, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.state_dict import check_like, check_values
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
@@ -115,6 +126,37 @@ class CudaMissions:
     def scenario_of(self, lane: int) -> Scenario:
         """The scenario that a lane flies; where events have changed the scene, as it is now."""
         return self._pool.scene_of(int(lane_on_host(self.missions.scene, lane)[0]))
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """All that changes from step to step, on the host, by name."""
+        return {name: on_host(array) for name, array in self._changing().items()}
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on where missions of the same arguments were when their `state_dict` was taken.
+
+        Raises:
+            ValueError: An array is missing, surplus, of another shape or dtype, or holds what no
+                mission here can have.
+        """
+        pool, own = self._pool, self._changing()
+        check_like(state, own)
+        check_values(state, {"mission": (0, np.iinfo(np.int64).max - 1)})
+        scenario = np.zeros(len(state["mission"]), dtype=np.int64)
+        _, changed = checked(pool, {**state, "scenario": scenario})
+        for name, array in own.items():
+            if array.size:
+                write(array, state[name])
+        scene = scenario.copy()
+        install_scenes(pool, scenario, scene, changed)
+        write(self.missions.scene, scene[:, np.newaxis])
+        self._pool_there = on_device(pool.arrays)
+
+    def _changing(self) -> dict[str, Any]:
+        missions = self.missions
+        arrays = missions.worlds._asdict() | missions.learners._asdict()
+        for name in ("rewards", "ended", "refused", "acted", "seed", "mission", "changes"):
+            arrays[name] = getattr(missions, name)
+        return {**arrays, "observation": missions.first_observations.observation}
 
     def _change_scenes(self) -> None:
         """Lay out anew on the host, as a batch does, the scenes that change at this sample."""

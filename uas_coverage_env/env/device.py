@@ -33,7 +33,7 @@ def write_lane(arrays: Any, lane: int, values: Any) -> None:
         for array, value in zip(arrays, values, strict=True):
             write_lane(array, lane, value)
     elif arrays.size:
-        _write(arrays[lane], values)
+        write(arrays[lane], values)
 
 
 def on_host(array: Any) -> NDArray[Any]:
@@ -61,11 +61,12 @@ def with_missions(there: Pool, memory: Memory, here: Pool, missions: Sequence[in
         for firsts, mission in changed:
             first, values = firsts[f], mission[f].reshape(-1)
             if values.size:
-                _write(arrays[f][first : first + values.size], values)
+                write(arrays[f][first : first + values.size], values)
     return Pool(memory.declaration(*arrays), on_device(here.first), on_device(here.sizes))
 
 
-def _write(view: Any, values: NDArray[Any]) -> None:
+def write(view: Any, values: NDArray[Any]) -> None:
+    """Write a contiguous array on the device, or a view of one."""
     if _SIMULATED:
         view[...] = values
     else:

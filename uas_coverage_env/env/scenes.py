@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.batch_memory import Missions, SubEnvironments
+from uas_coverage_env.env.batch_memory import Missions
 from uas_coverage_env.env.drawn import DrawnPool
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing
 from uas_coverage_env.env.pool import ScenarioPool
@@ -145,15 +145,19 @@ def _scene_after_all(
 
 
 def install_scenes(
-    pool: ScenarioPool | DrawnPool, lanes: SubEnvironments, changed: Mapping[int, Scenario]
+    pool: ScenarioPool | DrawnPool,
+    scenario: NDArray[np.int64],
+    scene: NDArray[np.int64],
+    changed: Mapping[int, Scenario],
 ) -> None:
     """Put the scenes of `scenes_in` into a pool.
 
     Args:
         pool: Of the batch.
-        lanes: With the scenarios and changes of the batch; `scene` is written.
+        scenario: (L,) index in the pool of the mission.
+        scene: (L,) index of what is flown now; written.
         changed: Lane -> the scenario that it flies now.
     """
-    lanes.scene[:] = lanes.scenario
+    scene[:] = scenario
     for lane, known in changed.items():
-        lanes.scene[lane] = pool.put_scene(lane, int(lanes.scenario[lane]), known)
+        scene[lane] = pool.put_scene(lane, int(scenario[lane]), known)
