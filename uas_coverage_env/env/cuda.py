@@ -33,7 +33,7 @@ from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
-from uas_coverage_env.env.scenes import SceneLane, change_scene, install_scenes
+from uas_coverage_env.env.scenes import SceneChanges, SceneLane, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like, check_values
 from uas_coverage_env.scenario import Scenario
@@ -168,10 +168,10 @@ class CudaMissions:
             missions.learners,
             missions.first_observations.observation,
         )
-        changed = []
+        scenes, changed = SceneChanges(pool, self._observing), []
         for lane in np.flatnonzero(on_host(missions.due)).tolist():
             here = lane_on_host(there, lane)
-            if change_scene(pool, lane, here, self._observing):
+            if scenes.change(lane, here):
                 write_lane(there, lane, here)
                 changed.append(int(here.scene[0]))
         if changed:

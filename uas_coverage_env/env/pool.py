@@ -178,20 +178,19 @@ class ScenarioPool:
         """The scenario that is flown now where `lanes.scene` is this."""
         return self._known[scene]
 
-    def put_scene(self, lane: int, scene: int, known: Scenario) -> int:
-        """Lay out what the scene of a lane has become.
+    def put_scene(self, lane: int, known: Scenario, arena: Arena, tables: Tables) -> int:
+        """Install what the scene of a lane has become.
 
         Args:
             lane: Which; below `lanes`.
-            scene: Index in the pool of what it has been.
             known: The scenario from now on.
+            arena: Its arrays, see `scene_arrays`.
+            tables: Likewise.
 
         Returns:
             Index in the pool of what it is.
         """
         now = len(self) + lane
-        before = TABLES.mission(self.arrays.tables, scene)
-        arena, tables = scene_arrays(known, self.settings, self.disturbances, before)
         self._put(now, arena, tables)
         self._known[now] = known
         return now

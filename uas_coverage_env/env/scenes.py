@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.batch_memory import Missions
 from uas_coverage_env.env.drawn import DrawnPool
-from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing
-from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing, Tables
+from uas_coverage_env.env.pool import ScenarioPool, scene_arrays
 from uas_coverage_env.env.start import look_around
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
-from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.arena import ARENA, Arena
 from uas_coverage_env.world.state import STATE, WorldState
 
 
@@ -50,6 +50,7 @@ def change_scenes(
     worlds, learners, lanes = missions.worlds, missions.learners, missions.lanes
     happens = (worlds.event_step == worlds.step).any(axis=1)
     again = (worlds.due_step == worlds.step).any(axis=1)
+    scenes = SceneChanges(pool, observing)
     for k in np.flatnonzero(flew & (happens | again)).tolist():
         lane = SceneLane(
             lanes.scene[k : k + 1],
@@ -58,45 +59,68 @@ def change_scenes(
             learners._make(array[k] for array in learners),
             observation[k],
         )
-        change_scene(pool, k, lane, observing)
+        scenes.change(k, lane)
 
 
-def change_scene(
-    pool: ScenarioPool | DrawnPool, k: int, lane: SceneLane, observing: Observing
-) -> bool:
-    """The same for one lane, in which an event happens or a waypoint is asked for again.
+class SceneChanges:
+    """What changes the scenes of lanes at one sample; scenes that are equal are laid out once.
 
     Args:
-        pool: See above.
-        k: Which lane.
-        lane: What it flies; written where its scene changes.
+        pool: The scenes of lanes are put into it.
         observing: What is observed.
-
-    Returns:
-        Whether it changes.
     """
-    scene = int(lane.scene[0])
-    known = pool.scene_of(scene)
-    sizes = ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene))
-    state = STATE.first_rows(lane.world, sizes)
-    changes = changes_due(known, state)
-    if not changes:
-        return False
-    n_before = int((lane.changes >= 0).sum())
-    lane.changes[n_before : n_before + len(changes)] = changes
-    for change in changes:
-        known = scene_after(known, change, state)
-    scene = lane.scene[0] = pool.put_scene(k, scene, known)
-    arena = ARENA.mission(pool.arrays.arenas, scene)
-    sizes = ARENA.sizes_of(arena)
-    carried = carried_over(known, arena, state)
-    state = STATE.first_rows(lane.world, sizes)
-    for array, each in zip(state, carried, strict=True):
-        array[:] = each
-    tables = TABLES.mission(pool.arrays.tables, scene)
-    learners = LEARNERS.first_rows(lane.learners, sizes)
-    look_around(arena, state, tables, learners, observing, lane.observation[: sizes["U"]])
-    return True
+
+    def __init__(self, pool: ScenarioPool | DrawnPool, observing: Observing) -> None:
+        self._pool, self._observing = pool, observing
+        self._made: dict[tuple[int, ...], tuple[Scenario, Arena, Tables]] = {}
+
+    def change(self, k: int, lane: SceneLane) -> bool:
+        """Change the scene of a lane in which something has happened; says whether it changes.
+
+        Args:
+            k: Which lane.
+            lane: What it flies; written where its scene changes.
+        """
+        pool, scene = self._pool, int(lane.scene[0])
+        known = pool.scene_of(scene)
+        sizes = ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene))
+        state = STATE.first_rows(lane.world, sizes)
+        changes = changes_due(known, state)
+        if not changes:
+            return False
+        n_before = int((lane.changes >= 0).sum())
+        lane.changes[n_before : n_before + len(changes)] = changes
+        known, arena, tables = self._after(scene, changes, state)
+        lane.scene[0] = pool.put_scene(k, known, arena, tables)
+        sizes = ARENA.sizes_of(arena)
+        carried = carried_over(known, arena, state)
+        state = STATE.first_rows(lane.world, sizes)
+        for array, each in zip(state, carried, strict=True):
+            array[:] = each
+        learners = LEARNERS.first_rows(lane.learners, sizes)
+        observation = lane.observation[: sizes["U"]]
+        look_around(arena, state, tables, learners, self._observing, observation)
+        return True
+
+    def _after(
+        self, scene: int, changes: Sequence[int], state: WorldState
+    ) -> tuple[Scenario, Arena, Tables]:
+        """The scene after changes, and its arrays."""
+        known = self._pool.scene_of(scene)
+        uas = [int(state.event_uas[change]) for change in changes if change < len(known.events)]
+        # lanes whose scenes have been equal so far share one scenario
+        key = (id(known), int(state.step[0]), len(changes), *changes, *uas)
+        if key not in self._made:
+            for change in changes:
+                known = scene_after(known, change, state)
+            self._made[key] = known, *_laid_out(self._pool, scene, known)
+        return self._made[key]
+
+
+def _laid_out(pool: ScenarioPool | DrawnPool, scene: int, known: Scenario) -> tuple[Arena, Tables]:
+    """The arrays of what the scene of a mission has become, which was this one of the pool."""
+    before = TABLES.mission(pool.arrays.tables, scene)
+    return scene_arrays(known, pool.settings, pool.disturbances, before)
 
 
 def scenes_in(
@@ -160,4 +184,5 @@ def install_scenes(
     """
     scene[:] = scenario
     for lane, known in changed.items():
-        scene[lane] = pool.put_scene(lane, int(scenario[lane]), known)
+        arrays = _laid_out(pool, int(scenario[lane]), known)
+        scene[lane] = pool.put_scene(lane, known, *arrays)
