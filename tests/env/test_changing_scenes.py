@@ -182,6 +182,21 @@ def test_changes_that_no_mission_can_have_are_refused(changes):
         np.testing.assert_array_equal(array, before[name])
 
 
+def test_scenes_that_become_equal_are_laid_out_once():
+    closed = {**EVENTS[6], "rate_per_h": None, "at_s": 4.0}  # the home of a UAS by lot
+    batch = CoverageBatch(6, mission(EVENTS[0], closed))
+    batch.reset(0)
+    arenas = []
+    for _ in range(4):
+        batch.step(np.zeros((6, 2, 3)))
+        first = batch.pool.arrays.arenas.first[batch.lanes.scene]
+        arenas.append(len(np.unique(first, axis=0)))
+    assert arenas == [1, 1, 1, 2]
+    known = [batch.scenario_of(lane) for lane in range(6)]
+    assert len({id(scenario) for scenario in known}) == 2
+    assert len({scenario.uas[0].start_m for scenario in known}) == 2
+
+
 def test_pictures_of_a_batch_show_its_scenes():
     envs = gymnasium.make_vec(
         "UASCoverage-v0", num_envs=2, vectorization_mode="vector_entry_point",

@@ -58,8 +58,9 @@ def with_missions(there: Pool, memory: Memory, here: Pool, missions: Sequence[in
         if arrays[f].size != array.size:
             arrays[f] = on_device(array)
             continue
-        for firsts, mission in changed:
-            first, values = firsts[f], mission[f].reshape(-1)
+        # those that are equal lie in one place
+        places = {firsts[f]: mission[f].reshape(-1) for firsts, mission in changed}
+        for first, values in places.items():
             if values.size:
                 write(arrays[f][first : first + values.size], values)
     return Pool(memory.declaration(*arrays), on_device(here.first), on_device(here.sizes))

@@ -72,7 +72,7 @@ class SceneChanges:
 
     def __init__(self, pool: ScenarioPool | DrawnPool, observing: Observing) -> None:
         self._pool, self._observing = pool, observing
-        self._made: dict[tuple[int, ...], tuple[Scenario, Arena, Tables]] = {}
+        self._made: dict[tuple[Any, ...], tuple[Scenario, Arena, Tables]] = {}
 
     def change(self, k: int, lane: SceneLane) -> bool:
         """Change the scene of a lane in which something has happened; says whether it changes.
@@ -107,9 +107,10 @@ class SceneChanges:
     ) -> tuple[Scenario, Arena, Tables]:
         """The scene after changes, and its arrays."""
         known = self._pool.scene_of(scene)
-        uas = [int(state.event_uas[change]) for change in changes if change < len(known.events)]
+        events = [change for change in changes if change < len(known.events)]
+        of_uas = [e for e in events if isinstance(known.events[e], OfUas)]
         # lanes whose scenes have been equal so far share one scenario
-        key = (id(known), int(state.step[0]), len(changes), *changes, *uas)
+        key = id(known), int(state.step[0]), tuple(changes), tuple(state.event_uas[of_uas].tolist())
         if key not in self._made:
             for change in changes:
                 known = scene_after(known, change, state)
