@@ -45,12 +45,11 @@ def disturbances_in(
         ValueError: See `disturbances_of`; or one belongs to an event that the scenario does not
             have.
     """
-    own = disturbances_of(scenario)
     if given is None:
-        return own
+        return disturbances_of(scenario)
     given = checked_disturbances(given)
     for disturbance in given:
-        if disturbance.act is degrade and disturbance not in own:
+        if disturbance.act is degrade and disturbance not in disturbances_of(scenario):
             raise ValueError(
                 f"disturbance {disturbance.name!r} belongs to an event that scenario "
                 f"{scenario.name!r} does not have; leave it out"

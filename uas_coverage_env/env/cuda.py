@@ -154,6 +154,7 @@ class CudaMissions:
     def _changing(self) -> dict[str, Any]:
         missions = self.missions
         arrays = missions.worlds._asdict() | missions.learners._asdict()
+        del arrays["asked"]  # of the coming step
         for name in ("rewards", "ended", "refused", "acted", "seed", "mission", "changes"):
             arrays[name] = getattr(missions, name)
         return {**arrays, "observation": missions.first_observations.observation}
