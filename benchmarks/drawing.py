@@ -1,10 +1,11 @@
-"""What missions that are drawn at reset cost, beside missions that are given.
+"""What missions cost that are drawn at reset, or whose scenes change, beside missions that do not.
 
     python benchmarks/drawing.py
 
 Processor time: of a reset that draws a generated scenario, and of its parts; and of the steps of a
 batch that draws its missions, beside a batch that was handed the same missions in a list. In most
-steps no mission ends, and the median is of these.
+steps no mission ends, and the median is of these. Then of the step after which the scenes of all
+lanes change, in the same way; and how much memory a scene and a lane take.
 """
 
 import argparse
@@ -15,11 +16,13 @@ from statistics import median
 
 import numpy as np
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import load_scenario, uas_coverage_v0
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.env import CoverageBatch, MissionSettings
 from uas_coverage_env.env.episode import Episode
+from uas_coverage_env.env.memory import TABLES
 from uas_coverage_env.scenario import FAMILIES, Scenario
+from uas_coverage_env.world.arena import ARENA
 
 FAMILY = FAMILIES["generated"]
 
@@ -71,15 +74,44 @@ def step_table(num_envs: int, n_steps: int) -> None:
         print(f"{name:32} {median(taken):10.2f} {np.quantile(taken, 0.9):10.2f}")
 
 
+def changing(num_envs: int) -> tuple[CoverageBatch, float]:
+    """A batch in which all scenes have just changed, and what that step has taken [ms]."""
+    added = {"kind": "waypoint_added", "at_s": 2.0, "position_m": (50.0, 50.0, -20.0)}
+    scenario = load_scenario("village").model_dump(by_alias=True)
+    scenario["events"] = ({**added, "radius_m": 8.0},)
+    batch = CoverageBatch(num_envs, Scenario.model_validate(scenario))
+    batch.reset(seed=0)
+    actions = np.zeros((num_envs, batch.n_uas, batch.actions.size))
+    batch.step(actions)
+    return batch, milliseconds(partial(batch.step, actions))
+
+
+def scene_table(num_envs: int, n_batches: int) -> None:
+    """Print what scenes cost that change."""
+    print(f"\n{f'scenes change, {n_batches} times':32} {'median, ms':>10} {'90 %, ms':>10}")
+    for lanes in (1, num_envs):
+        times = [changing(lanes)[1] for _ in range(n_batches)]
+        name = f"a step of {lanes} missions"
+        print(f"{name:32} {median(times):10.2f} {np.quantile(times, 0.9):10.2f}")
+    batch, _ = changing(1)
+    pool = batch.pool.arrays
+    scene = (*ARENA.mission(pool.arenas, 1), *TABLES.mission(pool.tables, 1))
+    lane = (*batch.worlds, *batch.learners, batch.observation)
+    for name, arrays in (("a scene, kB", scene), ("a lane, kB", lane)):
+        print(f"{name:32} {sum(array.nbytes for array in arrays) / 1e3:10.1f}")
+
+
 def main() -> None:
-    """Print both tables."""
+    """Print all tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--missions", type=int, default=100, help="resets that are timed")
     parser.add_argument("--lanes", type=int, default=256, help="missions of a batch")
     parser.add_argument("--steps", type=int, default=100, help="steps of a batch that are timed")
+    parser.add_argument("--batches", type=int, default=10, help="batches whose scenes change")
     given = parser.parse_args()
     reset_table(given.missions)
     step_table(given.lanes, given.steps)
+    scene_table(given.lanes, given.batches)
 
 
 if __name__ == "__main__":

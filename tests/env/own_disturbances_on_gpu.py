@@ -1,17 +1,14 @@
 """Own disturbances on numba's simulated GPU, and the same as episodes: see `simulated_gpu`."""
 
 import numpy as np
+from beside_episodes import compare
 from own_actions import CLIMB_RATE
 from own_disturbances import deviating, drained, gusts, push, weak_rotors
 from practice_grounds import practice_ground
 
 from uas_coverage_env.disturbances import disturbances_of
-from uas_coverage_env.env.cuda import CudaMissions
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import with_disturbances
 
-SEED, N_LANES, N_STEPS = 7, 2, 11
 GROUND = practice_ground(n_uas=2, max_steps=5)
 EVENTS = (
     {"kind": "uas_lost", "rate_per_h": 600.0},
@@ -30,42 +27,14 @@ OWN = (
     weak_rotors(0.05),
     deviating(mass=0.05, drag=0.2, power=0.1),
     drained(0.01),
-    *disturbances_of(EVENTFUL),  # its motor
 )
-
-
-def compare(**settings):
-    """Fly both ways past the end of missions; lanes have seeds of their own."""
-    settings = {"disturbances": OWN, **settings}
-    missions = CudaMissions(N_LANES, EVENTFUL, seed=SEED, **settings)
-    episodes = [Episode(EVENTFUL, MissionSettings(**settings)) for _ in range(N_LANES)]
-    flown = [0] * N_LANES
-    for lane, episode in enumerate(episodes):
-        episode.reset(SEED + lane)
-    ended = [False] * N_LANES
-    different = 0
-    asked = np.full((2, 3), 0.2)
-    seen = missions.missions
-    for _ in range(N_STEPS):
-        missions.step(np.array([asked] * N_LANES))
-        for lane, episode in enumerate(episodes):
-            if ended[lane]:
-                flown[lane] += 1
-                episode.reset(SEED + lane, flown[lane])
-            else:
-                episode.asked[:] = asked
-                episode.step()
-            ended[lane] = bool(seen.ended[lane])
-            observed = seen.first_observations.observation[lane]
-            different += int((observed != episode.observation).sum())
-            different += int((seen.worlds.x[lane, :, :3] != episode.positions_m).sum())
-    return {
-        "different": different,
-        "restarts": sum(flown),
-        "apart": bool((seen.worlds.x[0] != seen.worlds.x[1]).any()),
-    }
+MOTOR = disturbances_of(EVENTFUL)
+ASKED = np.full((2, 3), 0.2)
 
 
 def compare_all():
-    """In both plants; with one tuple of disturbances, which is compiled into the step."""
-    return [compare(), compare(dynamics="nonlinear", action=CLIMB_RATE)]
+    """In both plants, beside events and without; their kernels are compiled into the step."""
+    return [
+        compare(EVENTFUL, ASKED, 11, disturbances=(*OWN, *MOTOR)),
+        compare(GROUND, ASKED, 11, disturbances=OWN, dynamics="nonlinear", action=CLIMB_RATE),
+    ]

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
 
 import own_actions_on_gpu
 import own_disturbances_on_gpu
+import scenes_on_gpu
 
 from uas_coverage_env.env import cuda
 from uas_coverage_env.env.cuda import CudaMissions
@@ -117,5 +118,6 @@ if __name__ == "__main__":
     own = {
         "actions": own_actions_on_gpu.compare(),
         "disturbances": own_disturbances_on_gpu.compare_all(),
+        "scenes": scenes_on_gpu.compare_all(),
     }
     print(json.dumps({"missions": flown, **own}))

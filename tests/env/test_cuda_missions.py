@@ -1,3 +1,7 @@
+from changing_missions import EVENTS, EVERYTHING
+from scenes_on_gpu import EVERY_KIND
+
+from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.world import SWAPPING
 
 
@@ -18,3 +22,24 @@ def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes(flown_on_
         ["tilt", "tilt_rate"],
         ["speed", "tilt", "tilt_rate"],
     ]
+
+
+def test_scenes_change_on_a_simulated_gpu_as_in_episodes(flown_on_gpu):
+    everything, again = (flown_on_gpu["scenes"][name] for name in ("all", "again"))
+    for result in (everything, again):
+        assert result["different"] == 0
+        assert result["restarts"] == 2
+    n_events = len(EVENTS)
+    assert len(EVERY_KIND) == len(EVENT_KINDS) == n_events
+    change = {e for e, event in enumerate(EVERYTHING.events) if event.changes_scene}
+    assert change <= set(everything["changes"])
+    assert max(everything["changes"]) >= n_events  # a waypoint is asked for again
+    assert again["changes"]
+
+
+def test_missions_on_a_gpu_that_are_put_aside_go_on_in_their_scenes(flown_on_gpu):
+    result = flown_on_gpu["scenes"]["checkpoint"]
+    assert result["different"] == 0
+    assert min(result["changes"]) > 2
+    assert "changes[0] is" in result["refused"]
+    assert "which no mission here can have" in result["refused"]

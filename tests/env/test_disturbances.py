@@ -9,7 +9,7 @@ import pytest
 from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
 from practice_grounds import practice_ground
 
-from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env import World, uas_coverage_v0
 from uas_coverage_env.disturbances import constant_wind, disturbances_of
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.cuda import CudaMissions
@@ -19,6 +19,8 @@ GROUND = practice_ground(n_uas=2, max_steps=12)
 LEVEL = disturbances_of(with_disturbances(GROUND, "moderate", 1))
 OWN = (*LEVEL, gusts(), push(0.2, 0.0, 0.0), weak_rotors(0.05))
 WINDY = GROUND.model_copy(update={"wind": Wind(mean_mps=5.0, from_deg=120.0)})
+FAILS = {"kind": "motor_degraded", "at_s": 3.0, "thrust_share": 0.9, "power_factor": 1.3}
+MOTOR = disturbances_of(GROUND.model_copy(update={"events": (FAILS,)}))
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
 
 
@@ -189,6 +191,9 @@ def test_what_does_not_fit_is_refused():
         (lambda: CoverageBatch(2, GROUND, disturbances="wind"), "disturbances"),
         (lambda: uas_coverage_v0.parallel_env(GROUND, disturbances=(gusts(), other)), "of its own"),
         (lambda: CudaMissions(2, GROUND, seed=-1), "seed is -1"),
+        # of an event that happens elsewhere
+        (lambda: CoverageBatch(2, GROUND, disturbances=MOTOR), "does not have; leave it out"),
+        (lambda: World(GROUND, disturbances=MOTOR), r"'events\[0\] motor_degraded' belongs to"),
     ]
     for case, match in cases:
         with pytest.raises(ValueError, match=match):

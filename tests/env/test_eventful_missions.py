@@ -175,12 +175,6 @@ def test_one_agent_for_the_swarm_flies_a_changed_scene_and_its_picture_shows_it(
     assert (np.asarray(env.render()) != np.asarray(before)).mean() > 0.001
 
 
-def test_a_scene_that_changes_is_refused_on_a_gpu_in_one_line():
-    with pytest.raises(ValueError, match=r"scene changes.*take make_vec") as caught:
-        CudaMissions(1, changing(SCENE_EVENTS[5]))
-    assert "\n" not in str(caught.value)
-
-
 def test_what_takes_guidance_is_refused_on_a_gpu():
     scenario = GROUND.model_copy(update={"events": ({"kind": "planner_lost", "at_s": 5.0},)})
     with pytest.raises(ValueError, match=r"sends UAS home.*\(then = \"hover\"\)"):

@@ -207,14 +207,22 @@ class Memory(Generic[T]):
             lane: Which.
             sizes: Of the mission in it; sizes that are not named are those of the lanes.
         """
+        return self.first_rows([array[lane] for array in lanes], sizes)
+
+    def first_rows(self, arrays: Sequence[NDArray[Any]], sizes: Mapping[str, int]) -> T:
+        """The declaration of a mission in arrays with room for a larger one, views.
+
+        Args:
+            arrays: Of each field, with room; contiguous.
+            sizes: Of the mission; sizes that are not named are those of the arrays.
+        """
         made = {}
-        for field, array in zip(self.fields, lanes, strict=True):
-            mine = array[lane]
+        for field, array in zip(self.fields, arrays, strict=True):
             shape = tuple(
                 sizes.get(str(axis), size)
-                for axis, size in zip(field.axes, mine.shape, strict=True)
+                for axis, size in zip(field.axes, array.shape, strict=True)
             )
-            made[field.name] = mine.reshape(-1)[: math.prod(shape)].reshape(shape)
+            made[field.name] = array.reshape(-1)[: math.prod(shape)].reshape(shape)
         return self.made_of(made)
 
     def size(self, pool: Pool, name: str) -> NDArray[np.int64]:

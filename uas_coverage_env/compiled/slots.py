@@ -1,6 +1,7 @@
 """Arrays of many missions that are replaced one by one, as kernels read them from a pool."""
 
 import hashlib
+from collections import Counter
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -46,45 +47,60 @@ class Slots(Generic[T]):
         """
         sizes = self._memory.sizes_of(mission)
         for f, (column, array) in enumerate(zip(self._columns, mission, strict=True)):
-            column.put(slot, array)
-            self.pool.first[:, f] = column.first
+            if column.put(slot, array):
+                self.pool.first[:, f] = column.place * column.room
+            self.pool.first[slot, f] = column.place[slot] * column.room
         self.pool.sizes[slot] = [sizes[name] for name in self._memory.names]
         arrays = {column.field.name: column.array for column in self._columns}
         self.pool = self.pool._replace(arrays=self._memory.made_of(arrays))
 
 
 class _Column:
-    """One array of n missions, in n places as large as the largest of them so far."""
+    """One array of n missions, in up to n places as large as the largest of them so far.
+
+    Attributes:
+        array: All places, end to end.
+        room: Length of a place.
+        place: (n,) where the array of each slot lies.
+    """
 
     def __init__(self, field: Field, n: int) -> None:
         self.field = field
         self.array: NDArray[Any] = np.zeros(0, dtype=field.dtype)
-        self._room = 0
-        self._place = np.zeros(n, dtype=np.int64)
+        self.room = 0
+        self.place = np.zeros(n, dtype=np.int64)
         self._content = [b""] * n  # of each slot
+        self._slots_with: Counter[bytes] = Counter()
         self._places: dict[bytes, int] = {}
-        self._free = list(range(n - 1, -1, -1))
+        self._n_places = 0
+        self._free: list[int] = []
 
-    @property
-    def first(self) -> NDArray[np.int64]:
-        """(n,) where the array of a slot begins."""
-        return self._place * self._room
-
-    def put(self, slot: int, array: NDArray[Any]) -> None:
+    def put(self, slot: int, array: NDArray[Any]) -> bool:
+        """Put the array of a slot into its place; says whether other places have moved."""
         before, content = self._content[slot], hashlib.blake2b(array.tobytes()).digest()
         self._content[slot] = content
-        if before and before not in self._content:
-            self._free.append(self._places.pop(before))
-        if content not in self._places:
-            if array.size > self._room:
-                self._make_room(array.size + array.size // 4)
-            place = self._places[content] = self._free.pop()
-            first = place * self._room
-            self.array[first : first + array.size] = array.reshape(-1)
-        self._place[slot] = self._places[content]
+        self._slots_with[content] += 1
+        if before:
+            self._slots_with[before] -= 1
+            if not self._slots_with[before]:
+                del self._slots_with[before]
+                self._free.append(self._places.pop(before))
+        if content in self._places:
+            self.place[slot] = self._places[content]
+            return False
+        grows = array.size > self.room
+        if grows or not self._free:
+            self._make_room(array.size + array.size // 4 if grows else self.room)
+        place = self.place[slot] = self._places[content] = self._free.pop()
+        self.array[place * self.room :][: array.size] = array.reshape(-1)
+        return grows
 
     def _make_room(self, room: int) -> None:
-        n, before = len(self._place), self._room
+        """Make places this long, and more of them where none is free."""
+        n, kept = self._n_places, self._n_places
+        if not self._free:
+            n = min(2 * n + 1, len(self.place))
+            self._free = list(range(n - 1, kept - 1, -1))
         array = np.zeros(n * room, dtype=self.field.dtype)
-        array.reshape(n, room)[:, :before] = self.array.reshape(n, before)
-        self.array, self._room = array, room
+        array.reshape(n, room)[:kept, : self.room] = self.array.reshape(kept, self.room)
+        self.array, self.room, self._n_places = array, room, n

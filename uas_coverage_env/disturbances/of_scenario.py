@@ -1,9 +1,9 @@
 """The disturbances that a scenario asks for."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from uas_coverage_env.disturbances.gusts import discrete_gusts, random_gusts
-from uas_coverage_env.disturbances.motor import motor_degraded
+from uas_coverage_env.disturbances.motor import degrade, motor_degraded
 from uas_coverage_env.disturbances.turbulence import turbulence
 from uas_coverage_env.disturbances.uncertainty import uncertainty
 from uas_coverage_env.disturbances.wind import mean_wind
@@ -30,6 +30,31 @@ def disturbances_of(scenario: Scenario) -> tuple[Disturbance, ...]:
         if isinstance(event, MotorDegraded)
     ]
     return checked_disturbances(found)
+
+
+def disturbances_in(
+    scenario: Scenario, given: Sequence[Disturbance] | None
+) -> tuple[Disturbance, ...]:
+    """What acts in a mission.
+
+    Args:
+        scenario: Of the mission.
+        given: In place of what the scenario asks for; None: what it asks for.
+
+    Raises:
+        ValueError: See `disturbances_of`; or one belongs to an event that the scenario does not
+            have.
+    """
+    if given is None:
+        return disturbances_of(scenario)
+    given = checked_disturbances(given)
+    for disturbance in given:
+        if disturbance.act is degrade and disturbance not in disturbances_of(scenario):
+            raise ValueError(
+                f"disturbance {disturbance.name!r} belongs to an event that scenario "
+                f"{scenario.name!r} does not have; leave it out"
+            )
+    return given
 
 
 def _of_wind(wind: Wind) -> Iterator[Disturbance]:

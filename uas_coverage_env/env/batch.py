@@ -292,7 +292,7 @@ class CoverageBatch:
             self.pool.install(drawn)
         for name, array in own.items():
             array[...] = state[name]
-        install_scenes(self.pool, self.lanes, changed)
+        install_scenes(self.pool, self.lanes.scenario, self.lanes.scene, changed)
         # the other array of observations is not what it was
         self.missions.settled[:] = False
         self._begun = bool((self.lanes.mission >= 0).all())

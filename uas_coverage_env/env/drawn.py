@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.slots import Slots
-from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES
-from uas_coverage_env.env.pool import MissionPool, ScenarioPool, scene_arrays
+from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES, Tables
+from uas_coverage_env.env.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.simulation.scenes import changes_scene
-from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.arena import ARENA, Arena
 from uas_coverage_env.world.disturbance import fitted_to, in_slots
 from uas_coverage_env.world.events import goes_home, is_eventful
 from uas_coverage_env.world.packs import swaps_alone
@@ -150,10 +150,8 @@ class DrawnPool:
         """The scenario that is flown now where `lanes.scene` is this."""
         return self.scenarios[scene]
 
-    def put_scene(self, lane: int, scene: int, known: Scenario) -> int:
-        """Lay out what the scene of a lane has become, see `ScenarioPool`: in its own slot."""
-        before = TABLES.mission(self.arrays.tables, scene)
-        arena, tables = scene_arrays(known, self.settings, self.disturbances, before)
+    def put_scene(self, lane: int, known: Scenario, arena: Arena, tables: Tables) -> int:
+        """Install what the scene of a lane has become, see `ScenarioPool`: in its own slot."""
         self._slots[_MEMORIES.index(ARENA)].put(lane, arena)
         self._slots[_MEMORIES.index(TABLES)].put(lane, tables)
         self.scenarios[lane] = known

@@ -167,8 +167,7 @@ class ScenarioPool:
             n = len(self._known)
             self._arenas, self._tables = Slots(ARENA, n), Slots(TABLES, n)
             for s in range(len(self)):
-                self._arenas.put(s, ARENA.mission(worlds.arenas, s))
-                self._tables.put(s, tables[s])
+                self._put(s, ARENA.mission(worlds.arenas, s), tables[s])
         self.n_uas = ARENA.size(worlds.arenas, "U")
         self.n_waypoints = ARENA.size(worlds.arenas, "W")
 
@@ -179,25 +178,27 @@ class ScenarioPool:
         """The scenario that is flown now where `lanes.scene` is this."""
         return self._known[scene]
 
-    def put_scene(self, lane: int, scene: int, known: Scenario) -> int:
-        """Lay out what the scene of a lane has become.
+    def put_scene(self, lane: int, known: Scenario, arena: Arena, tables: Tables) -> int:
+        """Install what the scene of a lane has become.
 
         Args:
             lane: Which; below `lanes`.
-            scene: Index in the pool of what it has been.
             known: The scenario from now on.
+            arena: Its arrays, see `scene_arrays`.
+            tables: Likewise.
 
         Returns:
             Index in the pool of what it is.
         """
         now = len(self) + lane
-        before = TABLES.mission(self.arrays.tables, scene)
-        arena, tables = scene_arrays(known, self.settings, self.disturbances, before)
-        self._arenas.put(now, arena)
-        self._tables.put(now, tables)
+        self._put(now, arena, tables)
         self._known[now] = known
-        self.arrays = self.arrays._replace(arenas=self._arenas.pool, tables=self._tables.pool)
         return now
+
+    def _put(self, s: int, arena: Arena, tables: Tables) -> None:
+        self._arenas.put(s, arena)
+        self._tables.put(s, tables)
+        self.arrays = self.arrays._replace(arenas=self._arenas.pool, tables=self._tables.pool)
 
     def chosen(self, given: Any, num_envs: int) -> NDArray[np.int64] | None:
         """(L,) indices of the scenarios that lanes are to fly; None: they are drawn.

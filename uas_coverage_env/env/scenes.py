@@ -1,21 +1,34 @@
 """Scenes that change in a batch: those lanes are laid out anew, as a single mission is."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.batch_memory import Missions, SubEnvironments
+from uas_coverage_env.env.batch_memory import Missions
 from uas_coverage_env.env.drawn import DrawnPool
-from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
-from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing, Tables
+from uas_coverage_env.env.pool import ScenarioPool, scene_arrays
 from uas_coverage_env.env.start import look_around
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
-from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.arena import ARENA, Arena
 from uas_coverage_env.world.state import STATE, WorldState
+
+
+class SceneLane(NamedTuple):
+    """What a lane flies, in arrays with room for the largest mission."""
+
+    scene: NDArray[np.int64]
+    """(1,) index in the pool."""
+    changes: NDArray[np.int64]
+    """See `SubEnvironments.changes`."""
+    world: WorldState
+    learners: Learners
+    observation: NDArray[np.float32]
+    """(U, V)."""
 
 
 def change_scenes(
@@ -34,41 +47,81 @@ def change_scenes(
         observing: What is observed.
         observation: (L, U, V); written where a scene changes.
     """
-    worlds = missions.worlds
+    worlds, learners, lanes = missions.worlds, missions.learners, missions.lanes
     happens = (worlds.event_step == worlds.step).any(axis=1)
     again = (worlds.due_step == worlds.step).any(axis=1)
-    for lane in np.flatnonzero(flew & (happens | again)).tolist():
-        _change_scene(pool, missions, lane, observing, observation[lane])
+    scenes = SceneChanges(pool, observing)
+    for k in np.flatnonzero(flew & (happens | again)).tolist():
+        lane = SceneLane(
+            lanes.scene[k : k + 1],
+            lanes.changes[k],
+            worlds._make(array[k] for array in worlds),
+            learners._make(array[k] for array in learners),
+            observation[k],
+        )
+        scenes.change(k, lane)
 
 
-def _change_scene(
-    pool: ScenarioPool | DrawnPool,
-    missions: Missions,
-    lane: int,
-    observing: Observing,
-    observation: NDArray[np.float32],
-) -> None:
-    worlds, lanes = missions.worlds, missions.lanes
-    scene = int(lanes.scene[lane])
-    known = pool.scene_of(scene)
-    state = STATE.lane(worlds, lane, ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene)))
-    changes = changes_due(known, state)
-    if not changes:
-        return
-    n_before = int((lanes.changes[lane] >= 0).sum())
-    lanes.changes[lane, n_before : n_before + len(changes)] = changes
-    for change in changes:
-        known = scene_after(known, change, state)
-    scene = lanes.scene[lane] = pool.put_scene(lane, scene, known)
-    arena = ARENA.mission(pool.arrays.arenas, scene)
-    sizes = ARENA.sizes_of(arena)
-    carried = carried_over(known, arena, state)
-    state = STATE.lane(worlds, lane, sizes)
-    for array, each in zip(state, carried, strict=True):
-        array[:] = each
-    tables = TABLES.mission(pool.arrays.tables, scene)
-    learners = LEARNERS.lane(missions.learners, lane, sizes)
-    look_around(arena, state, tables, learners, observing, observation[: sizes["U"]])
+class SceneChanges:
+    """What changes the scenes of lanes at one sample; scenes that are equal are laid out once.
+
+    Args:
+        pool: The scenes of lanes are put into it.
+        observing: What is observed.
+    """
+
+    def __init__(self, pool: ScenarioPool | DrawnPool, observing: Observing) -> None:
+        self._pool, self._observing = pool, observing
+        self._made: dict[tuple[Any, ...], tuple[Scenario, Arena, Tables]] = {}
+
+    def change(self, k: int, lane: SceneLane) -> bool:
+        """Change the scene of a lane in which something has happened; says whether it changes.
+
+        Args:
+            k: Which lane.
+            lane: What it flies; written where its scene changes.
+        """
+        pool, scene = self._pool, int(lane.scene[0])
+        known = pool.scene_of(scene)
+        sizes = ARENA.sizes_of(ARENA.mission(pool.arrays.arenas, scene))
+        state = STATE.first_rows(lane.world, sizes)
+        changes = changes_due(known, state)
+        if not changes:
+            return False
+        n_before = int((lane.changes >= 0).sum())
+        lane.changes[n_before : n_before + len(changes)] = changes
+        known, arena, tables = self._after(scene, changes, state)
+        lane.scene[0] = pool.put_scene(k, known, arena, tables)
+        sizes = ARENA.sizes_of(arena)
+        carried = carried_over(known, arena, state)
+        state = STATE.first_rows(lane.world, sizes)
+        for array, each in zip(state, carried, strict=True):
+            array[:] = each
+        learners = LEARNERS.first_rows(lane.learners, sizes)
+        observation = lane.observation[: sizes["U"]]
+        look_around(arena, state, tables, learners, self._observing, observation)
+        return True
+
+    def _after(
+        self, scene: int, changes: Sequence[int], state: WorldState
+    ) -> tuple[Scenario, Arena, Tables]:
+        """The scene after changes, and its arrays."""
+        known = self._pool.scene_of(scene)
+        events = [change for change in changes if change < len(known.events)]
+        of_uas = [e for e in events if isinstance(known.events[e], OfUas)]
+        # lanes whose scenes have been equal so far share one scenario
+        key = id(known), int(state.step[0]), tuple(changes), tuple(state.event_uas[of_uas].tolist())
+        if key not in self._made:
+            for change in changes:
+                known = scene_after(known, change, state)
+            self._made[key] = known, *_laid_out(self._pool, scene, known)
+        return self._made[key]
+
+
+def _laid_out(pool: ScenarioPool | DrawnPool, scene: int, known: Scenario) -> tuple[Arena, Tables]:
+    """The arrays of what the scene of a mission has become, which was this one of the pool."""
+    before = TABLES.mission(pool.arrays.tables, scene)
+    return scene_arrays(known, pool.settings, pool.disturbances, before)
 
 
 def scenes_in(
@@ -117,15 +170,20 @@ def _scene_after_all(
 
 
 def install_scenes(
-    pool: ScenarioPool | DrawnPool, lanes: SubEnvironments, changed: Mapping[int, Scenario]
+    pool: ScenarioPool | DrawnPool,
+    scenario: NDArray[np.int64],
+    scene: NDArray[np.int64],
+    changed: Mapping[int, Scenario],
 ) -> None:
     """Put the scenes of `scenes_in` into a pool.
 
     Args:
         pool: Of the batch.
-        lanes: With the scenarios and changes of the batch; `scene` is written.
+        scenario: (L,) index in the pool of the mission.
+        scene: (L,) index of what is flown now; written.
         changed: Lane -> the scenario that it flies now.
     """
-    lanes.scene[:] = lanes.scenario
+    scene[:] = scenario
     for lane, known in changed.items():
-        lanes.scene[lane] = pool.put_scene(lane, int(lanes.scenario[lane]), known)
+        arrays = _laid_out(pool, int(scenario[lane]), known)
+        scene[lane] = pool.put_scene(lane, known, *arrays)

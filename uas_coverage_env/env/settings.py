@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.blocks import checked_blocks
-from uas_coverage_env.disturbances import Disturbance, disturbances_of
+from uas_coverage_env.disturbances import Disturbance
+from uas_coverage_env.disturbances.of_scenario import disturbances_in
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, observation_named
@@ -162,7 +163,7 @@ class MissionSettings:
 
     def disturbances_in(self, scenario: Scenario) -> tuple[Disturbance, ...]:
         """What pushes back in the missions of a scenario."""
-        return disturbances_of(scenario) if self.disturbances is None else self.disturbances
+        return disturbances_in(scenario, self.disturbances)
 
     def limited(self, scenario: Scenario) -> Scenario:
         """The scenario with this time limit; return mode and the observed time know it."""

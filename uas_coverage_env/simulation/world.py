@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.disturbances import Disturbance, disturbances_of
+from uas_coverage_env.disturbances import Disturbance
 from uas_coverage_env.disturbances.act import begin_random, disturbance_code
+from uas_coverage_env.disturbances.of_scenario import disturbances_in
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import take_off
 from uas_coverage_env.simulation.scenes import (
@@ -24,7 +25,6 @@ from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, s
 from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
-from uas_coverage_env.world.disturbance import checked_disturbances
 from uas_coverage_env.world.events import begin_events, is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.packs import packs_left, swap_steps_left, swaps_alone
@@ -144,8 +144,7 @@ class World:
         self.return_mode = bool(return_mode)
         self.safety_filter = bool(safety_filter)
         self.names = tuple(uas.name for uas in scenario.uas)
-        given = disturbances_of(scenario) if disturbances is None else disturbances
-        self.disturbances = checked_disturbances(given)
+        self.disturbances = disturbances_in(scenario, disturbances)
         self._measured_m = measured_m
         self.known, self.revisions = scenario, 0
         self.arena = self._first_arena = self._arena_of(scenario)
