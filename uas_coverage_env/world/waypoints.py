@@ -13,7 +13,10 @@ ALL_SHARES = 2.0**30
 """The weight of all waypoints, as a whole number. With it and positions of at most 2²², every sum
 of `Arena.waypoint_columns` stays below 2⁵³, up to where floats hold all whole numbers."""
 
-N_WAYPOINT_COLUMNS = 8
+NORTH_M, EAST_M, DOWN_M, REACH_M2, WEIGHT, SHARE, SHARE_NORTH, SHARE_EAST = range(8)
+"""Rows of `Arena.waypoint_columns`, whole numbers from SHARE on."""
+
+N_WAYPOINT_COLUMNS = SHARE_EAST + 1
 
 _NOBODY_HAS = 1 << 62
 

@@ -12,10 +12,12 @@ from uas_coverage_env.env.observation.block import (
     ObservationBlock,
     flag,
 )
+from uas_coverage_env.env.observation.nearest import DENSITY, NEXT
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
 from uas_coverage_env.vehicle import DOD, X, Y, Z
 from uas_coverage_env.world import FLYING
+from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, WEIGHT
 
 _ZERO, _ONE, _INFINITE = np.float32(0.0), np.float32(1.0), np.float32(math.inf)
 _NEARBY_M = np.float32(NEARBY_M)
@@ -123,13 +125,13 @@ def write_waypoints(arena, state, tables, learners, i, row):
         w = max(candidates[c], 0)
         n += candidates[c] >= 0
         wanted[c] = w
-        north_m[c] = columns[0, w]
-        east_m[c] = columns[1, w]
-        down_m[c] = columns[2, w]
-        weight[c] = np.float32(columns[4, w] * scale.per_heaviest)
+        north_m[c] = columns[NORTH_M, w]
+        east_m[c] = columns[EAST_M, w]
+        down_m[c] = columns[DOWN_M, w]
+        weight[c] = np.float32(columns[WEIGHT, w] * scale.per_heaviest)
         # here already: of 1000 missions, most of this lies far from the processor
-        next_one[c] = company[w, 0]
-        crowd[c] = company[w, 1]
+        next_one[c] = company[w, NEXT]
+        crowd[c] = company[w, DENSITY]
         rival_m2[c] = _INFINITE
         taken[c] = _ZERO
     # in fours, and not always twelve: a loop of known length is unrolled before it is vectorised
