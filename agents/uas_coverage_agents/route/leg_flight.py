@@ -222,9 +222,8 @@ def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
     if steps < 0:
         rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[_LAST], row)
     else:
-        beyond_m = math.hypot(
-            ahead[_LAST, NORTH] - ahead[2, NORTH], ahead[_LAST, EAST] - ahead[2, EAST]
-        )
+        last, before = ahead[_LAST], ahead[_LAST - 1]
+        beyond_m = math.hypot(last[NORTH] - before[NORTH], last[EAST] - before[EAST])
         rest_s = beyond_m / speed_mps
         rest_s += look_ahead(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
     return abs(steps) * vehicle.dt_s + rest_s + value_of(layers, row)

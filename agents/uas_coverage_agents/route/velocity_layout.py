@@ -114,9 +114,7 @@ def commanded(
         (N, 3) velocity north and east [m/s], altitude [m].
     """
     along, across = outputs[:, :1], outputs[:, 1:2]
-    level_mps = speeds_mps[:, None] * (
-        along * frames[:, :ACROSS_NORTH] + across * frames[:, ACROSS_NORTH:AIMED_M]
-    )
+    level_mps = speeds_mps[:, None] * (along * frames[:, _ALONG] + across * frames[:, _ACROSS])
     return np.column_stack([level_mps, frames[:, AIMED_M] + _RISE_M * outputs[:, 2]])
 
 
@@ -125,10 +123,8 @@ def outputs_of(
 ) -> NDArray[np.float64]:
     """The outputs that mean some commands: the inverse of `commanded`."""
     level = values[:, :2] / speeds_mps[:, None]
-    along, across = (
-        (level * frames[:, :ACROSS_NORTH]).sum(axis=1),
-        (level * frames[:, ACROSS_NORTH:AIMED_M]).sum(axis=1),
-    )
+    along = (level * frames[:, _ALONG]).sum(axis=1)
+    across = (level * frames[:, _ACROSS]).sum(axis=1)
     return np.column_stack([along, across, (values[:, 2] - frames[:, AIMED_M]) / _RISE_M])
 
 
