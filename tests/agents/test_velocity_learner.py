@@ -155,7 +155,7 @@ def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays()
 
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])
 def test_what_is_exported_decides_as_the_model_does(algorithm):
-    changes = ["player.hidden=[8, 8]"]
+    changes = ["policy.hidden=[8, 8]"]
     if algorithm == "sac":
         config = load_config("sac", changes=[*changes, "scenarios.pool=1", "lanes=1"])
     else:
@@ -178,7 +178,7 @@ def test_half_a_minute_of_training_covers_far_more_than_none():
         "learning.rollout_steps=128",
         "learning.batch_size=2048",
         "learning.learning_rate=1e-3",
-        "player.hidden=[64, 64]",
+        "policy.hidden=[64, 64]",
         "scenarios.pool=16",
         "scenarios.family.towns.n_waypoints=[8, 12]",
     ]
@@ -200,7 +200,7 @@ def test_a_quarter_of_a_minute_of_sac_covers_most_of_what_it_has_never_seen():
     changes = [
         "steps=15_000",
         "lanes=8",
-        "player.hidden=[64, 64]",
+        "policy.hidden=[64, 64]",
         "scenarios.pool=16",
         "scenarios.family.towns.n_uas=[1, 2]",
         "scenarios.family.towns.n_waypoints=[8, 12]",

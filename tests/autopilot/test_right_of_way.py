@@ -107,7 +107,7 @@ def cage(first, i, x):
     return towards(first[:3] + 6.3 * np.array(bars[i - 1]), 0.4)(x)
 
 
-PLAYERS = {p.__name__: p for p in (goalkeeper, press, siege, doorstep, cage)}
+POLICIES = {p.__name__: p for p in (goalkeeper, press, siege, doorstep, cage)}
 
 
 def around_corner(n_uas, seed=0):
@@ -123,11 +123,11 @@ def around_corner(n_uas, seed=0):
 
 
 @pytest.mark.parametrize("n_uas", [2, 5, 8])
-@pytest.mark.parametrize("player", PLAYERS.values(), ids=PLAYERS)
-def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(player, n_uas):
+@pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES)
+def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(policy, n_uas):
     world = swarm(n_uas)
     put(world, around_corner(n_uas))
-    contacts, apart_m, changed = see_home(world, player, n_waiting=40)
+    contacts, apart_m, changed = see_home(world, policy, n_waiting=40)
     assert world.state.status[0] == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M
@@ -138,13 +138,13 @@ def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(player, n_uas):
 @given(
     seed=st.integers(0, 10_000),
     n_uas=st.integers(2, 8),
-    names=st.lists(st.sampled_from(sorted(PLAYERS)), min_size=7, max_size=7),
+    names=st.lists(st.sampled_from(sorted(POLICIES)), min_size=7, max_size=7),
 )
 def test_nor_does_any_mixture_of_them_from_anywhere_around_a_corner(seed, n_uas, names):
     world = swarm(n_uas)
     put(world, around_corner(n_uas, seed))
-    players = [PLAYERS[name] for name in names]
-    contacts, apart_m, _ = see_home(world, lambda x0, i, x: players[i - 1](x0, i, x), n_waiting=40)
+    policies = [POLICIES[name] for name in names]
+    contacts, apart_m, _ = see_home(world, lambda x0, i, x: policies[i - 1](x0, i, x), n_waiting=40)
     assert world.state.status[0] == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M

@@ -367,7 +367,7 @@ def test_the_nearest_moving_obstacles_come_first():
             np.testing.assert_allclose(velocity, relative, atol=1e-5)
 
 
-def test_players_do_not_see_where_a_moving_obstacle_will_go():
+def test_planners_do_not_see_where_a_moving_obstacle_will_go():
     scenario = load_scenario("village")
     later = scenario.moving_obstacles[0].model_copy(
         update={"schedule": scenario.moving_obstacles[0].schedule[:1]}

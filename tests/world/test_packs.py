@@ -161,7 +161,7 @@ def test_without_its_radio_it_waits_and_takes_off_when_it_hears_again():
     assert fly(world, has(0, FLYING), BACK) == 100
 
 
-def test_what_a_player_is_told_late_shows_the_fresh_pack_at_once():
+def test_what_a_planner_is_told_late_shows_the_fresh_pack_at_once():
     scenario = mission().model_copy(update={"sensing": {"delay_steps": 4}})
     world = World(Scenario.model_validate(scenario.model_dump(by_alias=True)))
     first_sortie(world)

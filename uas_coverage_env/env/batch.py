@@ -309,7 +309,7 @@ class CoverageBatch:
         return arrays
 
     def swarm_state(self, lane: int) -> SwarmState:
-        """What a player of this lane sees now, in arrays of their own."""
+        """What a planner of this lane sees now, in arrays of their own."""
         arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
         state = STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
         return swarm_state(self.scenario_of(lane), arena, state)

@@ -123,7 +123,7 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
                 c = min(c, 0.0)
             if a < _TINY:
                 return
-            # Beyond a bound, where a wrench of the player's own led, the reference moves on as far
+            # Beyond a bound, where a commanded wrench led, the reference moves on as far
             # as that leads back: inside by the larger root, or to where the line is nearest.
             share = min(share, (-b + math.sqrt(max(b * b - a * c, 0.0))) / a)
             if share <= 0.0:
@@ -141,7 +141,7 @@ def _track(vehicle, x, reference, u):
     north += k[ON_RATE] * x[WY]
     east = -k[ON_SPEED] * (x[VY] - reference[1]) - k[ON_TILT] * (x[PHI] - trim * reference[1])
     east -= k[ON_RATE] * x[WX]
-    # never active on a governed flight: it is for states that a player's wrench led to
+    # never active on a governed flight: it is for states that a commanded wrench led to
     share = _within_limit(north, east, vehicle.alpha_xy_max_radps2)
     u[TAU_X] = vehicle.inertia_kgm2[0] * share * east
     u[TAU_Y] = -vehicle.inertia_kgm2[1] * share * north

@@ -1,4 +1,4 @@
-"""The state of the world, and the part of it that a player sees."""
+"""The state of the world, and the part of it that a planner sees."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Self
@@ -153,7 +153,7 @@ def responding(arena: Any, state: WorldState) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True)
 class SwarmState:
-    """What a player sees at a sample. The future of moving obstacles is not part of it.
+    """What a planner sees at a sample. The future of moving obstacles is not part of it.
 
     Attributes:
         time_s: [s] since the start.
@@ -161,7 +161,7 @@ class SwarmState:
         names: (U,) names of the UAS.
         x: (U, 14) states as they are sensed, in the order of `vehicle.layout`. A UAS that looks
             where it flies has heading and yaw rate 0 here: its autopilot turns it, and nothing that
-            a player plans depends on that.
+            a planner decides depends on that.
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST; one that swaps packs has landed.
         departed: (U,) has been farther from its start than the landing distance.

@@ -157,6 +157,8 @@ def _record(job: "TrainingJob") -> dict[str, Any]:
 
 def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) -> None:
     """Refuse to mix a training with something else."""
+    from uas_coverage_agents.training.config import with_present_names
+
     names = prepare_folder(directory) - {".lock"}
     if names and ORDER not in names:
         raise InputError(f"{directory}: is not empty and holds no training; give another --out")
@@ -166,6 +168,8 @@ def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) ->
         there = json.loads(read_bytes(directory / ORDER))
     except (OSError, ValueError, RecursionError):
         there = None
+    if isinstance(there, dict) and "config" in there:
+        there["config"] = with_present_names(there["config"])
     if there != json.loads(json.dumps(_record(job))):
         raise InputError(
             f"{directory}: holds a training with other settings; give another --out, or start "

@@ -1,7 +1,7 @@
 """How a learner is trained, as a small file: one TOML per published run, checked strictly."""
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -18,6 +18,27 @@ from uas_coverage_env.scenario import load_scenario
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
+
+_TABLES = {"player": "policy"}
+_NETWORKS = {"gaze": "attention"}
+
+
+def with_present_names(data: Any) -> Any:
+    """A configuration whose tables and networks have the names of today.
+
+    Args:
+        data: As a file of whatever version has it; left as it is where it is no configuration.
+    """
+    if not isinstance(data, Mapping):
+        return data
+    tables = {
+        name if _TABLES.get(name, name) in data else _TABLES.get(name, name): table
+        for name, table in data.items()
+    }
+    policy = tables.get("policy")
+    if isinstance(policy, Mapping) and isinstance(network := policy.get("network"), str):
+        tables["policy"] = {**policy, "network": _NETWORKS.get(network, network)}
+    return tables
 
 
 class PpoSettings(StrictModel):
@@ -113,7 +134,7 @@ class TrainingConfig(StrictModel):
             (velocities) or the whole team (waypoints).
         scenarios: Where.
         learning: How the network is improved.
-        player: What it reads, what it commands, and what it is paid for.
+        policy: What it reads, what it commands, and what it is paid for.
     """
 
     summary: str
@@ -121,19 +142,24 @@ class TrainingConfig(StrictModel):
     lanes: Annotated[int, Field(ge=1, le=65_536)]
     scenarios: TrainingScenarios
     learning: Annotated[PpoSettings | SacSettings, Field(discriminator="algorithm")]
-    player: Annotated[VelocitySettings | WaypointSettings, Field(discriminator="interface")]
+    policy: Annotated[VelocitySettings | WaypointSettings, Field(discriminator="interface")]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _present(cls, data: Any) -> Any:
+        return with_present_names(data)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        masked = self.player.interface == "waypoint"
+        masked = self.policy.interface == "waypoint"
         if masked != (self.learning.algorithm == "maskable-ppo"):
             raise ValueError(
-                f"learning.algorithm is {self.learning.algorithm!r}, but player.interface is "
-                f"{self.player.interface!r}; waypoints need maskable-ppo, velocities ppo or sac"
+                f"learning.algorithm is {self.learning.algorithm!r}, but policy.interface is "
+                f"{self.policy.interface!r}; waypoints need maskable-ppo, velocities ppo or sac"
             )
-        attention = isinstance(self.player, VelocitySettings) and self.player.network == "gaze"
+        attention = isinstance(self.policy, VelocitySettings) and self.policy.network == "attention"
         if attention and self.learning.algorithm != "ppo":
-            raise ValueError("player.network is 'gaze', which is learned by ppo alone")
+            raise ValueError("policy.network is 'attention', which is learned by ppo alone")
         return self
 
 
@@ -182,6 +208,7 @@ def _set(data: dict[str, Any], change: str) -> None:
     except (tomllib.TOMLDecodeError, RecursionError):
         value = text  # a plain word is text
     *tables, last = key.split(".")
+    tables = [_TABLES.get(name, name) for name in tables]
     table = data
     for name in tables:
         inner = table.get(name)
