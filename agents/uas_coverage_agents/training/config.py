@@ -1,11 +1,11 @@
 """How a learner is trained, as a small file: one TOML per published run, checked strictly."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from uas_coverage_agents.policy import ScenarioFamily
 from uas_coverage_agents.training.published import PUBLISHED, published_names
@@ -19,26 +19,8 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
 
-_TABLES = {"player": "policy"}
-_NETWORKS = {"gaze": "attention"}
-
-
-def with_present_names(data: Any) -> Any:
-    """A configuration whose tables and networks have the names of today.
-
-    Args:
-        data: As a file of whatever version has it; left as it is where it is no configuration.
-    """
-    if not isinstance(data, Mapping):
-        return data
-    tables = {
-        name if _TABLES.get(name, name) in data else _TABLES.get(name, name): table
-        for name, table in data.items()
-    }
-    policy = tables.get("policy")
-    if isinstance(policy, Mapping) and isinstance(network := policy.get("network"), str):
-        tables["policy"] = {**policy, "network": _NETWORKS.get(network, network)}
-    return tables
+_FORMER = {"player": "policy"}
+"""Tables that had another name in version 0.2."""
 
 
 class PpoSettings(StrictModel):
@@ -142,12 +124,10 @@ class TrainingConfig(StrictModel):
     lanes: Annotated[int, Field(ge=1, le=65_536)]
     scenarios: TrainingScenarios
     learning: Annotated[PpoSettings | SacSettings, Field(discriminator="algorithm")]
-    policy: Annotated[VelocitySettings | WaypointSettings, Field(discriminator="interface")]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _present(cls, data: Any) -> Any:
-        return with_present_names(data)
+    policy: Annotated[
+        VelocitySettings | WaypointSettings,
+        Field(discriminator="interface", validation_alias=AliasChoices("policy", *_FORMER)),
+    ]
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -208,7 +188,7 @@ def _set(data: dict[str, Any], change: str) -> None:
     except (tomllib.TOMLDecodeError, RecursionError):
         value = text  # a plain word is text
     *tables, last = key.split(".")
-    tables = [_TABLES.get(name, name) for name in tables]
+    tables = [_FORMER.get(name, name) for name in tables]
     table = data
     for name in tables:
         inner = table.get(name)

@@ -1,11 +1,15 @@
 """What a velocity learner reads and is paid for."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from uas_coverage_agents.policy.tensors import Width
 from uas_coverage_env.files.strict_toml import StrictModel
+
+
+def _present_name(network: Any) -> Any:
+    return "attention" if network == "gaze" else network  # as version 0.2 called it
 
 
 class VelocitySettings(StrictModel):
@@ -27,7 +31,7 @@ class VelocitySettings(StrictModel):
     """
 
     interface: Literal["velocity"]
-    network: Literal["layers", "attention"] = "layers"
+    network: Annotated[Literal["layers", "attention"], BeforeValidator(_present_name)] = "layers"
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)] = (128, 128)
     keys: Width = 32
     activation: Literal["tanh", "relu"] = "tanh"
