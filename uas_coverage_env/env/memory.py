@@ -59,8 +59,8 @@ class Learners(NamedTuple):
     """Where each is flying to (waypoint action)."""
     candidates: Annotated[NDArray[np.int64], "U", K_WAYPOINTS, Values(-1, "W")]
     """The open waypoints in the order of the latest observation; -1 where there are no more."""
-    company: Annotated[NDArray[np.float32], "W", N_AROUND]
-    """See `count_company`."""
+    around: Annotated[NDArray[np.float32], "W", N_AROUND]
+    """What is open around each waypoint, see `write_around`."""
     report: Annotated[NDArray[np.int64], "U", REPORT_SIZE]
     """Of the latest step: the columns named above."""
     amounts: Annotated[NDArray[np.float64], "U", "P"]

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, stack_array
 from uas_coverage_env.env.observation.relative import close
-from uas_coverage_env.env.observation.scales import CROWD, CROWD_M, K_WAYPOINTS
+from uas_coverage_env.env.observation.scales import DENSEST, DENSITY_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import X, Y, Z
@@ -22,7 +22,7 @@ NO_TARGET = -2
 N_NEIGHBOURS = 24
 
 NEXT, DENSITY = range(2)
-"""Columns of `Learners.company`: closeness of the next open waypoint, and how dense they are."""
+"""Columns of `Learners.around`: closeness of the next open waypoint, and how dense they are."""
 
 N_AROUND = DENSITY + 1
 
@@ -134,27 +134,27 @@ def nearest_waypoints(arena, state, i, candidates):
 
 
 @kernel
-def count_company(uncovered, neighbours, company):
+def write_around(uncovered, neighbours, around):
     """Write what is open around every waypoint; it changes only when a waypoint is covered.
 
     Args:
         uncovered: (W,) still to be covered.
         neighbours: (W,) of NEIGHBOURS_DTYPE.
-        company: (W, N_AROUND) of float32; written.
+        around: (W, N_AROUND) of float32; written.
     """
-    for w in range(company.shape[0]):
+    for w in range(around.shape[0]):
         index = neighbours[w].index
         distance_m = neighbours[w].distance_m
         next_m = math.inf
-        crowd = 0
+        near = 0
         for n in range(N_NEIGHBOURS):
             other = index[n]
             if other < 0:
                 break
             if uncovered[other]:
                 next_m = min(next_m, distance_m[n])
-                if distance_m[n] > CROWD_M or crowd == CROWD:
+                if distance_m[n] > DENSITY_M or near == DENSEST:
                     break
-                crowd += 1
-        company[w, NEXT] = close(next_m)
-        company[w, DENSITY] = crowd / CROWD
+                near += 1
+        around[w, NEXT] = close(next_m)
+        around[w, DENSITY] = near / DENSEST
