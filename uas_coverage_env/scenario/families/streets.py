@@ -39,8 +39,8 @@ def streets(rng: Rng, size: Size) -> Scenario:
                 continue
             tower = use > 1.0 - _TOWERS
             room_m = _LOT_M - street_m
-            side_m = (0.55 if tower else 1.0) * room_m
-            depth_m, width_m = side_m * (0.8 + 0.2 * depth), side_m * (0.8 + 0.2 * width)
+            longest_m = (0.55 if tower else 1.0) * room_m
+            depth_m, width_m = longest_m * (0.8 + 0.2 * depth), longest_m * (0.8 + 0.2 * width)
             north_m = MARGIN_M + _LOT_M * (i + 0.5)
             east_m = west_m + MARGIN_M + _LOT_M * (j + 0.5)
             low, high = _HIGH_M if tower else _LOW_M
