@@ -6,7 +6,7 @@
 The mission of a seed is a generated town (1 to 4 UAS, 5 to 20 blocks) with one to three cylinders
 that fly through it, each at a velocity that is drawn anew every 5 to 20 s, up to 15 m/s: faster
 than the UAS, and without a warning. They pass through blocks, and stay in the area and above the
-starts. Every flight lasts 200 steps or until all are home or lost; nobody is called home.
+starts. Every flight lasts 200 steps or until all are home or lost; none is called home.
 
 A UAS flight with a contact counts once, under what it was lost to. Its share of all UAS flights
 stands beside a 95 % upper bound (Clopper and Pearson's, one-sided: three in n where none was seen).

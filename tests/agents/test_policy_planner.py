@@ -56,7 +56,7 @@ def test_a_policy_flies_as_its_actions_do_in_the_environment(directory, scenario
         ({"layout": "somebody's own"}, "observation is not that of this version"),
     ],
 )
-def test_a_policy_that_nobody_can_fly_is_refused(tmp_path, changes, words):
+def test_a_policy_that_cannot_be_flown_is_refused(tmp_path, changes, words):
     description = describe()
     network, view = description.network, description.observation
     if "outputs" in changes:

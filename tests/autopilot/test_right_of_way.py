@@ -18,9 +18,9 @@ CANYON = [
     box("west", (70.0, 90.0, -49.0), (94.8, 150.0, 0.0)),
     box("east", (105.2, 90.0, -49.0), (130.0, 150.0, 0.0)),
 ]
-"""Two walls as high as the ceiling, 10.4 m apart: nobody passes beside another."""
+"""Two walls as high as the ceiling, 10.4 m apart: no UAS passes beside another."""
 OUT_OF_THE_WAY = [waypoint((5.0, 195.0, -40.0), 3.0)] * 3
-"""Nobody covers them, which would call all home. Most are high: so high are routes planned."""
+"""No UAS covers them, which would call all home. Most are high: so high are routes planned."""
 KEPT_M = 5.72
 RESIDUE_M = 0.01
 """Braking is simulated until what is left of the motion is centimetres."""
@@ -193,7 +193,7 @@ def test_a_mate_beside_the_way_home_is_left_in_peace_and_one_on_it_is_not():
     assert changed == [True, False]
 
 
-def test_nobody_makes_way_for_a_uas_that_is_not_called_home():
+def test_no_uas_makes_way_for_one_that_is_not_called_home():
     world = swarm(2)
     put(world, [(100.0, 160.0, -20.0), (100.0, 150.0, -20.0)])
     assert not hover(world, 10)

@@ -84,7 +84,7 @@ def test_without_a_seed_the_next_mission_is_drawn():
     assert len({repr(scenario) for scenario in drawn[0]}) > 3
 
 
-def test_a_fresh_environment_without_a_seed_draws_what_nobody_foresees():
+def test_a_fresh_environment_without_a_seed_draws_what_cannot_be_foreseen():
     envs = [parallel(SMALL) for _ in range(3)]
     for env in envs:
         env.reset()

@@ -55,7 +55,7 @@ def test_other_data_has_another_hash(one, other):
     assert (content_hash(one) == content_hash(other)) == same
 
 
-def test_every_scenario_is_flown_by_everybody_with_every_seed():
+def test_every_scenario_is_flown_by_every_planner_with_every_seed():
     some = sweep("village,corridor", "hover,lawnmower", seeds=range(3, 5))
     entries = list(some.entries())
     flown = [(e.seed, e.scenario.name, e.spec.label) for e in entries]

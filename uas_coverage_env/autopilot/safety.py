@@ -215,7 +215,7 @@ def filter_commands(arena, state, nonlinear, outcome):
     held_up = np.empty(n_uas, np.int64)
     n_held_up = 0
     brake = arena.rules[0].brake
-    # the first UAS decides before anybody asks where it would brake
+    # the first UAS decides before any other asks where it would brake
     for rank in range(1, n_flying):
         i = order[rank]
         x = state.x[i]

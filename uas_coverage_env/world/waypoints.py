@@ -18,7 +18,7 @@ NORTH_M, EAST_M, DOWN_M, REACH_M2, WEIGHT, SHARE, SHARE_NORTH, SHARE_EAST = rang
 
 N_WAYPOINT_COLUMNS = SHARE_EAST + 1
 
-_NOBODY_HAS = 1 << 62
+_NOT_CARRIED = 1 << 62
 
 WAYPOINT_DTYPE = np.dtype(
     (
@@ -48,7 +48,7 @@ def waypoint_records(scenario: Scenario) -> NDArray[np.void]:
     rows = [
         (
             *(w.position_m, w.radius_m, w.weight, asks(w)),
-            0 if w.sensor is None else bits.get(w.sensor, _NOBODY_HAS),
+            0 if w.sensor is None else bits.get(w.sensor, _NOT_CARRIED),
             *(w.heights_m or (-math.inf, math.inf)),
             math.inf if w.max_speed_mps is None else w.max_speed_mps,
         )

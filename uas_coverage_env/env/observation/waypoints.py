@@ -157,7 +157,7 @@ def write_waypoints(arena, state, tables, learners, i, row):
         from_home[c] = _near(home_m)
         margin[c] = within(margin_left - (there_m + home_m) * margin_per_m, -_ONE, _ONE)
     for c in range(K_WAYPOINTS):
-        # an end that nobody can foretell: so the compiler does not write four waypoints at a time,
+        # an end that cannot be foretold: so the compiler does not write four waypoints at a time,
         # by instructions for scattered numbers that take longer than one by one
         if candidates[c] < 0:
             break
