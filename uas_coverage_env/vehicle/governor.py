@@ -39,8 +39,8 @@ class VelocityLoop(NamedTuple):
     """Angular acceleration = -gain · (v - r, tilt - trim r, rate) for a governed reference r.
 
     A row (a_v, a_tilt, a_rate, b, bound), in the order of `ON_SPEED` and the names beside it, says
-    that a · (v, tilt, rate) + b r, a quantity of one of
-    the coming steps while r is held, stays within its bound.
+    that a · (v, tilt, rate) + b r, a quantity of one of the coming steps while r is held, stays
+    within its bound.
     """
 
     gain: FloatArray
