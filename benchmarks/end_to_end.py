@@ -21,7 +21,7 @@ from uas_coverage_env import Scenario, load_planner, rollout
 from uas_coverage_env.flight import coverage, energy_Wh, home
 
 NAME = "end-to-end"
-PLAYER = "learned-velocity"
+PLANNER = "learned-velocity"
 LEVELS = {"none": (0, 0), "1 to 3": (1, 3), "5 to 20": VALIDATION.n_obstacles}
 HEAD = (
     "obstacles", "covered, %", "all home, %", "UAS lost, %", "energy, Wh", "steps",
@@ -56,7 +56,7 @@ def towns_of(level: str, missions: int) -> list[Scenario]:
 
 def flown(towns: Sequence[Scenario]) -> NDArray[np.float64]:
     """(missions, 5) under `HEAD`."""
-    planner = load_planner(PLAYER, {"filter": "false", "return_mode": "false"})
+    planner = load_planner(PLANNER, {"filter": "false", "return_mode": "false"})
     flights = [
         rollout(scenario, planner, safety_filter=False, return_mode=False) for scenario in towns
     ]

@@ -23,7 +23,7 @@ from uas_coverage_env import Scenario, load_planner, rollout
 
 NAME = "fleets"
 REFERENCE = "nearest-waypoint"
-PLAYERS: dict[str, dict[str, str]] = {
+PLANNERS: dict[str, dict[str, str]] = {
     REFERENCE: {},
     "learned-waypoint": {"simulations": "0"},
     "learned-velocity": {},
@@ -51,8 +51,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     ]
     for n_uas in fleets:
         towns = towns_of(n_uas, arguments.missions)
-        results = {name: flown(name, towns) for name in PLAYERS}
-        lines += [row(n_uas, name, results[name], results[REFERENCE]) for name in PLAYERS]
+        results = {name: flown(name, towns) for name in PLANNERS}
+        lines += [row(n_uas, name, results[name], results[REFERENCE]) for name in PLANNERS]
     text = "\n".join(lines)
     sys.stdout.write(f"{text}\n")
     put(NAME, text)
@@ -67,7 +67,7 @@ def towns_of(n_uas: int, missions: int) -> list[Scenario]:
 
 def flown(name: str, towns: Sequence[Scenario]) -> NDArray[np.float64]:
     """(missions, measures) of a planner."""
-    planner = load_planner(name, PLAYERS[name])
+    planner = load_planner(name, PLANNERS[name])
     return np.array([measured(rollout(scenario, planner)) for scenario in towns])
 
 

@@ -53,7 +53,7 @@ class Report:
         coverage: Fraction of the waypoints covered.
         steps: Steps until the last UAS was home or lost.
         energy_Wh: Sum of voltage times current times dt.
-        all_home: Whether everybody has landed.
+        all_home: Whether every UAS has landed.
         contacts: (time [s], UAS, kind, with whom), straight from sample to sample.
         limits: (first time [s], UAS, `limit`, which) of the vehicle's limits exceeded.
         breaches: Samples closer than the safe distances, or below the least height.
@@ -156,7 +156,7 @@ def _in_flight(
 
 
 def _end_without_cause(track: Track, contacts: Collection[int]) -> Iterator[str]:
-    """Lost is who touched something, and nobody else."""
+    """Lost is what touched something, and no other UAS."""
     last = track.steps - 1 if track.end == "lost" else None
     if last is not None and last not in contacts:
         yield f"{track.name} is lost without a contact"
@@ -342,7 +342,7 @@ def _judge_plan(record: FlightRecord, report: Report, tolerance_m: float) -> Non
     for (step, name), path in record.plan.items():
         if step >= tracks[name].steps:
             report.problems.append(
-                f"{name} has a plan at {step * record.dt_s:g} s, flown by nobody"
+                f"{name} has a plan at {step * record.dt_s:g} s, flown by no UAS"
             )
             continue
         flown = tracks[name].position_m[step : step + 2][: len(path)]

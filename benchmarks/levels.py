@@ -31,7 +31,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path, help="The --out of `uas-coverage score`.")
     store = ScoreStore(parser.parse_args().folder / "test")
-    anchors = {level: anchors_from(store, level) for level in LEVELS if store.players(level)}
+    anchors = {level: anchors_from(store, level) for level in LEVELS if store.planners(level)}
     ANCHORS.write_text(json.dumps(anchors, indent=2) + "\n", encoding="utf-8")
     text = PAGE.read_text("utf-8")
     before, first, rest = text.partition(FIRST)
@@ -42,12 +42,12 @@ def main() -> None:
 
 
 def anchors_from(store: ScoreStore, level: str) -> dict[str, object]:
-    """The anchors of a level, over the missions that all of its players have flown."""
+    """The anchors of a level, over the missions that all of its planners have flown."""
     means = {
-        player: scored(level, store.missions(level, player)).mean("value")
-        for player in store.players(level)
+        planner: scored(level, store.missions(level, planner)).mean("value")
+        for planner in store.planners(level)
     }
-    best = max((player for player in means if player != RANDOM), key=means.__getitem__)
+    best = max((planner for planner in means if planner != RANDOM), key=means.__getitem__)
     flown = Anchors(means[RANDOM], means[best], best, len(store.missions(level, best)))
     return dataclasses.asdict(flown)
 
@@ -56,9 +56,9 @@ def tables(store: ScoreStore) -> str:
     """The tables of all levels that were flown."""
     parts = []
     for level, task in LEVELS.items():
-        players = store.players(level)
-        if players:
-            flown = {player: scored(level, store.missions(level, player)) for player in players}
+        planners = store.planners(level)
+        if planners:
+            flown = {planner: scored(level, store.missions(level, planner)) for planner in planners}
             parts.append(f"\n`{task.id}`\n\n{markdown(flown)}\n")
     return "".join(parts) + "\n"
 

@@ -28,7 +28,7 @@ class Row:
         steps: Steps until the last UAS was home, lost, or the flight ended.
         energy_Wh: Energy of the swarm.
         coverage: Fraction of the waypoints.
-        all_home: Whether everybody has landed.
+        all_home: Whether every UAS has landed.
         violations: Contacts and limits exceeded that the world counted.
         problems: What the independent check found: violations, and where it disagrees.
         breaches: Samples closer than the safe distances, the larger of both counts.
@@ -75,7 +75,7 @@ class Row:
 
     @property
     def accomplished(self) -> bool:
-        """Everything covered, everybody home, nothing touched."""
+        """Everything covered, every UAS home, nothing touched."""
         return self.coverage == 1.0 and self.all_home and not self.violations
 
     def values(self) -> list[Any]:

@@ -37,8 +37,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("newcomer"))
     given = parser.parse_args()
     torch.set_num_threads(1)
-    for player in ("random-walk", "nearest-waypoint", "tour"):
-        write(given.out / player, [row(0, 0.0, flown(player))])
+    for planner in ("random-walk", "nearest-waypoint", "tour"):
+        write(given.out / planner, [row(0, 0.0, flown(planner))])
     for seed in range(given.seeds):
         folder = given.out / f"seed-{seed}"
         if not (folder / "learning_curve.csv").exists():
@@ -65,14 +65,14 @@ def policy_of(model: PPO) -> Any:
     return lambda seen: model.predict(seen, deterministic=True)[0]
 
 
-def flown(player: Any) -> Evaluation:
+def flown(planner: Any) -> Evaluation:
     """Validation missions."""
     task = level_named(LEVEL)
     episodes = [
         episode
         for seed in seeds_of("validation")[:MISSIONS]
         for episode in evaluate(
-            player, task.scenario(seed), seeds=[seed], swarm_of=1, **task.settings()
+            planner, task.scenario(seed), seeds=[seed], swarm_of=1, **task.settings()
         ).episodes
     ]
     return Evaluation(tuple(episodes))

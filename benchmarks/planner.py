@@ -254,7 +254,7 @@ def joint(
 
 
 def _reached(problem: PlanningProblem) -> PlanningProblem:
-    """Without the waypoints that nobody reaches in time, as the planner has it."""
+    """Without the waypoints that no UAS reaches in time, as the planner has it."""
     kept = np.flatnonzero(coverable(problem).any(axis=(0, 1)))
     return replace(
         problem,

@@ -1,7 +1,7 @@
 """Put the tables of a comparison where they are published.
 
     python benchmarks/put_table.py sweep         the leaderboard
-    python benchmarks/put_table.py sweep test    the same players on the `test` set
+    python benchmarks/put_table.py sweep test    the same planners on the `test` set
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (all of
 `table.md`) and of `README.md` (a short table), and copies the picture to `docs/pictures`; or the
@@ -48,9 +48,10 @@ def short_table(data: dict[str, Any]) -> str:
     headings += [f"Δ energy to {reference}, %", "Δ steps, %", "above the bound, %"]
     lines = ["| " + " | ".join(headings) + " |", "|---|" + "---:|" * (len(headings) - 1)]
     for one in data["scores"]:
-        is_reference = one["player"] == reference
+        label = one["label"] if "label" in one else one["player"]  # of version 0.2
+        is_reference = label == reference
         cells = [
-            f"`{one['player']}`",
+            f"`{label}`",
             f"{one['accomplished']}/{one['flights']}",
             str(one["violations"]),
             "–" if one["decision_p50_ms"] is None else f"{one['decision_p50_ms']:.3g}",

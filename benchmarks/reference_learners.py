@@ -110,7 +110,7 @@ def result_of(name: str, reference: Reference, level: str, given: argparse.Names
             write_atomically(kept, json.dumps([asdict(each) for each in known]).encode())
 
         flown = score(
-            trained.player, level, missions=given.missions, known=tuple(known), on_mission=keep
+            trained.policy, level, missions=given.missions, known=tuple(known), on_mission=keep
         )
         missions += flown.missions
     mean_steps = round(steps / given.seeds)

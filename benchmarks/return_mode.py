@@ -1,4 +1,4 @@
-"""Which UAS return mode loses: random players, return mode and safety filter, until all are down.
+"""Which UAS return mode loses: random policies, return mode and safety filter, until all are down.
 
     python benchmarks/return_mode.py
     python benchmarks/return_mode.py --missions 300 --families overhangs --first-seed 90000
@@ -7,7 +7,7 @@ The mission of a seed belongs to a family: generated towns (`towns`), eight UAS 
 (`crowd`), hexacopters, steps of half a second (`short_steps`), blocks close together (`clutter`),
 far corners of a large empty area (`far`), six-sided fences (`hexagon`), and slabs, mushrooms and
 tilted rocks (`overhangs`). Charge is scarce: every UAS begins with what hovering takes in 60 to
-240 s, and more where its area is large. The player sends each UAS its own velocities:
+240 s, and more where its area is large. The policy sends each UAS its own velocities:
 
 - jitter: drawn anew in every step;
 - hold: drawn anew every 8 s;
@@ -255,10 +255,10 @@ def _away(rng: Rng, dt_s: float, away_m: Vector) -> Iterator[Wish]:
         yield _FULL_MPS * math.cos(heading_rad), _FULL_MPS * math.sin(heading_rad), altitude_m
 
 
-PLAYERS = {"jitter": _jitter, "hold": _hold, "fast": _fast, "away": _away}
+POLICIES = {"jitter": _jitter, "hold": _hold, "fast": _fast, "away": _away}
 
 
-def fly(family: str, player: str, seed: int, wind_mps: float = 0.0) -> Counter[str]:
+def fly(family: str, policy: str, seed: int, wind_mps: float = 0.0) -> Counter[str]:
     """One mission, the wind from a drawn direction: what there is to count."""
     from_deg = float(np.random.default_rng([seed, 2]).uniform(0.0, 360.0))
     world = World(
@@ -271,8 +271,8 @@ def fly(family: str, player: str, seed: int, wind_mps: float = 0.0) -> Counter[s
     commands = np.zeros(n_uas, COMMAND_DTYPE)
     status, x = world.state.status, world.state.x
     away_m = np.zeros((n_uas, 2))
-    rng = np.random.default_rng([seed, list(PLAYERS).index(player), 1])
-    wishes = [PLAYERS[player](rng, world.scenario.dt_s, away_m[i]) for i in range(n_uas)]
+    rng = np.random.default_rng([seed, list(POLICIES).index(policy), 1])
+    wishes = [POLICIES[policy](rng, world.scenario.dt_s, away_m[i]) for i in range(n_uas)]
     tally = Counter(missions=1, flights=n_uas)
     while not world.done:
         away_m[:] = x[:, :2] - world.arena.uas["home_m"][:, :2]
@@ -302,17 +302,17 @@ def _lost(tally: Counter[str]) -> int:
 
 def _table(tallies: Mapping[tuple[str, str], Counter[str]]) -> Table:
     table = Table(title="UAS lost with return mode and safety filter on")
-    for column in ("family", "player", "missions", "UAS", "lost", "at most", "to what"):
+    for column in ("family", "policy", "missions", "UAS", "lost", "at most", "to what"):
         table.add_column(column)
     for column in ("mean charge left at home", "UAS samples", "in breach"):
         table.add_column(column)
     total = sum(tallies.values(), Counter[str]())
-    for (family, player), tally in [*tallies.items(), (("all", "all"), total)]:
+    for (family, policy), tally in [*tallies.items(), (("all", "all"), total)]:
         kinds = [name for name in (*CONTACT_NAMES, "still flying") if tally[name]]
         home = tally["flights"] - _lost(tally)
         table.add_row(
             family,
-            player,
+            policy,
             str(tally["missions"]),
             str(tally["flights"]),
             str(_lost(tally)),
@@ -339,23 +339,25 @@ def chosen(names: str, allowed: Mapping[str, object], what: str) -> list[str]:
 
 
 def main(
-    missions: Annotated[int, typer.Option(min=1, help="Of each family and player.")] = 4,
+    missions: Annotated[int, typer.Option(min=1, help="Of each family and policy.")] = 4,
     families: Annotated[str, typer.Option(help="Which families.")] = ",".join(FAMILIES),
-    players: Annotated[str, typer.Option(help="Which players.")] = ",".join(PLAYERS),
+    policies: Annotated[
+        str, typer.Option("--policies", "--players", help="Which policies.")
+    ] = ",".join(POLICIES),
     first_seed: Annotated[int, typer.Option(min=0, help="Of the missions.")] = FIRST_SEED,
     wind_mps: Annotated[float, typer.Option(min=0.0, help="Constant, unknown to all.")] = 0.0,
     verbose: Annotated[bool, typer.Option(help="Name the missions with losses.")] = False,
 ) -> None:
-    """Fly random players until all UAS are down, and print a table."""
+    """Fly random policies until all UAS are down, and print a table."""
     tallies: dict[tuple[str, str], Counter[str]] = {}
     for family in chosen(families, FAMILIES, "family"):
-        for player in chosen(players, PLAYERS, "player"):
-            tallies[family, player] = Counter()
+        for policy in chosen(policies, POLICIES, "policy"):
+            tallies[family, policy] = Counter()
             for seed in range(first_seed, first_seed + missions):
-                tally = fly(family, player, seed, wind_mps)
-                tallies[family, player].update(tally)
+                tally = fly(family, policy, seed, wind_mps)
+                tallies[family, policy].update(tally)
                 if verbose and _lost(tally):
-                    sys.stderr.write(f"{family} {player} {seed}: {dict(tally)}\n")
+                    sys.stderr.write(f"{family} {policy} {seed}: {dict(tally)}\n")
     console = Console()
     console.width = max(console.width, 130)
     console.print(_table(tallies))

@@ -1,11 +1,11 @@
 """Which UAS come home among others in their way: missions in which the others try to prevent it.
 
     python benchmarks/right_of_way.py
-    python benchmarks/right_of_way.py --missions 140 --players cage,doorstep
+    python benchmarks/right_of_way.py --missions 140 --policies cage,doorstep
 
 The mission of a seed is a generated town with 2 to 8 UAS. One of them, drawn, has half a battery
 and flies to a drawn corner of the geofence, until return mode calls it home; the others have full
-batteries and fly, for as long as it is out, where the player sends them:
+batteries and fly, for as long as it is out, where the policy sends them:
 
 - corner: to the same corner, at full speed, as untrained policies do;
 - siege: at it, at full speed;
@@ -88,20 +88,20 @@ def _doorstep(scene: Scene, _: int) -> Vector:
 
 
 @dataclass(frozen=True)
-class Player:
+class Policy:
     """Where it sends the mates, and whether they slow down on the way there."""
 
     target: Callable[[Scene, int], Vector]
     slows: bool
 
 
-PLAYERS: Mapping[str, Player] = {
-    "corner": Player(lambda scene, _: scene.corner_m, slows=False),
-    "siege": Player(lambda scene, _: scene.place_m, slows=False),
-    "press": Player(lambda scene, _: scene.place_m, slows=True),
-    "goalkeeper": Player(_goalkeeper, slows=True),
-    "cage": Player(_cage, slows=True),
-    "doorstep": Player(_doorstep, slows=True),
+POLICIES: Mapping[str, Policy] = {
+    "corner": Policy(lambda scene, _: scene.corner_m, slows=False),
+    "siege": Policy(lambda scene, _: scene.place_m, slows=False),
+    "press": Policy(lambda scene, _: scene.place_m, slows=True),
+    "goalkeeper": Policy(_goalkeeper, slows=True),
+    "cage": Policy(_cage, slows=True),
+    "doorstep": Policy(_doorstep, slows=True),
 }
 
 
@@ -131,7 +131,7 @@ def _velocity(place_m: Vector, target_m: Vector, slows: bool) -> tuple[float, ..
 
 def fly(name: str, seed: int, n_uas: int) -> Counter[str]:
     """One mission: what there is to count."""
-    player = PLAYERS[name]
+    policy = POLICIES[name]
     scenario, chosen, corner_m = _mission(seed, n_uas)
     world = World(scenario, return_mode=True, safety_filter=True)
     mates = [i for i in range(n_uas) if i != chosen]
@@ -142,7 +142,7 @@ def fly(name: str, seed: int, n_uas: int) -> Counter[str]:
         scene = Scene(x[chosen, :3].copy(), world.arena.uas["home_m"][chosen], corner_m)
         commands[chosen] = (_VELOCITY, _velocity(scene.place_m, corner_m, slows=False), False)
         for number, i in enumerate(mates):
-            values = _velocity(x[i, :3], player.target(scene, number), player.slows)
+            values = _velocity(x[i, :3], policy.target(scene, number), policy.slows)
             commands[i] = (_VELOCITY, values, False)
         outcome = world.step(commands)
         tally["uas_steps"] += int(outcome["flew"].sum())
@@ -157,7 +157,7 @@ def fly(name: str, seed: int, n_uas: int) -> Counter[str]:
 def _table(tallies: Mapping[str, Counter[str]]) -> Table:
     table = Table(title="Which UAS come home among others in their way")
     contacts = [name for name in CONTACT_NAMES if name != "none"]
-    for column in ("player", "missions", "not home", "steps on the way home", "lost to"):
+    for column in ("policy", "missions", "not home", "steps on the way home", "lost to"):
         table.add_column(column)
     for column in ("UAS samples in breach", "UAS samples", "commands changed"):
         table.add_column(column)
@@ -177,14 +177,16 @@ def _table(tallies: Mapping[str, Counter[str]]) -> Table:
 
 
 def main(
-    missions: Annotated[int, typer.Option(min=1, help="Missions of each player.")] = 140,
-    players: Annotated[str, typer.Option(help="Which players.")] = ",".join(PLAYERS),
+    missions: Annotated[int, typer.Option(min=1, help="Missions of each policy.")] = 140,
+    policies: Annotated[
+        str, typer.Option("--policies", "--players", help="Which policies.")
+    ] = ",".join(POLICIES),
 ) -> None:
     """Fly missions in which mates are in the way, and print a table."""
-    names = [name.strip() for name in players.split(",") if name.strip()]
+    names = [name.strip() for name in policies.split(",") if name.strip()]
     for name in names:
-        if name not in PLAYERS:
-            raise InputError(f"unknown player {name!r}; allowed: {', '.join(PLAYERS)}")
+        if name not in POLICIES:
+            raise InputError(f"unknown policy {name!r}; allowed: {', '.join(POLICIES)}")
     sizes = MOST_UAS - LEAST_UAS + 1
     tallies: dict[str, Counter[str]] = {}
     for name in names:

@@ -1,12 +1,12 @@
-"""What the safety filter leaves: random players among things that move, with it and without it.
+"""What the safety filter leaves: random policies among things that move, with it and without it.
 
     python benchmarks/safety_filter.py
-    python benchmarks/safety_filter.py --missions 400 --players random-velocities
+    python benchmarks/safety_filter.py --missions 400 --policies random-velocities
 
 The mission of a seed is a generated town (1 to 4 UAS, 5 to 20 blocks) with one to three cylinders
 that fly through it, each at a velocity that is drawn anew every 5 to 20 s, up to 15 m/s: faster
 than the UAS, and without a warning. They pass through blocks, and stay in the area and above the
-starts. Every flight lasts 200 steps or until all are home or lost; nobody is called home.
+starts. Every flight lasts 200 steps or until all are home or lost; none is called home.
 
 A UAS flight with a contact counts once, under what it was lost to. Its share of all UAS flights
 stands beside a 95 % upper bound (Clopper and Pearson's, one-sided: three in n where none was seen).
@@ -49,7 +49,7 @@ _CLIMB_MPS = 3.0
 _HELD_S = (5.0, 20.0)
 
 
-class Player(Protocol):
+class Policy(Protocol):
     """What is asked of a planner here."""
 
     def reset(self, brief: MissionBrief, seed: int, /) -> None:
@@ -61,7 +61,7 @@ class Player(Protocol):
         ...
 
 
-def _player(name: str) -> Player:
+def _policy(name: str) -> Policy:
     if name == "random-walk":
         return RandomWalk()
     if name == "random-velocities":
@@ -69,7 +69,7 @@ def _player(name: str) -> Player:
     return NearestWaypoint()
 
 
-PLAYERS = ("random-walk", "random-velocities", "nearest-waypoint")
+POLICIES = ("random-walk", "random-velocities", "nearest-waypoint")
 
 
 def with_movers(scenario: Scenario, seed: int) -> Scenario:
@@ -120,9 +120,9 @@ def _schedule(rng, place_m, low_m, high_m, until_s: float) -> list[dict]:
 
 @dataclass(frozen=True)
 class Case:
-    """A player, with the filter or without it, with things that move or without them."""
+    """A policy, with the filter or without it, with things that move or without them."""
 
-    player: str
+    policy: str
     safety_filter: bool
     moving: bool
 
@@ -154,15 +154,15 @@ def fly(case: Case, seed: int, steps: int) -> Tally:
     if case.moving:
         scenario = with_movers(scenario, seed)
     world = World(scenario, safety_filter=case.safety_filter)
-    player = _player(case.player)
-    player.reset(MissionBrief.of(scenario), seed)
+    policy = _policy(case.policy)
+    policy.reset(MissionBrief.of(scenario), seed)
     tally = Tally(uas_flights=len(world.names), lost=Counter())
     for _ in range(steps):
         if world.done:
             break
         swarm = world.swarm_state()
         tally.uas_steps += len(swarm.active)
-        outcome = world.step(player.act(swarm))
+        outcome = world.step(policy.act(swarm))
         tally.filtered += int(outcome["filtered"].sum())
         contacts = [CONTACT_NAMES[code] for code in outcome["contact"] if code]
         tally.lost = (tally.lost or Counter()) + Counter(contacts)
@@ -193,7 +193,7 @@ def upper_bound(hits: int, trials: int) -> float:
 
 def _table(tallies: Mapping[Case, Tally]) -> Table:
     table = Table(title="UAS flights that ended in a contact; UAS samples too near to something")
-    for column in ("player", "filter", "moving", "UAS flights", "lost to: moving", "at most"):
+    for column in ("policy", "filter", "moving", "UAS flights", "lost to: moving", "at most"):
         table.add_column(column)
     for column in ("UAS", "obstacle", "fence", "these at most", "breaches: moving", "others"):
         table.add_column(column)
@@ -203,7 +203,7 @@ def _table(tallies: Mapping[Case, Tally]) -> Table:
         moving = lost["moving_obstacle"]
         others = sum(lost.values()) - moving
         table.add_row(
-            case.player,
+            case.policy,
             "on" if case.safety_filter else "off",
             "yes" if case.moving else "no",
             str(n),
@@ -229,15 +229,17 @@ def _fly_many(case: Case, seeds: Sequence[int], steps: int) -> Tally:
 
 def main(
     missions: Annotated[int, typer.Option(min=1, help="Generated missions of each case.")] = 60,
-    players: Annotated[str, typer.Option(help="Which players.")] = ",".join(PLAYERS),
+    policies: Annotated[
+        str, typer.Option("--policies", "--players", help="Which policies.")
+    ] = ",".join(POLICIES),
     steps: Annotated[int, typer.Option(min=1, help="Steps of a flight at most.")] = 200,
     jobs: Annotated[int, typer.Option(min=1, help="Processes side by side.")] = 2,
 ) -> None:
-    """Fly random players with the safety filter and without it, and print a table."""
-    names = [name.strip() for name in players.split(",") if name.strip()]
+    """Fly random policies with the safety filter and without it, and print a table."""
+    names = [name.strip() for name in policies.split(",") if name.strip()]
     for name in names:
-        if name not in PLAYERS:
-            raise InputError(f"unknown player {name!r}; allowed: {', '.join(PLAYERS)}")
+        if name not in POLICIES:
+            raise InputError(f"unknown policy {name!r}; allowed: {', '.join(POLICIES)}")
     cases = [
         Case(name, *switches)
         for name in names

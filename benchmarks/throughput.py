@@ -72,7 +72,7 @@ class CaseFailedError(Exception):
     """An environment ended instead of answering."""
 
 
-class Player:
+class CaseProcess:
     """The process of a case."""
 
     def __init__(self, case: Case, python: Path) -> None:
@@ -176,26 +176,27 @@ def measure(
     """
     failed: list[tuple[Case, str]] = []
     for group in dict.fromkeys((case.num_envs, case.threads) for case in cases):
-        players: list[Player] = []
+        processes: list[CaseProcess] = []
         for case in cases:
             if (case.num_envs, case.threads) != group:
                 continue
             try:
-                player = Player(case, python_of(case.peer, cache))
-                players.append(player)
-                player.answer()
+                process = CaseProcess(case, python_of(case.peer, cache))
+                processes.append(process)
+                process.answer()
                 # the first turn is not kept: it finds how many steps a turn has
-                player.play(seconds / 2, clock)
+                process.play(seconds / 2, clock)
                 case.rates.clear()
                 case.row_rates.clear()
             except CaseFailedError as error:
                 failed.append((case, str(error)))
-        alive = [player for player in players if player.case not in (case for case, _ in failed)]
+        lost = [case for case, _ in failed]
+        alive = [process for process in processes if process.case not in lost]
         for _ in range(turns):
-            for player in alive:
-                player.play(seconds, clock)
-        for player in players:
-            player.close()
+            for process in alive:
+                process.play(seconds, clock)
+        for process in processes:
+            process.close()
     return failed
 
 

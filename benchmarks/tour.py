@@ -56,11 +56,11 @@ _LEFT_OUT_S = 120  # for a waypoint of weight 1, as in our search
 def problem(scenario: Scenario) -> RoutingTask:
     """The routing problem before take-off, nothing blocked."""
     swarm = World(scenario).swarm_state()
-    everybody = np.ones(len(swarm.names), np.bool_)
+    all_uas = np.ones(len(swarm.names), np.bool_)
     view = View(
         x=swarm.x,
-        may_work=everybody,
-        flies=everybody,
+        may_work=all_uas,
+        flies=all_uas,
         uncovered=swarm.uncovered,
         blocked=np.zeros_like(swarm.uncovered),
         time_s=0.0,

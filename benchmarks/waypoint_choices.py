@@ -94,13 +94,13 @@ def by_greedy_rollout(scenarios: Sequence[Scenario]) -> NDArray:
     )  # fmt: skip
 
 
-def table(title: str, players: dict[str, NDArray]) -> Table:
+def table(title: str, flights: dict[str, NDArray]) -> Table:
     """Means, and the differences to the first."""
     table = Table(title=title)
     for column in ("", *COLUMNS, "Wh, % of the first's", "steps, % of the first's"):
         table.add_column(column, justify="right" if column else "left")
-    first = next(iter(players.values()))
-    for name, rows in players.items():
+    first = next(iter(flights.values()))
+    for name, rows in flights.items():
         cells = ["" if np.isnan(value) else f"{value:.4g}" for value in rows.mean(axis=0)]
         for column in (WH, STEPS):
             change = interval(
@@ -122,14 +122,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     console = Console(width=170)
     for title, scenarios in (("village", [load_scenario("village")]), ("generated", towns)):
         options = {"filter": arguments.filter}
-        players = {"nearest-waypoint": flown(scenarios, "nearest-waypoint", options)}
+        flights = {"nearest-waypoint": flown(scenarios, "nearest-waypoint", options)}
         if arguments.filter == "true":
-            players["greedy outlook, not learned"] = by_greedy_rollout(scenarios)
+            flights["greedy outlook, not learned"] = by_greedy_rollout(scenarios)
         for number in arguments.simulations.split(","):
             name = f"learned-waypoint, {number} simulations"
             choice = {**options, "simulations": number}
-            players[name] = flown(scenarios, "learned-waypoint", choice)
-        console.print(table(f"{title}: {len(scenarios)} missions", players))
+            flights[name] = flown(scenarios, "learned-waypoint", choice)
+        console.print(table(f"{title}: {len(scenarios)} missions", flights))
     return 0
 
 

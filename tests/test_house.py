@@ -93,6 +93,52 @@ def _is_command(node: ast.AST) -> bool:
     return any(word in text for text in said for word in ("typer.Option(", "typer.Argument("))
 
 
+def test_no_column_with_a_meaning_is_addressed_by_its_number():
+    # up to 2 they are coordinates, ends and pairs mostly; beyond, a number says nothing to a reader
+    found = [
+        f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}"
+        for folder in PACKAGES.values()
+        for path in folder.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Subscript) and _is_numbered(node)
+    ]
+    assert not found, "name these columns where their array is declared"
+
+
+NOT_COLUMNS = {
+    "Annotated": "types, and lengths of axes",
+    "series": "terms of a power series, numbered as in its formula",
+}
+
+
+def _is_numbered(node: ast.Subscript) -> bool:
+    """Whether a number of 3 or more says which element is meant.
+
+    A slice from the beginning alone is none: it cuts texts and lists short.
+    """
+    if isinstance(node.value, ast.Name) and node.value.id in NOT_COLUMNS:
+        return False
+    if isinstance(node.slice, ast.Tuple):
+        numbers = [number for part in node.slice.elts for number in _ends(part)]
+    elif isinstance(node.slice, ast.Slice) and node.slice.lower is None:
+        numbers = []
+    else:
+        numbers = _ends(node.slice)
+    return any(
+        isinstance(number, ast.Constant) and number.value in range(3, 1000) for number in numbers
+    )
+
+
+def _ends(part: ast.expr) -> list[ast.expr | None]:
+    """An index, or the first and the last index of a slice."""
+    if not isinstance(part, ast.Slice):
+        return [part]
+    last = part.upper
+    if isinstance(last, ast.Constant) and isinstance(last.value, int):
+        last = ast.Constant(last.value - 1)
+    return [part.lower, last]
+
+
 def _source_folders() -> list[str]:
     return sorted({str(folder.parent) for folder in PACKAGES.values()})
 

@@ -1,4 +1,4 @@
-"""Multi-UAS area coverage with a physical battery: one model of the world for every player.
+"""Multi-UAS area coverage with a physical battery: one world for every planner.
 
 Importing the package registers the environments with Gymnasium and PettingZoo, nothing else: its
 names are imported when they are first asked for, from where `__init__.pyi` says.

@@ -1,6 +1,7 @@
 """The rows of `benchmarks/robustness.py`: what each tries, and what it makes of the results."""
 
 from robustness_rows import (
+    attacks,
     batteries,
     decisions,
     exported,
@@ -9,7 +10,6 @@ from robustness_rows import (
     judge,
     kills,
     missions,
-    players,
     repeats,
     scores,
 )
@@ -21,8 +21,8 @@ ROWS: dict[str, Row] = {
         missions.ROW,
         faults.ROW,
         fuzz.ROW,
-        players.HOSTILE,
-        players.RANDOM,
+        attacks.HOSTILE,
+        attacks.RANDOM,
         scores.ROW,
         repeats.ROW,
         kills.ROW,

@@ -1,4 +1,4 @@
-"""The gaze network: what it looks at, what it does at first, and that torch and NumPy agree."""
+"""The attention network: what it looks at and does at first, and that torch and NumPy agree."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from uas_coverage_env import InputError
 from uas_coverage_env.env import observation_columns
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
-CHANGES = ['player.network="gaze"', "player.hidden=[8]", "player.keys=4"]
+CHANGES = ['policy.network="attention"', "policy.hidden=[8]", "policy.keys=4"]
 SMALL = Attention(inputs=11, outputs=2, before=2, candidates=3, features=2, keys=4, hidden=5)
 
 
@@ -44,6 +44,12 @@ def test_the_order_of_the_candidates_does_not_matter(order, seed):
     shuffled[:, 2:8] = x[:, 2:8].reshape(4, 3, 2)[:, order].reshape(4, 6)
     t = tensors_of(SMALL, seed)
     assert np.allclose(SMALL.forward(t, x), SMALL.forward(t, shuffled), rtol=1e-9)
+
+
+def test_the_network_is_found_under_its_former_name():
+    described = SMALL.model_dump()
+    assert described["kind"] == "attention"
+    assert Attention(**{**described, "kind": "gaze"}) == SMALL
 
 
 def test_a_candidate_that_is_not_there_is_not_looked_at():
@@ -97,7 +103,7 @@ def test_what_is_exported_decides_as_the_model_does(training_run):
 
 
 def test_it_learns_and_explores_less_and_less():
-    changes = [*CHANGES, "player.first_deviation=0.5", "learning.epochs=1"]
+    changes = [*CHANGES, "policy.first_deviation=0.5", "learning.epochs=1"]
     fresh = TrainingRun.untrained(TrainingJob("tiny", load_config(TINY, changes=changes), seed=0))
     before = fresh.policy().tensors
     fresh.model.lr_schedule = lambda _: 0.25 * fresh.model.learning_rate
@@ -110,9 +116,9 @@ def test_it_learns_and_explores_less_and_less():
 @pytest.mark.parametrize(
     ("name", "changes", "words"),
     [
-        (TINY, ['player.network="gaze"', "player.hidden=[8, 8]"], "'gaze' has one width"),
-        ("sac", ['player.network="gaze"', "player.hidden=[8]"], "learned by ppo alone"),
-        (TINY, ['player.network="glance"'], "should be 'layers' or 'gaze'"),
+        (TINY, ['policy.network="attention"', "policy.hidden=[8, 8]"], "'attention' has one width"),
+        ("sac", ['policy.network="attention"', "policy.hidden=[8]"], "learned by ppo alone"),
+        (TINY, ['policy.network="glance"'], "should be 'layers' or 'attention'"),
     ],
 )
 def test_a_network_that_cannot_be_learned_is_refused(name, changes, words):

@@ -8,7 +8,7 @@ from uas_coverage_env.world import FLYING
 
 @pytest.mark.parametrize("assisted", [False, True])
 @pytest.mark.parametrize("name", ["village", "generated"])
-def test_a_player_sees_what_a_learner_sees(name, assisted):
+def test_a_planner_sees_what_a_learner_sees(name, assisted):
     scenario = (
         load_scenario(name)
         if name == "village"

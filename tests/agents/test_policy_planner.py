@@ -56,7 +56,7 @@ def test_a_policy_flies_as_its_actions_do_in_the_environment(directory, scenario
         ({"layout": "somebody's own"}, "observation is not that of this version"),
     ],
 )
-def test_a_policy_that_nobody_can_fly_is_refused(tmp_path, changes, words):
+def test_a_policy_that_cannot_be_flown_is_refused(tmp_path, changes, words):
     description = describe()
     network, view = description.network, description.observation
     if "outputs" in changes:
@@ -81,6 +81,15 @@ def test_the_words_about_an_observation_may_change_and_its_numbers_may_not():
         assert view.model_copy(update={"groups": groups}).has_the_numbers_of(view) == same
     scales = view.scales | {"ray_m": 81.0}
     assert not view.model_copy(update={"scales": scales}).has_the_numbers_of(view)
+
+
+def test_an_observation_is_the_same_by_the_names_of_before():
+    view = describe().observation
+    text = view.model_dump_json()
+    for name, former in (("density", "crowd"), ("density_m", "crowd_m"), ("nearest_uas", "rival")):
+        assert f'"{name}"' in text
+        text = text.replace(f'"{name}"', f'"{former}"')
+    assert type(view).model_validate_json(text) == view
 
 
 def test_planners_of_a_kind_are_named_with_their_argument(directory):

@@ -24,7 +24,7 @@ def tiny(name: str, **changes) -> Reference:
 
 
 def weights(trained) -> list[torch.Tensor]:
-    return list(trained.player.model.policy.state_dict().values())
+    return list(trained.policy.model.policy.state_dict().values())
 
 
 def test_every_learner_of_the_package_is_read_and_has_an_environment_on_every_level():
@@ -90,10 +90,10 @@ def test_a_central_critic_sees_the_whole_mission_and_the_actor_does_not():
 
 def test_a_policy_with_a_memory_begins_each_mission_with_nothing_in_mind(tmp_path):
     trained = train_reference(tiny("recurrent-ppo", rounds=1), "easy", 0, tmp_path)
-    returns = [score(trained.player, "easy", missions=1).mean("episode_return") for _ in range(2)]
+    returns = [score(trained.policy, "easy", missions=1).mean("episode_return") for _ in range(2)]
     assert returns[0] == returns[1]
 
 
 def test_a_policy_with_masks_flies_what_it_may(tmp_path):
     trained = train_reference(tiny("maskable-ppo", rounds=1), "easy", 0, tmp_path)
-    assert score(trained.player, "easy", missions=1).missions[0].n_uas == 1
+    assert score(trained.policy, "easy", missions=1).missions[0].n_uas == 1

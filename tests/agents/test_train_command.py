@@ -2,6 +2,7 @@ import csv
 import json
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -68,7 +69,7 @@ def test_a_training_leaves_a_policy_a_curve_and_its_logs(trained):
     assert not list(trained.rglob("*.pkl"))
 
 
-def test_the_curve_has_the_default_return_and_stands_beside_players_that_do_not_learn(trained):
+def test_the_curve_has_the_default_return_and_stands_beside_planners_that_do_not_learn(trained):
     job = TrainingJob("tiny", load_config(TINY), seed=0, missions=1)
     town = curve_scenarios(job)[0]
     (beside,) = read_curve(trained / "baselines" / "nearest-waypoint")
@@ -79,6 +80,14 @@ def test_the_curve_has_the_default_return_and_stands_beside_players_that_do_not_
     assert returns[-1] == last.mean("episode_return")
     score = load_policy(trained / "policy").description.score
     assert score.measures["episode_return"].mean == returns[-1]
+
+
+def test_a_training_that_an_older_version_began_goes_on(trained, tmp_path, capsys):
+    begun = shutil.copytree(trained, tmp_path / "run")
+    order = (begun / "order.json").read_text()
+    (begun / "order.json").write_text(order.replace('"policy"', '"player"'))
+    assert train(begun) == 0
+    assert "going on with the training there" in capsys.readouterr().out
 
 
 def test_a_baseline_that_is_no_planner_is_refused_before_anything_is_begun(tmp_path, capsys):
@@ -203,7 +212,7 @@ SAC = [
 
 @pytest.mark.parametrize("name", [TINY, "sac"])
 def test_a_model_that_is_taken_up_again_learns_on_bit_for_bit(name):
-    config = load_config(name, changes=["player.hidden=[8]", *(SAC if name == "sac" else ())])
+    config = load_config(name, changes=["policy.hidden=[8]", *(SAC if name == "sac" else ())])
     job = TrainingJob("tiny", config, seed=0)
     first, second = TrainingRun.untrained(job), TrainingRun.untrained(job)
     first.model.learn(256)
@@ -225,7 +234,7 @@ def same(some: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> bool:
 
 def test_a_checkpoint_of_another_network_is_refused():
     job = TrainingJob("tiny", load_config(TINY), seed=0)
-    other = TrainingJob("tiny", load_config(TINY, changes=["player.hidden=[4]"]), seed=0)
+    other = TrainingJob("tiny", load_config(TINY, changes=["policy.hidden=[4]"]), seed=0)
     first, second = TrainingRun.untrained(job), TrainingRun.untrained(other)
     first.model.learn(64)
     with pytest.raises(InputError, match="does not fit this version"):
@@ -275,7 +284,7 @@ def test_a_memory_that_points_elsewhere_is_refused(remembering, name, change, wo
 @pytest.fixture(scope="module")
 def remembering():
     """A training off-policy, put aside."""
-    job = TrainingJob("tiny", load_config("sac", changes=["player.hidden=[8]", *SAC]), seed=0)
+    job = TrainingJob("tiny", load_config("sac", changes=["policy.hidden=[8]", *SAC]), seed=0)
     training_run = TrainingRun.untrained(job)
     training_run.model.learn(64)
     return job, to_arrays(training_run.model, training_run.lanes)

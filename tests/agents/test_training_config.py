@@ -32,7 +32,7 @@ def test_every_published_configuration_is_valid(name):
 
 
 def test_there_are_configurations_for_both_interfaces():
-    interfaces = {load_config(name).player.interface for name in published_names()}
+    interfaces = {load_config(name).policy.interface for name in published_names()}
     assert interfaces == {"velocity", "waypoint"}
     assert {path.suffix for path in PUBLISHED.iterdir()} == {".toml"}
 
@@ -42,10 +42,10 @@ def test_there_are_configurations_for_both_interfaces():
     [
         ("steps=77", "steps", 77),
         ("learning.gamma = 0.5", "learning.gamma", 0.5),
-        ("player.hidden=[32, 16]", "player.hidden", (32, 16)),
-        ("player.activation=relu", "player.activation", "relu"),
-        ('player.activation="relu"', "player.activation", "relu"),
-        ("player.safety_filter=false", "player.safety_filter", False),
+        ("policy.hidden=[32, 16]", "policy.hidden", (32, 16)),
+        ("policy.activation=relu", "policy.activation", "relu"),
+        ('policy.activation="relu"', "policy.activation", "relu"),
+        ("policy.safety_filter=false", "policy.safety_filter", False),
         ("scenarios.family.towns.n_uas=[3, 3]", "scenarios.family.towns.n_uas", (3, 3)),
     ],
 )
@@ -72,14 +72,30 @@ def test_settings_can_be_changed_one_by_one(change, field, value):
         ("learning.gamma=1.5", "gamma"),
         ("learning.algorithm=maskable-ppo", "waypoints need maskable-ppo"),
         ("learning.algorithm=magic", "learning"),
-        ("player.hidden=[]", "hidden"),
-        ("player.hidden=[999999]", "hidden"),
-        ("player.rewards.filter=1", "there is no 'filter'"),
+        ("policy.hidden=[]", "hidden"),
+        ("policy.hidden=[999999]", "hidden"),
+        ("policy.rewards.filter=1", "there is no 'filter'"),
         ("steps=" + "[" * 5000, "steps"),
     ],
 )
 def test_a_change_that_does_not_fit_is_named(change, words):
     assert words in refusal(TINY, changes=[change])
+
+
+def test_a_configuration_with_the_names_of_before_is_the_same_one(tmp_path):
+    old = tmp_path / "old.toml"
+    text = (PUBLISHED / "ppo.toml").read_text()
+    old.write_text(text.replace("[policy", "[player").replace('"attention"', '"gaze"'))
+    assert "[player.rewards]" in old.read_text()
+    assert load_config(str(old)) == load_config("ppo")
+    changed = [load_config("ppo", changes=[f"{table}.keys=8"]) for table in ("player", "policy")]
+    assert changed[0] == changed[1] != load_config("ppo")
+
+
+def test_a_table_is_not_given_under_both_names(tmp_path):
+    both = tmp_path / "both.toml"
+    both.write_text(Path(TINY).read_text() + '[player]\ninterface = "velocity"\n')
+    assert "player: unknown key" in refusal(str(both))
 
 
 def test_mistakes_in_the_name_are_answered_with_what_there_is():

@@ -52,7 +52,7 @@ def test_lanes_that_do_not_decide_show_zeros_and_pay_nothing(towns):
         assert ended[decided & ~decides].all()
         handed_over += int((decided & ~decides & (raw[:, FLYING] > 0)).sum())
         decided = decides
-    assert handed_over > 0, "return mode should have taken over somebody"
+    assert handed_over > 0, "return mode should have taken over some UAS"
 
 
 def test_an_episode_that_the_clock_ends_is_over(towns):
@@ -107,7 +107,7 @@ def test_only_decisions_are_learned_from():
     batches = list(buffer.get(batch_size=16))
     assert (torch.cat([batch.observations for batch in batches])[:, FLYING] == 1.0).all()
     decided = int((buffer.observations[:, FLYING] > 0).sum())
-    assert decided < len(buffer.observations), "some lanes should have had nobody in them"
+    assert decided < len(buffer.observations), "some lanes should have had no UAS in them"
     assert abs(sum(len(batch.observations) for batch in batches) - decided) <= 8
 
 
@@ -125,7 +125,7 @@ def test_sac_remembers_decisions_alone_and_what_came_of_them(towns):
         step = zip(view, now, actions, rewards, ended, strict=True)
         happened.extend(sample for sample in step if sample[0][FLYING] > 0)
         view = now
-    assert 100 < len(happened) < 300 * env.num_envs, "in some lanes, nobody should have decided"
+    assert 100 < len(happened) < 300 * env.num_envs, "in some lanes, no UAS should have decided"
     names = ("observations", "next_observations", "actions", "rewards", "dones")
     for name, column in zip(names, map(np.array, zip(*happened, strict=True)), strict=True):
         assert np.array_equal(getattr(all_of_it, name)[: len(happened), 0], column)
@@ -155,7 +155,7 @@ def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays()
 
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])
 def test_what_is_exported_decides_as_the_model_does(algorithm):
-    changes = ["player.hidden=[8, 8]"]
+    changes = ["policy.hidden=[8, 8]"]
     if algorithm == "sac":
         config = load_config("sac", changes=[*changes, "scenarios.pool=1", "lanes=1"])
     else:
@@ -178,7 +178,7 @@ def test_half_a_minute_of_training_covers_far_more_than_none():
         "learning.rollout_steps=128",
         "learning.batch_size=2048",
         "learning.learning_rate=1e-3",
-        "player.hidden=[64, 64]",
+        "policy.hidden=[64, 64]",
         "scenarios.pool=16",
         "scenarios.family.towns.n_waypoints=[8, 12]",
     ]
@@ -200,7 +200,7 @@ def test_a_quarter_of_a_minute_of_sac_covers_most_of_what_it_has_never_seen():
     changes = [
         "steps=15_000",
         "lanes=8",
-        "player.hidden=[64, 64]",
+        "policy.hidden=[64, 64]",
         "scenarios.pool=16",
         "scenarios.family.towns.n_uas=[1, 2]",
         "scenarios.family.towns.n_waypoints=[8, 12]",

@@ -124,7 +124,7 @@ def test_a_lane_flies_the_same_whatever_flies_beside_it():
         assert np.array_equal(Teams([s]).fly(nearest)[0], together[s])
 
 
-def test_nobody_goes_home_while_it_is_the_last_that_covers():
+def test_no_uas_goes_home_while_it_is_the_last_that_covers():
     teams = Teams([0])
     assert teams.lanes.decider[0] == 0
     assert not teams.lanes.legal[0, HOME_CHOICE]

@@ -23,7 +23,7 @@ def environment(n_lanes=3, seed=0):
 
 def config(*changes):
     return load_config(
-        "maskable-ppo", changes=["scenarios.pool=4", "lanes=4", "player.hidden=8", *changes]
+        "maskable-ppo", changes=["scenarios.pool=4", "lanes=4", "policy.hidden=8", *changes]
     )
 
 
@@ -153,8 +153,8 @@ def test_an_untrained_model_takes_the_nearest_waypoint():
 def test_a_short_training_saves_energy_and_time_on_towns_it_has_not_seen():
     torch.set_num_threads(1)
     learner = WaypointLearner()
-    shares = [f"player.{of}_share=0.0" for of in ("moving", "covered", "discharged")]
-    little = config("lanes=32", "scenarios.pool=48", "player.hidden=48", *shares)
+    shares = [f"policy.{of}_share=0.0" for of in ("moving", "covered", "discharged")]
+    little = config("lanes=32", "scenarios.pool=48", "policy.hidden=48", *shares)
     model = learner.model(little, learner.lanes(little, 0), 0)
 
     def costs_Wh():

@@ -198,6 +198,6 @@ def test_in_wind_nearest_waypoint_brings_all_home(wind):
 
 @pytest.mark.parametrize("wind_mps", [4.0, 8.0])
 @pytest.mark.parametrize("family", ["towns", "far", "overhangs"])
-def test_random_players_in_wind_come_home(family, wind_mps):
+def test_random_policies_in_wind_come_home(family, wind_mps):
     tally = fly(family, "away", 80_000, wind_mps)
     assert tally["battery"] == tally["obstacle"] == tally["geofence"] == tally["uas"] == 0

@@ -62,7 +62,7 @@ def test_all_come_home_when_everything_is_covered():
     assert world.state.status[0] == LANDED
 
 
-def test_return_mode_stays_on_and_overrides_the_player():
+def test_return_mode_stays_on_and_overrides_the_planner():
     world = World(meadow(max_steps=120), return_mode=True)
     returning = []
     for _ in range(120):
@@ -75,7 +75,7 @@ def test_return_mode_stays_on_and_overrides_the_player():
     assert world.state.status[0] == LANDED
 
 
-def test_without_return_mode_only_the_player_returns():
+def test_without_return_mode_only_the_planner_returns():
     world = World(meadow())
     outcome = world.step(AWAY)
     assert not outcome["returning"][0]
@@ -176,9 +176,9 @@ FORMERLY_LOST = (
 )
 
 
-@pytest.mark.parametrize(("family", "player", "seed"), FORMERLY_LOST)
-def test_random_players_on_which_uas_were_lost_bring_them_home(family, player, seed):
-    tally = fly(family, player, seed)
+@pytest.mark.parametrize(("family", "policy", "seed"), FORMERLY_LOST)
+def test_random_policies_on_which_uas_were_lost_bring_them_home(family, policy, seed):
+    tally = fly(family, policy, seed)
     assert tally["battery"] == tally["still flying"] == tally["breaches"] == 0
     assert tally["charge left"] > 0
 

@@ -18,9 +18,9 @@ CANYON = [
     box("west", (70.0, 90.0, -49.0), (94.8, 150.0, 0.0)),
     box("east", (105.2, 90.0, -49.0), (130.0, 150.0, 0.0)),
 ]
-"""Two walls as high as the ceiling, 10.4 m apart: nobody passes beside another."""
+"""Two walls as high as the ceiling, 10.4 m apart: no UAS passes beside another."""
 OUT_OF_THE_WAY = [waypoint((5.0, 195.0, -40.0), 3.0)] * 3
-"""Nobody covers them, which would call all home. Most are high: so high are routes planned."""
+"""No UAS covers them, which would call all home. Most are high: so high are routes planned."""
 KEPT_M = 5.72
 RESIDUE_M = 0.01
 """Braking is simulated until what is left of the motion is centimetres."""
@@ -107,7 +107,7 @@ def cage(first, i, x):
     return towards(first[:3] + 6.3 * np.array(bars[i - 1]), 0.4)(x)
 
 
-PLAYERS = {p.__name__: p for p in (goalkeeper, press, siege, doorstep, cage)}
+POLICIES = {p.__name__: p for p in (goalkeeper, press, siege, doorstep, cage)}
 
 
 def around_corner(n_uas, seed=0):
@@ -123,11 +123,11 @@ def around_corner(n_uas, seed=0):
 
 
 @pytest.mark.parametrize("n_uas", [2, 5, 8])
-@pytest.mark.parametrize("player", PLAYERS.values(), ids=PLAYERS)
-def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(player, n_uas):
+@pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES)
+def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(policy, n_uas):
     world = swarm(n_uas)
     put(world, around_corner(n_uas))
-    contacts, apart_m, changed = see_home(world, player, n_waiting=40)
+    contacts, apart_m, changed = see_home(world, policy, n_waiting=40)
     assert world.state.status[0] == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M
@@ -138,13 +138,13 @@ def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(player, n_uas):
 @given(
     seed=st.integers(0, 10_000),
     n_uas=st.integers(2, 8),
-    names=st.lists(st.sampled_from(sorted(PLAYERS)), min_size=7, max_size=7),
+    names=st.lists(st.sampled_from(sorted(POLICIES)), min_size=7, max_size=7),
 )
 def test_nor_does_any_mixture_of_them_from_anywhere_around_a_corner(seed, n_uas, names):
     world = swarm(n_uas)
     put(world, around_corner(n_uas, seed))
-    players = [PLAYERS[name] for name in names]
-    contacts, apart_m, _ = see_home(world, lambda x0, i, x: players[i - 1](x0, i, x), n_waiting=40)
+    policies = [POLICIES[name] for name in names]
+    contacts, apart_m, _ = see_home(world, lambda x0, i, x: policies[i - 1](x0, i, x), n_waiting=40)
     assert world.state.status[0] == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M
@@ -193,7 +193,7 @@ def test_a_mate_beside_the_way_home_is_left_in_peace_and_one_on_it_is_not():
     assert changed == [True, False]
 
 
-def test_nobody_makes_way_for_a_uas_that_is_not_called_home():
+def test_no_uas_makes_way_for_one_that_is_not_called_home():
     world = swarm(2)
     put(world, [(100.0, 160.0, -20.0), (100.0, 150.0, -20.0)])
     assert not hover(world, 10)

@@ -68,7 +68,7 @@ KINDS = [(VELOCITY,), (VELOCITY, ACCELERATION, WRENCH)]
 
 @pytest.mark.parametrize("kinds", KINDS, ids=["velocity", "all"])
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_random_commands_with_both_assistants_harm_nobody_and_all_come_home(name, kinds):
+def test_random_commands_with_both_assistants_harm_no_uas_and_all_come_home(name, kinds):
     world = World(SCENARIOS[name](), safety_filter=True, return_mode=True)
     for seed in range(4):
         contacts, breaches, filtered = fly_randomly(world, seed, kinds)
@@ -215,7 +215,7 @@ def test_getting_out_of_the_way_is_not_paid_for_with_the_fence_a_wall_or_another
         assert outcome["separation_m"].min() >= 5.72 - 1e-6
 
 
-def test_things_that_turn_without_warning_drive_nobody_into_what_stands_still():
+def test_things_that_turn_without_warning_drive_no_uas_into_what_stands_still():
     world = World(restless(SCENARIOS["town_5"]()), safety_filter=True)
     for seed in range(4):
         assert lost_to(world, seed) <= {CONTACT_NAMES.index("moving_obstacle")}

@@ -35,7 +35,7 @@ def test_planners_that_do_not_know_of_sensors_refuse_the_mission(planner):
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_what_nobody_can_cover_keeps_nobody_in_the_air(name):
+def test_what_no_uas_can_cover_keeps_none_in_the_air(name):
     whole = load_scenario("mixed_fleet")
     mapper = whole.uas[0]
     few = [whole.waypoints[w] for w in (2, 15, 18)]

@@ -50,7 +50,7 @@ def ready(planner, scenario) -> Any:
     return planner
 
 
-def test_nearest_waypoint_sends_each_uas_to_the_nearest_one_that_nobody_else_flies_to(
+def test_nearest_waypoint_sends_each_uas_to_the_nearest_one_that_no_other_flies_to(
     village, at_start
 ):
     commands = ready(NearestWaypoint(), village).act(at_start)
@@ -76,7 +76,7 @@ def test_a_target_is_kept_until_it_is_covered(planner_class, village, at_start):
 
 
 @pytest.mark.parametrize("planner_class", [NearestWaypoint, Lawnmower, RandomWalk])
-def test_everybody_flies_home_when_everything_is_covered(planner_class, village, at_start):
+def test_every_uas_flies_home_when_everything_is_covered(planner_class, village, at_start):
     commands = ready(planner_class(), village).act(leaving(at_start))
     assert commands == {"uas_1": GoTo(None), "uas_2": GoTo(None)}
 
@@ -140,7 +140,7 @@ def test_a_uas_with_little_charge_gets_a_short_run(village):
     assert lengths[1] < 10 < lengths[0]
 
 
-def test_charges_that_are_too_little_together_still_give_everybody_a_run(village):
+def test_charges_that_are_too_little_together_still_give_every_uas_a_run(village):
     weak = [{**uas.model_dump(), "soc_0": 0.28} for uas in village.uas]
     brief = MissionBrief.of(changed(village, uas=weak))
     lengths = [len(run) for run in plan_runs(brief, list(range(49)))]
@@ -157,7 +157,7 @@ def test_lawnmower_flies_its_own_run_and_helps_when_it_is_done(village, at_start
     assert planner.act(leaving(at_start, *others))["uas_1"].waypoint in others
 
 
-def test_hover_holds_everybody_above_their_start(village, at_start):
+def test_hover_holds_every_uas_above_its_start(village, at_start):
     commands = ready(Hover(HoverOptions(climb_m=7.0)), village).act(at_start)
     assert {(c.north_mps, c.east_mps, c.altitude_m) for c in commands.values()} == {(0.0, 0.0, 8.0)}
     assert not hasattr(Hover(), "assistants"), "a baseline that fails is not helped"
@@ -228,7 +228,7 @@ def test_a_random_walk_with_its_assistants_touches_nothing(village):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("planner", ["nearest-waypoint", "lawnmower"])
-def test_the_village_is_covered_and_everybody_comes_home(village, planner):
+def test_the_village_is_covered_and_every_uas_comes_home(village, planner):
     flight = rollout(village, planner)
     assert accomplished(flight)
     assert flight.breaches == 0

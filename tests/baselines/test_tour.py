@@ -128,7 +128,7 @@ def test_a_uas_slower_than_thought_hands_over_what_its_battery_does_not_last_for
     assert len(schedule.order.left_out) == 0
 
 
-def test_a_short_clock_leaves_out_what_nobody_comes_home_from_in_time(village):
+def test_a_short_clock_leaves_out_what_no_uas_comes_home_from_in_time(village):
     short = changed(village, max_steps=120)
     schedule = schedule_of(short, view_of(short))
     assert len(schedule.order.left_out) > 0
@@ -169,7 +169,7 @@ def test_a_predicted_flight_begins_where_the_uas_is_and_comes_true(small_town):
         np.testing.assert_allclose(world.state.x[:, :3], expected_m, atol=1e-6)
 
 
-def test_it_flies_with_the_filter_and_brings_everybody_home_itself():
+def test_it_flies_with_the_filter_and_brings_every_uas_home_itself():
     assert Tour().assistants == Assistants(return_mode=False, safety_filter=True)
 
 

@@ -55,7 +55,7 @@ def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatc
     assert COMPILATIONS.n_compiled == n_compiled
 
 
-def test_a_planner_that_nobody_knows_is_refused(capsys):
+def test_a_planner_that_is_not_known_is_refused(capsys):
     assert main(["warm-up", "--planner", "nobody"]) == 2
     assert capsys.readouterr().err.startswith("error: ")
 

@@ -6,6 +6,7 @@ from eventful import STARTS_M, WAYPOINTS, after, corners_m, event, field, hoveri
 from small_worlds import mover
 
 from uas_coverage_env import MissionBrief, World, rollout
+from uas_coverage_env.disturbances import disturbances_of
 from uas_coverage_env.flight import accomplished, coverage, home, summary
 from uas_coverage_env.vehicle import DOD, LIFT, VX
 from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity, Wrench
@@ -99,6 +100,14 @@ def test_a_uas_that_loses_charge_comes_home_with_what_is_left():
     assert flight.x[20, 0, DOD] - flight.x[19, 0, DOD] == pytest.approx(0.55, abs=0.01)
     assert all_is_well(flight)
     assert flight.last_sample[0] < flight.last_sample[1]
+
+
+def test_a_damaged_motor_of_a_mission_with_other_events_is_refused():
+    weak = event("motor_degraded", 3.0, uas="uas_1", thrust_share=0.85)
+    damaged = disturbances_of(field(weak))
+    world = World(field(), disturbances=damaged)
+    with pytest.raises(ValueError, match="of an event that the mission does not have"):
+        after(world, 1, Velocity(0.0, 0.0, 49.0))
 
 
 def test_a_uas_with_a_damaged_motor_draws_more_and_climbs_less_and_comes_home():

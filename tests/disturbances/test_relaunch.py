@@ -1,4 +1,4 @@
-"""UAS that have landed take off again, where the scenario lets them and nobody else is at work."""
+"""UAS that have landed take off again, where the scenario lets them and no other is at work."""
 
 import dataclasses
 
@@ -103,7 +103,7 @@ def test_its_flight_is_kept_whole_in_files(flight, tmp_path):
     assert energy_Wh(loaded)[0] > 0.5
 
 
-def test_where_nobody_takes_off_again_flights_are_what_they_were():
+def test_where_no_uas_takes_off_again_flights_are_what_they_were():
     stays, may = (rollout(s, SecondUasWorks()) for s in (field(waypoints=AHEAD), again()))
     for name in ("x", "u", "mode", "voltage_V", "current_A", "covered"):
         np.testing.assert_array_equal(getattr(stays, name), getattr(may, name))
@@ -146,7 +146,7 @@ def due(scenario, *status, **changes):
     return Relaunch(MissionBrief.of(scenario)).due(seen(scenario, *status, **changes)).tolist()
 
 
-def test_nobody_goes_while_another_is_at_work():
+def test_no_uas_goes_while_another_is_at_work():
     assert due(again(), LANDED, LOST) == [True, False]
     assert due(again(), LANDED, LANDED) == [True, True]
     assert due(again(), LANDED, FLYING) == [False, False]

@@ -14,7 +14,7 @@ GOOD = {"position_noise_m": 0.3, "velocity_noise_mps": 0.1, "position_bias_m": 0
 
 
 def sensed_and_true(world, n_steps):
-    """(T, U, 14) of what players were told and of what was."""
+    """(T, U, 14) of what planners were told and of what was."""
     told, true = [], []
     for _ in range(n_steps):
         after(world, 1, Velocity(0.0, 0.0, 20.0))

@@ -80,7 +80,7 @@ def test_the_command_line_understands_every_command_of_a_page(page, tmp_path, mo
 
 
 def understood(words):
-    """Parse a command as the program does, and ask that players and their options exist."""
+    """Parse a command as the program does, and ask that planners and their options exist."""
     command, context, rest = command_group(), None, words[1:]
     while True:
         if rest == [] and context is not None:

@@ -21,7 +21,7 @@ ALONE = ["--jobs", "1"]  # else each of them starts processes of its own
 SHORTER = {
     "run": ["--steps", "1"],
     "reproduce": ["--steps", "2", "--seeds", "0:1", *ALONE],
-    "score": ["--missions", "1", "--players", "nearest-waypoint"],
+    "score": ["--missions", "1", "--planners", "nearest-waypoint"],
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }
 COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}
@@ -76,5 +76,5 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
             assert main(words) == REFUSED
             assert "vehicles would arm and take off" in capsys.readouterr().err
             continue
-        # a player may fail its mission, and the text may say so; the command has done its work
+        # a planner may fail its mission, and the text may say so; the command has done its work
         assert main(words) in (DONE, FAILED), f"{words}: {capsys.readouterr().err}"

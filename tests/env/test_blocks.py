@@ -140,7 +140,7 @@ def test_the_usual_blocks_write_the_same_in_another_order():
     np.testing.assert_array_equal(env.state(), usual.state())
 
 
-def test_an_observation_may_leave_out_what_nobody_needs():
+def test_an_observation_may_leave_out_what_is_not_needed():
     ground = practice_ground(n_uas=2)
     env = uas_coverage_v0.parallel_env(ground, observation=(BEACON,), reward=(SLOW,))
     observations, _ = env.reset(seed=0)

@@ -84,7 +84,7 @@ def test_without_a_seed_the_next_mission_is_drawn():
     assert len({repr(scenario) for scenario in drawn[0]}) > 3
 
 
-def test_a_fresh_environment_without_a_seed_draws_what_nobody_foresees():
+def test_a_fresh_environment_without_a_seed_draws_what_cannot_be_foreseen():
     envs = [parallel(SMALL) for _ in range(3)]
     for env in envs:
         env.reset()
@@ -396,7 +396,7 @@ def test_a_pool_holds_scenarios_and_nothing_that_draws_them():
         ScenarioPool(grounds)
 
 
-def test_families_never_draw_what_players_are_compared_on():
+def test_families_never_draw_what_planners_are_compared_on():
     scenario = FAMILIES["generated"](np.random.default_rng(0))
     seed = int(scenario.name.split("-")[1][1:])
     assert seed > max(max(seeds) for seeds in SETS.values())

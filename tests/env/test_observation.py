@@ -79,6 +79,12 @@ def test_the_yaw_of_a_uas_that_looks_where_it_flies_is_shown_whole():
     assert other == 0.0
 
 
+@pytest.mark.parametrize(("former", "name"), [("crowd", "density"), ("rival", "nearest_uas")])
+def test_a_feature_is_found_under_its_former_name(former, name):
+    found, wanted = (observation_columns("waypoints", each) for each in (former, name))
+    np.testing.assert_array_equal(found, wanted)
+
+
 def test_an_unknown_feature_is_refused_with_those_known():
     with pytest.raises(ValueError, match=r"own\.position"):
         observation_columns("own", "pozition")
@@ -181,9 +187,9 @@ def test_the_nearest_open_waypoints_come_first():
         }
         near = np.where(np.eye(len(places), dtype=bool), np.inf, spaces)
         columns["neighbour"] = close(near.min(axis=1)[order])
-        columns["crowd"] = np.minimum((near < 100).sum(axis=1), 8)[order] / 8
-        rival_m = np.linalg.norm(places - state.x[1 - i, :3], axis=1)
-        columns["rival"] = close(rival_m[order])
+        columns["density"] = np.minimum((near < 100).sum(axis=1), 8)[order] / 8
+        other_m = np.linalg.norm(places - state.x[1 - i, :3], axis=1)
+        columns["nearest_uas"] = close(other_m[order])
         home_m = np.linalg.norm(places - scenario.uas[i].start_m, axis=1)
         columns["from_home"] = close(home_m[order])
         for name, expected in columns.items():
@@ -338,7 +344,7 @@ def test_a_uas_that_has_ended_is_no_longer_seen_and_sees_itself_ended():
     observations, *_ = env.step({"uas_1": 12, "uas_2": 0})
     assert feature(observations["uas_1"], "own", "flying").item() == 0.0
     assert not feature(observations["uas_2"], "others", "valid").any()
-    assert not feature(observations["uas_2"], "waypoints", "rival").any()
+    assert not feature(observations["uas_2"], "waypoints", "nearest_uas").any()
 
 
 def test_the_nearest_moving_obstacles_come_first():
@@ -367,7 +373,7 @@ def test_the_nearest_moving_obstacles_come_first():
             np.testing.assert_allclose(velocity, relative, atol=1e-5)
 
 
-def test_players_do_not_see_where_a_moving_obstacle_will_go():
+def test_planners_do_not_see_where_a_moving_obstacle_will_go():
     scenario = load_scenario("village")
     later = scenario.moving_obstacles[0].model_copy(
         update={"schedule": scenario.moving_obstacles[0].schedule[:1]}

@@ -9,7 +9,7 @@ from uas_coverage_env.env import HOME_CHOICE, REWARD, REWARD_TERMS, rewards_tabl
 
 
 def run(env, policy, limit=200):
-    """Fly until nobody flies any more; all steps as (rewards, terminations, truncations, infos)."""
+    """Fly until no UAS flies any more; all steps as (rewards, terminations, truncations, infos)."""
     observations, infos = env.reset(seed=0)
     steps = []
     for _ in range(limit):

@@ -1,4 +1,4 @@
-"""A player of wrenches cannot leave the vehicle's limits unseen, in whatever environment."""
+"""A learner of wrenches cannot leave the vehicle's limits unseen, in whatever environment."""
 
 import gymnasium as gym
 import numpy as np

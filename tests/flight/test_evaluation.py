@@ -150,14 +150,17 @@ def test_a_damaged_file_of_rewards_is_refused_in_one_line(tmp_path, found, put, 
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        ({"player": 3}, "policy is 3"),
-        ({"player": turning, "swarm_of": 0}, "swarm_of is 0"),
-        ({"player": turning, "swarm_of": 1}, "2 UAS"),
-        ({"player": "hover", "seeds": ()}, "seeds are empty"),
-        ({"player": "hover", "reward_weights": {"fun": 1.0}}, "fun"),
-        ({"player": "hover", "episodes": 3}, "'episodes'; there are seeds, swarm_of, on_episode, "),
-        ({"player": lambda seen: "left"}, "action of uas_1"),
-        ({"player": lambda seen: np.full(3, np.nan)}, "finite"),
+        ({"planner": 3}, "policy is 3"),
+        ({"planner": turning, "swarm_of": 0}, "swarm_of is 0"),
+        ({"planner": turning, "swarm_of": 1}, "2 UAS"),
+        ({"planner": "hover", "seeds": ()}, "seeds are empty"),
+        ({"planner": "hover", "reward_weights": {"fun": 1.0}}, "fun"),
+        (
+            {"planner": "hover", "episodes": 3},
+            "'episodes'; there are seeds, swarm_of, on_episode, ",
+        ),
+        ({"planner": lambda seen: "left"}, "action of uas_1"),
+        ({"planner": lambda seen: np.full(3, np.nan)}, "finite"),
     ],
 )
 def test_what_cannot_be_evaluated_is_refused_in_one_line(arguments, reason):

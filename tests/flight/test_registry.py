@@ -120,6 +120,6 @@ def test_a_planner_whose_package_is_missing_is_refused_in_one_line():
         load_planner("broken")
 
 
-def test_a_planner_that_nobody_announced_goes_by_the_name_of_its_class():
+def test_a_planner_that_was_not_announced_goes_by_the_name_of_its_class():
     assert registry.name_of(Tuned(TunedOptions())) == "Tuned"
     assert registry.options_of(object()) == {}

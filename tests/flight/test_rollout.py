@@ -25,7 +25,7 @@ from uas_coverage_env.world import GoTo, Velocity, Wrench
 
 
 class Still:
-    """Holds everybody where they started, three metres higher."""
+    """Holds every UAS where it started, three metres higher."""
 
     def reset(self, scenario, seed):
         pass

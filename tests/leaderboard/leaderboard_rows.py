@@ -3,14 +3,14 @@
 from uas_coverage_env.leaderboard import FAILED, FLOWN, Row
 
 
-def row(scenario="a", player="p", seed=0, **changes) -> Row:
+def row(scenario="a", label="p", seed=0, **changes) -> Row:
     """A flight that accomplished its mission with 10 Wh in 100 steps, unless changed."""
     usual = {
-        "key": f"{scenario}/{player}/{seed}",
+        "key": f"{scenario}/{label}/{seed}",
         "scenario": scenario,
         "scenario_sha256": "00",
-        "player": player,
-        "planner": player,
+        "label": label,
+        "planner": label,
         "options": "{}",
         "seed": seed,
         "dynamics": "lpv",
@@ -40,7 +40,7 @@ def row(scenario="a", player="p", seed=0, **changes) -> Row:
     return Row(**{**usual, **changes})
 
 
-def failed_row(scenario="a", player="p", seed=0, reason="refused") -> Row:
+def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
     """A flight that there is none of."""
     nothing = dict.fromkeys(
         (
@@ -53,7 +53,7 @@ def failed_row(scenario="a", player="p", seed=0, reason="refused") -> Row:
         )
     )
     return row(
-        *(scenario, player, seed),
+        *(scenario, label, seed),
         **{"status": FAILED, "reason": reason, "accomplished": False, "coverage": 0.0},
         **{"all_home": False, "wall_time_s": None, **nothing},
     )

@@ -57,7 +57,7 @@ def test_a_sweep_prints_tables_and_writes_its_files(two_yards, elsewhere, capsys
     frame = flights()
     assert frame.height == 8
     assert frame["status"].unique().to_list() == ["flown"]
-    hover = frame.filter(player="hover")
+    hover = frame.filter(label="hover")
     assert hover["accomplished"].to_list() == [False] * 4
     assert hover["steps"].to_list() == [60] * 4
     own = evaluate("hover", two_yards.partition(",")[0], seeds=[0]).mean("episode_return")
@@ -83,7 +83,7 @@ def test_another_sweep_in_the_same_directory_is_refused(yard, capsys):
         ("--filter",): "safety_filter is False there, True asked for",
         ("--dynamics", "nonlinear"): "dynamics is lpv there, nonlinear asked for",
         ("--seeds", "0:3"): "seeds is 0:2 there, 0:3 asked for",
-        ("--planners", "lawnmower"): "players: it has no lawnmower",
+        ("--planners", "lawnmower"): "planners: it has no lawnmower",
         ("--option", "hover:climb_m=6"): "options: climb_m is 5.0 there, 6.0 asked for",
     }.items():
         assert compare(yard, *more) == 2
@@ -91,7 +91,7 @@ def test_another_sweep_in_the_same_directory_is_refused(yard, capsys):
         assert (out, err.count("\n")) == ("", 1)
         assert said in err
     assert compare(yard, planners="hover") == 2
-    assert "players: it has nearest-waypoint" in capsys.readouterr().err
+    assert "planners: it has nearest-waypoint" in capsys.readouterr().err
     assert flights().equals(before)
     assert compare(yard, "--filter", "--overwrite") == 0
     assert flights()["safety_filter"].to_list() == [True] * 4
@@ -100,7 +100,7 @@ def test_another_sweep_in_the_same_directory_is_refused(yard, capsys):
 def test_flights_of_another_sweep_are_not_mixed_in(yard, capsys):
     assert compare(yard) == 0
     with sqlite3.connect("sweep/flights.sqlite") as connection:
-        connection.execute("UPDATE flights SET key = 'another' WHERE player = 'hover' AND seed = 1")
+        connection.execute("UPDATE flights SET key = 'another' WHERE label = 'hover' AND seed = 1")
     connection.close()
     capsys.readouterr()
     assert compare(yard) == 2
@@ -143,7 +143,7 @@ def test_a_planner_that_refuses_or_crashes_is_a_row_with_its_reason(
     assert compare(yard) == 1
     err = capsys.readouterr().err
     assert "hover failed 1 flight (first: yard, seed 0)" in err
-    frame = flights().filter(player="hover")
+    frame = flights().filter(label="hover")
     assert frame["status"].to_list() == ["failed", "failed"]
     refused, crashed = frame["reason"].to_list()
     assert refused.endswith("no map of this place")
@@ -166,7 +166,7 @@ def test_commands_that_cannot_be_flown_fail_the_flight_alone(yard, with_planners
     assert issubclass(PlannerError, ValueError)
     with_planners(Wild)
     assert compare(yard) == 1
-    assert "at t = 0 s" in flights().filter(player="hover")["reason"][0]
+    assert "at t = 0 s" in flights().filter(label="hover")["reason"][0]
 
 
 def test_a_flight_that_is_stopped_by_hand_is_not_kept(yard, capsys, with_planners):
@@ -220,7 +220,7 @@ def test_a_policy_that_changes_under_way_fails(yard, with_planners):
 
     with_planners(Policy)
     assert compare(yard) == 1
-    assert "have changed" in flights().filter(player="hover")["reason"][0]
+    assert "have changed" in flights().filter(label="hover")["reason"][0]
 
 
 def test_options_and_labels_reach_the_planners(yard):
@@ -228,7 +228,7 @@ def test_options_and_labels_reach_the_planners(yard):
     assert compare(yard, *options, planners="hover,high=hover") == 0
     frame = flights().filter(seed=0)
     climbs = {
-        label: json.loads(text)["climb_m"] for label, text in frame["player", "options"].rows()
+        label: json.loads(text)["climb_m"] for label, text in frame["label", "options"].rows()
     }
     assert climbs == {"hover": 5.0, "high": 12.0}
     assert frame["planner"].to_list() == ["hover"] * 2
@@ -239,10 +239,10 @@ def test_flights_that_another_sweep_has_in_common_are_taken_over(yard, two_yards
     assert compare(yard, planners="hover,random-walk", out="old") == 0
     before = flights("old")
     capsys.readouterr()
-    # more scenarios, other players: hover on the yard is in both
+    # more scenarios, other planners: hover on the yard is in both
     assert compare(two_yards, "--reuse", "old", "--reuse", "old") == 0
     assert "2 of 8 flights are there" in capsys.readouterr().out
-    assert flights().filter(player="hover", scenario="yard").equals(before.filter(player="hover"))
+    assert flights().filter(label="hover", scenario="yard").equals(before.filter(label="hover"))
     assert flights("old").equals(before)
     assert compare(yard, "--filter", "--reuse", "old", out="filtered") == 0
     assert "4 flights to fly" in capsys.readouterr().out

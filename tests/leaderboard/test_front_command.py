@@ -31,7 +31,7 @@ def test_on_the_front_is_what_no_other_flight_beats():
     assert [one.time_s for one in found] == sorted(one.time_s for one in found)
     front = {one.settings.removeprefix("w ") for one in found if one.on_front}
     assert front == {"as good as quick", "between", "slow"}
-    assert {one.row.player for one in found} & {"cheap", "none"} == set()
+    assert {one.row.label for one in found} & {"cheap", "none"} == set()
     assert front_cells(found)[1][-1] == ["w slow", "1", "60", "9.00", "12.5", "yes"]
 
 

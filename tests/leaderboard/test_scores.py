@@ -1,4 +1,4 @@
-"""What the rows say about a player."""
+"""What the rows say about a planner."""
 
 import dataclasses
 import json
@@ -28,8 +28,8 @@ from uas_coverage_env.leaderboard.table import (
 )
 
 
-def by_player(rows, reference="base"):
-    return {one.player: one for one in scores_of(rows, reference)}
+def by_label(rows, reference="base"):
+    return {one.label: one for one in scores_of(rows, reference)}
 
 
 def test_a_violating_flight_has_no_energy_and_no_part_in_pairs():
@@ -39,7 +39,7 @@ def test_a_violating_flight_has_no_energy_and_no_part_in_pairs():
         row("a", "p", energy_Wh=10.0),
         row("b", "p", energy_Wh=1.0, violations=2, accomplished=False, all_home=False),
     ]
-    one = by_player(rows)["p"]
+    one = by_label(rows)["p"]
     assert (one.energy_Wh.value, one.energy_Wh.n) == (10.0, 1)
     assert (one.violations, one.violating, one.accomplished, one.all_home) == (2, 1, 1, 1)
     assert one.energy_difference_percent.value == pytest.approx(-50.0)
@@ -49,7 +49,7 @@ def test_a_violating_flight_has_no_energy_and_no_part_in_pairs():
 
 def test_a_failed_flight_covers_nothing_and_the_rest_is_still_counted():
     rows = [row("a", "base"), row("a", "p"), failed_row("b", "p"), row("b", "base")]
-    one = by_player(rows)["p"]
+    one = by_label(rows)["p"]
     assert (one.flights, one.failed, one.accomplished) == (2, 1, 1)
     assert one.coverage_percent.value == 50.0
     assert one.worst_coverage_percent == 0.0
@@ -62,8 +62,8 @@ def test_what_the_filter_replaced_is_averaged_over_the_flights_there_are():
         *(row("a", "base"), row("a", "p", filtered_share=0.1), row("b", "p", filtered_share=0.2)),
         failed_row("c", "p"),
     ]
-    assert by_player(rows)["p"].filtered_percent == pytest.approx(15.0)
-    nothing = by_player([row("a", "base"), failed_row("a", "p")])["p"]
+    assert by_label(rows)["p"].filtered_percent == pytest.approx(15.0)
+    nothing = by_label([row("a", "base"), failed_row("a", "p")])["p"]
     assert nothing.filtered_percent == 0.0
 
 
@@ -72,7 +72,7 @@ def test_energy_per_percent_leaves_out_planners_that_covered_nothing():
         row("a", "p", coverage=0.5, accomplished=False),
         row("b", "p", coverage=0.0, accomplished=False),
     ]
-    one = by_player(rows, "p")["p"]
+    one = by_label(rows, "p")["p"]
     assert (one.Wh_per_percent.value, one.Wh_per_percent.n) == (0.2, 1)
     assert one.steps.value is None
 
@@ -84,7 +84,7 @@ def test_a_planner_that_accomplishes_more_comes_first_then_one_that_needs_less()
         row("a", "thrifty", energy_Wh=8.0),
         failed_row("a", "broken"),
     ]
-    order = [one.player for one in scores_of(rows, "base")]
+    order = [one.label for one in scores_of(rows, "base")]
     assert order == ["thrifty", "base", "idle", "broken"]
 
 
@@ -93,14 +93,14 @@ def test_pairs_are_flights_of_the_same_scenario_and_seed():
         *(row("a", "base", seed, energy_Wh=10.0 + seed) for seed in range(3)),
         *(row("a", "p", seed, energy_Wh=5.0 + 0.5 * seed) for seed in (2, 1, 7)),
     ]
-    one = by_player(rows)["p"]
+    one = by_label(rows)["p"]
     assert one.energy_difference_percent.n == 2
     assert one.energy_difference_percent.value == pytest.approx(-50.0)
     assert one.steps_difference_percent.value == 0.0
 
 
 def test_a_reference_that_has_not_flown_yet_leaves_the_comparison_empty():
-    one = by_player([row("a", "p")], "base")["p"]
+    one = by_label([row("a", "p")], "base")["p"]
     assert one.improves_energy.value is None
     assert one.relative_energy_percent.value is None
 
@@ -118,7 +118,7 @@ def test_cells_say_nothing_where_there_is_nothing_to_say():
 def test_energy_is_compared_with_the_bound_where_there_is_one():
     rows = [row("a", energy_Wh=12.0, steps=90), row("b", energy_Wh=30.0), row("c", energy_Wh=9.0)]
     rows += [row("a", "q", accomplished=False, steps=90)]
-    scores = {one.player: one for one in scores_of(rows, "p", {("a", 90): 10.0, ("b", 100): 20.0})}
+    scores = {one.label: one for one in scores_of(rows, "p", {("a", 90): 10.0, ("b", 100): 20.0})}
     assert scores["p"].above_bound_percent.value == pytest.approx(35.0)
     assert scores["p"].above_bound_percent.n == 2
     assert scores["q"].above_bound_percent.value is None
@@ -162,7 +162,7 @@ def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
     flights = polars.read_parquet(tmp_path / "flights.parquet")
     assert flights.rows() == [dataclasses.astuple(one) for one in rows]
     scores = json.loads((tmp_path / "table.json").read_text())
-    assert [one["player"] for one in scores["scores"]] == ["base", "p"]
+    assert [one["label"] for one in scores["scores"]] == ["base", "p"]
     assert scores["scores"][0]["energy_Wh"] == {"value": 20.5, "low": 20.0, "high": 21.0, "n": 4}
     header, *lines = (tmp_path / "table.csv").read_text().splitlines()
     assert len(lines) == 2
@@ -246,11 +246,19 @@ def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
         row("a", "p", 2, episode_return=None),
         failed_row("b", "p"),
     ]
-    one = by_player(rows, "p")["p"]
+    one = by_label(rows, "p")["p"]
     assert (one.episode_return.value, one.episode_return.n) == (20.0, 2)
     assert one.flat()["episode_return_high"] == 30.0
     headings, (cells,) = outcome_cells([one])
     assert cells[headings.index("return")] == "20.0 [10.0, 30.0]"
+
+
+def test_a_comparison_of_a_version_that_called_labels_players_can_still_be_drawn(tmp_path):
+    write(Comparison.of([row("a", "p")], 1, "p", "a command", "1"), tmp_path)
+    file = tmp_path / "flights.parquet"
+    polars.read_parquet(file).rename({"label": "player"}).write_parquet(file)
+    rows, reference = published(tmp_path)
+    assert [one.label for one in rows] == [reference] == ["p"]
 
 
 def test_a_comparison_of_a_version_without_returns_can_still_be_drawn(tmp_path):

@@ -126,7 +126,7 @@ def test_a_damaged_store_is_refused_in_one_line_or_begun_anew(tmp_path, damage):
 @pytest.mark.parametrize(
     ("column", "value"),
     [
-        *(("player", b"\xff"), ("seed", "many"), ("seed", -1), ("status", "landed")),
+        *(("label", b"\xff"), ("seed", "many"), ("seed", -1), ("status", "landed")),
         *(("accomplished", "yes"), ("coverage", "all"), ("coverage", float("inf"))),
         *(("violations", 1e300), ("steps", -3), ("energy_Wh", "none"), ("decision_p50_s", b"")),
     ],
@@ -170,6 +170,21 @@ def older(path):
     with sqlite3.connect(path) as connection:
         connection.execute("ALTER TABLE flights DROP COLUMN episode_return")
     connection.close()
+
+
+def test_a_store_of_a_version_that_called_labels_players_is_read_and_gone_on_with(tmp_path):
+    asked = {"seeds": "0:2", "planners": {"p": {"options": {}}}}
+    with opened(tmp_path, {"seeds": "0:2", "players": asked["planners"]}) as store:
+        store.add(row())
+    with sqlite3.connect(tmp_path / STORE) as connection:
+        connection.execute("ALTER TABLE flights RENAME COLUMN label TO player")
+    connection.close()
+    assert flights_in(tmp_path) == [row()], "and reading changes nothing"
+    assert flights_in(tmp_path) == [row()]
+    with opened(tmp_path, asked) as store:
+        store.add(row(seed=1))
+        assert store.rows() == [row(), row(seed=1)]
+    assert flights_in(tmp_path) == [row(), row(seed=1)]
 
 
 def test_a_store_of_a_version_without_returns_is_read_and_gone_on_with(tmp_path):

@@ -55,10 +55,10 @@ def test_other_data_has_another_hash(one, other):
     assert (content_hash(one) == content_hash(other)) == same
 
 
-def test_every_scenario_is_flown_by_everybody_with_every_seed():
+def test_every_scenario_is_flown_by_every_planner_with_every_seed():
     some = sweep("village,corridor", "hover,lawnmower", seeds=range(3, 5))
     entries = list(some.entries())
-    flown = [(e.seed, e.scenario.name, e.player.label) for e in entries]
+    flown = [(e.seed, e.scenario.name, e.spec.label) for e in entries]
     assert len(set(keys(some))) == len(flown) == len(set(flown)) == 8
     assert {seed for seed, *_ in flown[:4]} == {3}, "seed by seed"
 
@@ -81,10 +81,10 @@ def test_whatever_changes_a_flight_changes_its_key():
 
 
 def test_an_option_that_is_spelt_out_is_the_default():
-    (player,) = planner_specs_of(["milp-mpc"], []).values()
+    (spec,) = planner_specs_of(["milp-mpc"], []).values()
     values = {
         key: ",".join(value) if isinstance(value, list) else value
-        for key, value in player.options.items()
+        for key, value in spec.options.items()
     }
     spelt = [f"milp-mpc:{key}={value}" for key, value in values.items()]
     plain = [text for text in spelt if not text.endswith("=None")]
@@ -149,21 +149,21 @@ def test_two_different_scenarios_of_one_name_are_refused(tmp_path, village_text)
         scenarios_of(["village", str(mine)])
 
 
-def test_a_player_can_fly_twice_under_labels():
-    players = planner_specs_of(["hover,still=hover"], [])
-    assert {label: player.planner for label, player in players.items()} == {
+def test_a_planner_can_fly_twice_under_labels():
+    specs = planner_specs_of(["hover,still=hover"], [])
+    assert {label: spec.planner for label, spec in specs.items()} == {
         "hover": "hover",
         "still": "hover",
     }
 
 
 def test_a_difference_is_named_where_it_lies():
-    kept = {"seeds": "0:2", "players": {"tour": {"options": {"time_s": 1.0}}, "hover": {}}}
-    asked = {"seeds": "0:2", "players": {"tour": {"options": {"time_s": 2.0}}, "hover": {}}}
+    kept = {"seeds": "0:2", "planners": {"tour": {"options": {"time_s": 1.0}}, "hover": {}}}
+    asked = {"seeds": "0:2", "planners": {"tour": {"options": {"time_s": 2.0}}, "hover": {}}}
     assert difference(kept, kept) == ""
-    assert difference(kept, asked) == "players: tour: options: time_s is 1.0 there, 2.0 asked for"
-    assert difference(kept, {"seeds": "0:2"}) == "it has players, which is not asked for"
-    assert difference({"seeds": "0:2"}, kept) == "it has no players"
+    assert difference(kept, asked) == "planners: tour: options: time_s is 1.0 there, 2.0 asked for"
+    assert difference(kept, {"seeds": "0:2"}) == "it has planners, which is not asked for"
+    assert difference({"seeds": "0:2"}, kept) == "it has no planners"
 
 
 def test_the_source_is_that_of_the_world_and_of_the_planner():
@@ -174,7 +174,7 @@ def test_the_source_is_that_of_the_world_and_of_the_planner():
 def test_a_flight_is_kept_where_that_is_asked_for(tmp_path):
     some = sweep("corridor", "hover")
     short = next(iter(some.scenarios.values())).model_copy(update={"max_steps": 2})
-    (entry,) = Sweep({"corridor": short}, some.players, range(7, 8)).entries()
+    (entry,) = Sweep({"corridor": short}, some.planners, range(7, 8)).entries()
     row = fly(entry, "")
     assert list(tmp_path.iterdir()) == []
     assert dataclasses.replace(fly(entry, "", tmp_path), **dict.fromkeys(TIMES)) == (

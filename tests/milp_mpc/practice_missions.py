@@ -83,7 +83,7 @@ def wrenches(plan, step):
 
 
 def fly(world, made, steps):
-    """Outcomes (T, U) of flying the planner, until nobody flies."""
+    """Outcomes (T, U) of flying the planner, until no UAS flies."""
     outcomes = []
     for _ in range(steps):
         if world.done:

@@ -44,7 +44,7 @@ def guide(scenario):
     return made, world
 
 
-def test_a_generated_mission_is_covered_and_everybody_comes_home():
+def test_a_generated_mission_is_covered_and_every_uas_comes_home():
     scenario = generate_scenario(3, n_uas=2, n_waypoints=8, n_obstacles=3)
     flight = rollout(scenario, MilpMpcGuided(REPEATABLE), seed=0)
     assert accomplished(flight)

@@ -23,7 +23,7 @@ MEAN_MPS, FROM_DEG = 3.5, 150.0
 
 
 def world_in(mean_mps):
-    """The field in a steady wind, of which nobody is told."""
+    """The field in a steady wind, of which no planner is told."""
     return World(FIELD, disturbances=(constant_wind(mean_mps, FROM_DEG),))
 
 
@@ -102,7 +102,7 @@ def test_a_plan_goes_on_from_where_the_uas_is_and_leads_back_to_itself():
     assert first_trouble(here, led) is None
 
 
-def test_of_a_fleet_that_plans_in_turn_nobody_brakes_between_its_turns():
+def test_of_a_fleet_that_plans_in_turn_none_brakes_between_its_turns():
     town = generate_scenario(5, n_uas=2, n_waypoints=6, n_obstacles=2, disturbances="light")
     options = GuidedOptions(horizon=10, in_wind="tube", deterministic=True, at_once=1, threads=1)
     flight = rollout(town, MilpMpcGuided(options), 0, max_steps=8)

@@ -1,4 +1,4 @@
-"""When no plan comes, the last one's backup trajectory is flown; nobody touches anything."""
+"""When no plan comes, the last one's backup trajectory is flown; no UAS touches anything."""
 
 import dataclasses
 
@@ -79,7 +79,7 @@ PATTERNS = {
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 @pytest.mark.parametrize("name", ["open_field", "village", "corridor"])
-def test_nobody_touches_anything_however_often_there_is_no_plan(monkeypatch, name, pattern):
+def test_no_uas_touches_anything_however_often_there_is_no_plan(monkeypatch, name, pattern):
     scenario = load_scenario(name)
     decide = RoughDecisions(PATTERNS[pattern], seed=3)
     positions, decisions, outcomes = flown_with(monkeypatch, scenario, decide, 50)
@@ -93,7 +93,7 @@ def test_nobody_touches_anything_however_often_there_is_no_plan(monkeypatch, nam
     assert moved_m > 10.0, "a flight that stays at home proves nothing"
 
 
-def test_when_plans_stop_coming_everybody_ends_in_a_hover(monkeypatch):
+def test_when_plans_stop_coming_every_uas_ends_in_a_hover(monkeypatch):
     decide = RoughDecisions(PATTERNS["all_after_ten"], seed=5)
     # before they follow routes, after 30 s without progress
     positions, decisions, _ = flown_with(monkeypatch, load_scenario("village"), decide, 36)
@@ -172,7 +172,7 @@ class AlwaysNorth(RoughDecisions):
 
 
 @pytest.mark.parametrize("limit_s", [1e-3, 0.05])
-def test_a_planner_without_time_still_commands_everybody(limit_s):
+def test_a_planner_without_time_still_commands_every_uas(limit_s):
     scenario = load_scenario("village")
     world = World(scenario)
     made = planner(scenario, deterministic=False, time_limit_s=limit_s)
@@ -183,7 +183,7 @@ def test_a_planner_without_time_still_commands_everybody(limit_s):
         assert (outcome["contact"] == 0).all()
 
 
-def test_without_any_plan_ever_everybody_hovers_at_the_start(monkeypatch):
+def test_without_any_plan_ever_every_uas_hovers_at_the_start(monkeypatch):
     scenario = load_scenario("village")
     positions, decisions, outcomes = flown_with(
         monkeypatch, scenario, lambda *args, **rest: Reason.NO_PLAN, 25

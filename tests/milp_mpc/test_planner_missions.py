@@ -1,4 +1,4 @@
-"""The planner at work: repeatable, for different vehicles, until everybody has landed."""
+"""The planner at work: repeatable, for different vehicles, until every UAS has landed."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_one_decision_for_different_vehicles_is_a_verified_plan(monkeypatch):
     assert world.state.x == pytest.approx(plan.x[:, 1], abs=1e-6)
 
 
-def test_everybody_lands_where_it_stands_once_there_is_nothing_to_do():
+def test_every_uas_lands_where_it_stands_once_there_is_nothing_to_do():
     starts = [(50.0, 50.0, -1.0), (50.0, 90.0, -1.0)]
     scenario = mission([((52.0, 51.0, -2.0), 8.0)], starts)
     world = World(scenario)
@@ -79,7 +79,7 @@ def finished():
     return fly(world, made, 40), world, made
 
 
-def test_a_mission_ends_with_everything_covered_and_everybody_landed(finished):
+def test_a_mission_ends_with_everything_covered_and_every_uas_landed(finished):
     outcomes, world, _ = finished
     assert not world.state.uncovered.any()
     assert (world.state.status == LANDED).all()

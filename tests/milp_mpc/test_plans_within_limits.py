@@ -1,4 +1,4 @@
-"""Plans stay within the vehicle's limits, which hold for every player in the world."""
+"""Plans stay within the vehicle's limits, which hold for every planner in the world."""
 
 import numpy as np
 import pytest

@@ -80,7 +80,7 @@ def test_moving_obstacles_are_predicted_at_the_velocity_that_is_seen(scenario, a
     assert (balloon.radius_m, balloon.half_height_m) == (10.0, 10.0)
 
 
-def test_waypoints_that_nobody_reaches_within_the_horizon_are_left_out(scenario, around):
+def test_waypoints_that_no_uas_reaches_within_the_horizon_are_left_out(scenario, around):
     problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
     assert problem.waypoint_index.tolist() == [0, 1]
     assert problem.n_scenario_waypoints == 3

@@ -1,4 +1,4 @@
-"""Where not all can be planned for at once, everybody gets a turn and nothing is touched."""
+"""Where not all can be planned for at once, every UAS gets a turn and nothing is touched."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ ONE = Effort(deterministic=True, teams=1, at_once=1)
 
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(n_uas=st.integers(1, 12), most=st.integers(1, 5), urgent=st.data())
-def test_nobody_waits_longer_than_the_others_together_take(n_uas, most, urgent):
+def test_no_uas_waits_longer_than_the_others_together_take(n_uas, most, urgent):
     turns, names = RoundRobin(), [f"uas_{k}" for k in range(n_uas)]
     waited = np.zeros(n_uas, int)
     for _ in range(30):

@@ -83,7 +83,7 @@ def scenario() -> Scenario:
 
 
 class Listener:
-    """Keeps what it is handed, and holds everybody in place."""
+    """Keeps what it is handed, and holds every UAS in place."""
 
     def warm_up(self, brief):
         self.warmed_up_with = brief

@@ -53,7 +53,7 @@ def test_a_mission_without_repeats_has_none():
     assert not len(World(mission((), ())).swarm_state().again_s)
 
 
-def test_players_are_told_how_long_it_is_until_a_waypoint_is_asked_for_again():
+def test_planners_are_told_how_long_it_is_until_a_waypoint_is_asked_for_again():
     world = World(mission((30.0,), ()))
     assert np.isinf(world.swarm_state().again_s).all()
     while world.state.uncovered[0]:

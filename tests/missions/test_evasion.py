@@ -1,4 +1,4 @@
-"""Nobody waits for what comes straight at them: with a solver, and without one."""
+"""No UAS waits for what comes straight at it: with a solver, and without one."""
 
 import independent_check
 import pytest
@@ -23,7 +23,7 @@ def approached(gap_m, speed_mps):
 @pytest.mark.parametrize(
     ("gap_m", "speed_mps"), [(2.5, 1.0), (10.0, 2.0), (15.0, 5.0), (40.0, 5.0)]
 )
-def test_everybody_gets_out_of_the_way_of_what_comes_straight_at_them(
+def test_every_uas_gets_out_of_the_way_of_what_comes_straight_at_it(
     monkeypatch, tmp_path, gap_m, speed_mps, solver_works
 ):
     if not solver_works:

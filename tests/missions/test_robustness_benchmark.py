@@ -5,6 +5,7 @@ import pytest
 import robustness
 from robustness_rows import (
     ROWS,
+    attacks,
     batteries,
     decisions,
     exported,
@@ -13,7 +14,6 @@ from robustness_rows import (
     judge,
     kills,
     missions,
-    players,
 )
 from robustness_rows.page import page
 from robustness_rows.row import Finding, Row, Trial
@@ -184,11 +184,11 @@ def test_an_export_that_is_off_has_failed():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_hostile_calls_are_refused_and_leave_no_trace(seed):
-    found = players.attack(players.FIRST_SEED + seed)
+    found = attacks.attack(attacks.FIRST_SEED + seed)
     tally = found["tally"]
     assert tally["refused"] == tally["calls"] > 5
     assert tally["traces"] == tally["not finite"] == tally["episodes failed"] == 0
-    row = players.attacks_found({"a": found, "b": {"error": "gone"}})
+    row = attacks.attacks_found({"a": found, "b": {"error": "gone"}})
     assert (row.trials, row.failures) == (20, 10)
     assert f"| {found['action']} | 10 |" in row.table
 

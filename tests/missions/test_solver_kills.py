@@ -149,7 +149,7 @@ def test_a_start_inside_the_planner_s_margin_ends_in_a_fallback_and_touches_noth
     assert flight.decisions[0].fallback
 
 
-def test_without_time_everybody_hovers_at_the_start(tmp_path, town):
+def test_without_time_every_uas_hovers_at_the_start(tmp_path, town):
     planner = load_planner("milp-mpc", {"time_limit_s": "0.01", "horizon": "8", "threads": "1"})
     flight = rollout(town, planner, max_steps=15)
     judged(flight, tmp_path / "hovering")
@@ -169,7 +169,7 @@ def with_little_charge(scenario, seconds):
 @pytest.mark.parametrize(
     ("planner", "dynamics"), [("milp-mpc-guided", "lpv"), ("milp-mpc", "nonlinear")]
 )
-def test_where_the_solver_is_dead_for_good_everybody_comes_home(
+def test_where_the_solver_is_dead_for_good_every_uas_comes_home(
     monkeypatch, tmp_path, town, planner, dynamics
 ):
     short = with_little_charge(town, 110.0)

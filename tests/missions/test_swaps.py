@@ -81,7 +81,7 @@ def test_every_swap_begins_with_a_landing_and_ends_with_a_fresh_pack(flight, mis
         assert flight.resting[:, i].sum() == SWAP_S
 
 
-def test_players_see_packs_that_are_left_and_when_a_uas_is_ready(mission, flight):
+def test_planners_see_packs_that_are_left_and_when_a_uas_is_ready(mission, flight):
     seen = []
     FLY(mission, max_steps=int(flight.swaps[-1].time_s) + 2, on_step=lambda p: seen.append(p.swarm))
     for swap in flight.swaps:
@@ -92,7 +92,7 @@ def test_players_see_packs_that_are_left_and_when_a_uas_is_ready(mission, flight
         assert (seen[took_off].packs_left[i], seen[took_off].ground_s[i]) == (2, 0.0)
 
 
-def test_players_of_other_missions_see_no_packs():
+def test_planners_of_other_missions_see_no_packs():
     swarm = first_sight(MissionBrief.of(load_scenario("village")))
     assert not len(swarm.packs_left)
     assert not len(swarm.ground_s)

@@ -1,4 +1,4 @@
-"""A wall stops nobody: aims go round it, and what plans cannot do a route does.
+"""A wall stops no UAS: aims go round it, and what plans cannot do a route does.
 
 The missions are small ones of the kind in which `milp-mpc` and `milp-mpc-guided` stood before a
 wall until their batteries were empty.

@@ -32,7 +32,7 @@ def village(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_the_village_is_covered_in_time_and_everybody_comes_home(village):
+def test_the_village_is_covered_in_time_and_every_uas_comes_home(village):
     code, directory = village
     summary = json.loads((directory / "summary.json").read_text())
     assert code == 0

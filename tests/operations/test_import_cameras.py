@@ -67,7 +67,7 @@ def test_an_area_with_a_hole_is_drawn_as_areas_without():
     assert drawn_m2(scenario) == pytest.approx((1.0 - share) * drawn_m2(whole), rel=1e-3)
 
 
-def test_a_camera_that_nobody_carries_is_refused_with_what_to_do(capsys):
+def test_a_camera_that_no_uas_carries_is_refused_with_what_to_do(capsys):
     path = collection(feature(SQUARE, camera="mavic3e"))
     assert "seen by 'mavic3e', which no UAS carries (they carry sony-a6000)" in refused(
         capsys, path, *HOME

@@ -332,7 +332,7 @@ def test_trainings_are_drawn_side_by_side_in_panels_of_their_own(tmp_path):
     assert len(styles) == 2, "told apart without colour"
 
 
-def test_the_return_has_a_panel_where_all_tables_have_it_and_players_are_level_lines(tmp_path):
+def test_the_return_has_a_panel_where_all_tables_have_it_and_planners_are_level_lines(tmp_path):
     head, *rows = CURVE.splitlines()
     paid = "\n".join([f"{head},return", *(f"{row},{k}.5" for k, row in enumerate(rows))]) + "\n"
     once = "\n".join(paid.splitlines()[:2]) + "\n"

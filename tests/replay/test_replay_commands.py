@@ -71,8 +71,8 @@ def test_figure_draws_trainings_and_comparisons_too(trained, capsys):
     shutil.copytree(trained, "again")
     assert main(["figure", "trained", "again", "--kind", "training"]) == 0
     assert capsys.readouterr().out == "figure in trained/training.pdf\n"
-    players = ["--scenarios", "open_field", "--planners", "hover", "--seeds", "0:1"]
-    assert main(["compare", *players, "--jobs", "1", "--out", "compared"]) in (0, 1)
+    flights = ["--scenarios", "open_field", "--planners", "hover", "--seeds", "0:1"]
+    assert main(["compare", *flights, "--jobs", "1", "--out", "compared"]) in (0, 1)
     capsys.readouterr()
     assert main(["figure", "compared", "--kind", "leaderboard", "--out", "board.svg"]) == 0
     assert capsys.readouterr().out == "figure in board.svg\n"

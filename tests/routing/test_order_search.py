@@ -84,7 +84,7 @@ def seconds_of(task, u, route):
 
 
 def cost_of(task, seconds, left_out, total_weight):
-    """What the search minimises, from everybody's seconds."""
+    """What the search minimises, from the seconds of all UAS."""
     overtime = sum(max(s - b, 0.0) for s, b in zip(seconds, task.budget_s, strict=True))
     left_s = search_module._left_out_s(task, total_weight)[list(left_out)].sum()
     return max(0.0, *seconds) + total_weight * sum(seconds) + annealing.OVERTIME * overtime + left_s
@@ -270,14 +270,14 @@ def test_visited_waypoints_vanish_and_new_ones_are_inserted():
         assert [w for w in old if w in now] == [w for w in new if w < 8]
 
 
-def test_with_nothing_open_everybody_goes_home():
+def test_with_nothing_open_every_uas_goes_home():
     problem = task(6, 5, open_waypoints=np.zeros(0, np.int64))
     found = improve_routes(problem, improve_routes(task(6, 5), empty_routes(2), SOME, 0), SOME, 0)
     assert visits(found) == []
     assert found.seconds == pytest.approx(problem.idle_s)
 
 
-def test_one_waypoint_alone_goes_to_somebody():
+def test_one_waypoint_alone_goes_to_some_uas():
     found = improve_routes(task(7, 1), empty_routes(2), SOME, 0)
     assert isinstance(found, Routes)
     assert visits(found) == [0]
@@ -326,7 +326,7 @@ def test_short_routes_are_searched_as_a_whole():
 
 @few
 @given(seeds, st.booleans())
-def test_nobody_is_sent_where_it_must_not_go(seed, by_pieces):
+def test_no_uas_is_sent_where_it_must_not_go(seed, by_pieces):
     barred = np.zeros((2, 12), bool)
     barred[0, :4] = barred[1, 3:6] = True
     problem = task(seed, 12, barred=barred)
@@ -335,4 +335,4 @@ def test_nobody_is_sent_where_it_must_not_go(seed, by_pieces):
     found = improve_routes(problem, against, SearchEffort(4000, by_pieces=by_pieces), seed)
     for u, route in enumerate(found.routes):
         assert not barred[u, route].any()
-    assert found.left_out.tolist() == [3], "nobody may go there"
+    assert found.left_out.tolist() == [3], "no UAS may go there"

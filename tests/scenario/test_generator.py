@@ -87,7 +87,7 @@ def test_every_generated_town_can_be_flown(seed, n_uas, n_waypoints, n_obstacles
         np.testing.assert_array_equal(fence_high, [size_m, size_m, 0])
     starts = np.array([uas.start_m for uas in town.uas])
     centres = np.array([waypoint.position_m for waypoint in town.waypoints])
-    # the layer above all roofs is free and high enough for everybody
+    # the layer above all roofs is free and high enough for every UAS
     layer_m = (low[:, 2].min() if n_obstacles else 0.0) - KEPT_M - 1.0
     assert layer_m > -CEILING_M + 4.0
     for point in [*starts, *centres]:

@@ -64,7 +64,7 @@ def test_where_a_uas_looks_is_one_of_two_and_reads_back_equal(tmp_path):
             parse(data, Scenario, "mine")
 
 
-def test_a_sensor_that_nobody_carries_is_warned_of_in_one_line():
+def test_a_sensor_that_no_uas_carries_is_warned_of_in_one_line():
     data = with_changes({"sensor": "termal"}, [{"name": "thermal"}])
     data["waypoints"] *= 3
     (line,) = [w for w in warnings(parse(data, Scenario, "mine")) if "carries" in w]
@@ -74,7 +74,7 @@ def test_a_sensor_that_nobody_carries_is_warned_of_in_one_line():
     )
 
 
-def test_heights_that_nobody_may_fly_at_are_warned_of():
+def test_heights_that_no_uas_may_fly_at_are_warned_of():
     data = with_changes({"heights_m": [0.0, 20.0], "position_m": [100.0, 150.0, -20.0]})
     data["min_height_m"] = 25.0
     data["uas"][0]["start_m"] = [20.0, 20.0, -26.0]

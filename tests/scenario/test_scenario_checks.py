@@ -155,7 +155,7 @@ FLAT = box((90, 110), (90, 110), (0, 0))
         ),
     ],
 )
-def test_what_nobody_can_fly_is_one_line_with_place_value_and_fix(changes, expected):
+def test_what_no_uas_can_fly_is_one_line_with_place_value_and_fix(changes, expected):
     with pytest.raises(InputError) as caught:
         with_changes(*changes)
     assert str(caught.value) == f"mission.toml: {expected}"
@@ -179,7 +179,7 @@ def test_what_keeps_every_distance_exactly_is_sound(changes):
     assert with_changes(*changes).name == "checked"
 
 
-def test_a_waypoint_whose_sphere_nobody_may_enter_is_worth_a_warning():
+def test_a_waypoint_whose_sphere_no_uas_may_enter_is_worth_a_warning():
     # in the gap between a tower and the ceiling
     scenario = with_changes(
         place("waypoints", 1, WP, [30.0, 90.0, -49.5]), place("waypoints", 1, "radius_m", 5.0)

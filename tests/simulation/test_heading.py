@@ -150,7 +150,7 @@ def test_planners_see_axes_that_do_not_turn_and_where_it_looks():
 
 
 def test_it_turns_round_for_its_way_home():
-    """Once landed, its angles are 0, as everybody's."""
+    """Once landed, its angles are 0, as those of all."""
     flight = rollout(field(waypoints=[waypoint((100.0, 130.0, -20.0), 8.0)]), "nearest-waypoint")
     assert flight.x[:, 0, PSI].max() > 1.4
     assert apart(flight.x[-2, 0, PSI], -math.pi / 2) < 0.6

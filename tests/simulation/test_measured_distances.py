@@ -12,7 +12,7 @@ DISTANCES = ("obstacle_clearance_m", "separation_m")
 VELOCITY = KIND_NAMES.index("velocity")
 
 
-def crowd():
+def dense():
     """Four UAS, two blocks and two moving obstacles in a small place."""
     starts_m = [
         (80.0, 80.0, -10.0),
@@ -59,8 +59,8 @@ def flown(scenario, measured_m, n_missions=30, n_steps=40):
 
 @pytest.mark.parametrize(
     "scenario",
-    [crowd(), load_scenario("village"), generate_scenario(11, n_uas=4, n_obstacles=20)],
-    ids=["crowd", "village", "town"],
+    [dense(), load_scenario("village"), generate_scenario(11, n_uas=4, n_obstacles=20)],
+    ids=["dense", "village", "town"],
 )
 def test_nothing_but_the_unmeasured_distances_changes(scenario):
     exact, exact_states = flown(scenario, np.inf)
@@ -81,16 +81,16 @@ def test_nothing_but_the_unmeasured_distances_changes(scenario):
     assert (exact["contact"] > 0).any()
 
 
-def test_the_crowd_meets_everything():
-    exact, _ = flown(crowd(), np.inf)
+def test_the_dense_scene_meets_everything():
+    exact, _ = flown(dense(), np.inf)
     met = {CONTACT_NAMES[contact] for contact in np.unique(exact["contact"])}
     assert met >= {"none", "obstacle", "moving_obstacle", "uas", "geofence"}
 
 
 @pytest.mark.parametrize("measured_m", [10.0, 40.0])
 def test_distances_are_exact_up_to_where_they_are_measured(measured_m):
-    exact, _ = flown(crowd(), np.inf, n_missions=10)
-    short, _ = flown(crowd(), measured_m, n_missions=10)
+    exact, _ = flown(dense(), np.inf, n_missions=10)
+    short, _ = flown(dense(), measured_m, n_missions=10)
     for field in DISTANCES:
         near = exact[field] < measured_m
         assert near.any()

@@ -119,7 +119,7 @@ def test_packed_commands_may_lie_anywhere_in_memory():
     np.testing.assert_array_equal(flown[2], flown[0])
 
 
-def test_players_see_the_present_velocity_of_moving_obstacles_and_nothing_else():
+def test_planners_see_the_present_velocity_of_moving_obstacles_and_nothing_else():
     turning = mover((50.0, 50.0, -10.0), (0.0, (2.0, 0.0, 0.0)), (2.0, (0.0, -3.0, 1.0)))
     world = World(meadow(moving_obstacles=[turning]))
     seen = []
@@ -137,7 +137,7 @@ def test_players_see_the_present_velocity_of_moving_obstacles_and_nothing_else()
     assert not {field for field in fields if "path" in field or "schedule" in field}
 
 
-def test_a_player_cannot_change_the_world_through_what_it_sees():
+def test_a_planner_cannot_change_the_world_through_what_it_sees():
     world = World(meadow())
     swarm = world.swarm_state()
     before = world.state.copy()
@@ -148,7 +148,7 @@ def test_a_player_cannot_change_the_world_through_what_it_sees():
     assert world.swarm_state().home_m.tolist() == [[100.0, 100.0, -1.0]]
 
 
-def test_what_players_see_can_be_sent_to_another_process():
+def test_what_planners_see_can_be_sent_to_another_process():
     swarm = pickle.loads(pickle.dumps(World(load_scenario("village")).swarm_state()))
     assert swarm.active == ("uas_1", "uas_2")
     assert (swarm.status == FLYING).all()

@@ -95,7 +95,7 @@ def test_a_random_policy_repeats():
 )
 def test_what_cannot_be_scored_is_refused(arguments, reason):
     with pytest.raises(ValueError, match=reason):
-        score(**{"player": "hover", "level": "easy", **arguments})
+        score(**{"planner": "hover", "level": "easy", **arguments})
 
 
 def test_a_folder_of_scores_goes_on_after_a_kill(tmp_path):
@@ -110,7 +110,15 @@ def test_a_folder_of_scores_goes_on_after_a_kill(tmp_path):
     again.add("easy", "mine", mission(seeds[2], 0.25))
     assert len(path.read_text().splitlines()) == 3
     assert ScoreStore(tmp_path).missions("easy", "mine")[2].value == 0.25
-    assert ScoreStore(tmp_path).players("easy") == ("mine",)
+    assert ScoreStore(tmp_path).planners("easy") == ("mine",)
+
+
+def test_scores_of_a_version_that_said_player_are_read(tmp_path):
+    flown = mission(seeds_of("test")[0], 0.5)
+    ScoreStore(tmp_path).add("easy", "mine", flown)
+    path = tmp_path / FILE
+    path.write_text(path.read_text().replace('"planner"', '"player"'))
+    assert ScoreStore(tmp_path).missions("easy", "mine") == (flown,)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +138,7 @@ def test_a_damaged_line_is_refused_by_its_number(tmp_path, change, reason):
         ScoreStore(tmp_path)
 
 
-def test_a_table_has_the_best_player_first():
+def test_a_table_has_the_best_planner_first():
     scores = {
         "worse": scored("easy", [mission(1, 0.1, home=0)]),
         "better": scored("easy", [mission(1, 0.6)]),
@@ -140,7 +148,7 @@ def test_a_table_has_the_best_player_first():
 
 
 def test_the_command_prints_a_table_and_flies_nothing_twice(tmp_path, capsys, monkeypatch):
-    asked = ["score", "--level", "easy", "--players", "hover", "--missions", "1"]
+    asked = ["score", "--level", "easy", "--planners", "hover", "--missions", "1"]
     asked += ["--split", "validation", "--out", str(tmp_path)]
     assert main(asked) == 0
     first = capsys.readouterr().out
@@ -151,11 +159,19 @@ def test_the_command_prints_a_table_and_flies_nothing_twice(tmp_path, capsys, mo
     assert capsys.readouterr().out == first
 
 
+def test_the_former_name_of_the_option_says_what_it_is_called_now(tmp_path, capsys):
+    asked = ["score", "--level", "easy", "--missions", "1", "--split", "validation"]
+    assert main([*asked, "--players", "hover", "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr()
+    assert "--players is called --planners now" in told.err
+    assert "| hover |" in told.out
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
         (("--level", "none"), "--level 'none'"),
-        (("--players", "nobody"), "unknown planner 'nobody'"),
+        (("--planners", "nobody"), "unknown planner 'nobody'"),
         (("--split", "training"), "--split 'training'"),
         (("--missions", "51"), "--missions 51"),
     ],

@@ -31,7 +31,7 @@ def small_town():
 
 @pytest.fixture
 def bad_orders(monkeypatch):
-    """Plans whose last waypoints are visited in an order that nobody would choose."""
+    """Plans whose last waypoints are visited in an order that is plainly bad."""
     orders = mission_plan._orders
 
     def bad(*args):

@@ -272,7 +272,7 @@ def test_flights_are_alike_in_north_and_east_and_wherever_they_begin(name, dt_s,
 
 @pytest.mark.parametrize("name", NAMES)
 def test_after_wild_wrenches_the_loop_takes_over_and_comes_to_rest(name):
-    """Where a player's wrenches led beyond the bounds, braking still ends in a hover."""
+    """Where commanded wrenches led beyond the bounds, braking still ends in a hover."""
     record, vehicle = record_of(name), load(name)
     rng = np.random.default_rng(3)
     for _ in range(40):

@@ -104,7 +104,7 @@ def test_where_no_uas_flies_again_what_is_asked_for_later_is_left():
     assert not any("fly again" in line for line in warnings(mission(again(NEAR, 100.0))))
 
 
-def test_a_flight_ends_with_its_last_landing_where_nobody_can_take_off_any_more():
+def test_a_flight_ends_with_its_last_landing_where_no_uas_can_take_off_any_more():
     scenario = mission(again(NEAR, 150.0), starts_m=STARTS_M[:1])
     low = scenario.model_copy(update={"uas": (scenario.uas[0].model_copy(update={"soc_0": 0.28}),)})
     flight = nearest(low)

@@ -167,7 +167,7 @@ def test_commands_beyond_the_limits_of_the_vehicle_are_flown_as_far_as_it_goes()
     assert np.abs(outcome["u"][0, 1:4]) == pytest.approx(torque_Nm)
 
 
-def test_a_player_may_not_change_what_the_world_flies():
+def test_a_planner_may_not_change_what_the_world_flies():
     command = Velocity(1.0, 0.0, 5.0)
     with pytest.raises(AttributeError):
         command.north_mps = 2.0  # type: ignore[misc]

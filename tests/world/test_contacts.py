@@ -105,7 +105,7 @@ def test_more_than_the_allowed_depth_of_discharge_loses_the_uas():
     assert world.state.status[0] == FLYING
 
 
-def test_a_breach_is_counted_and_nobody_is_lost():
+def test_a_breach_is_counted_and_no_uas_is_lost():
     starts = [(100.0, 100.0, -10.0), (100.0, 140.0, -10.0)]
     house = box("house", (60.0, 60.0, -9.0), (90.0, 90.0, 0.0))
     world = World(meadow(starts, obstacles=[house]))

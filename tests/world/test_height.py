@@ -47,7 +47,7 @@ def test_the_least_height_counts_from_the_roof_of_what_is_below(world):
     assert judged_at(world, (91.5, 75.0, -9.5)) == (0, False)
 
 
-def test_without_the_rule_nobody_is_too_low():
+def test_without_the_rule_no_uas_is_too_low():
     free = World(meadow(obstacles=[HOUSE]))
     assert judged_at(free, (130.0, 100.0, -1.0)) == (0, False)
     assert judged_at(free, (75.0, 75.0, -10.5)) == (0, False)

@@ -79,7 +79,7 @@ def test_without_a_pack_left_landing_is_final():
     assert world.state.status.tolist() == [LANDED, FLYING]
 
 
-def test_a_sortie_that_covers_nothing_is_the_last_until_somebody_is_lost():
+def test_a_sortie_that_covers_nothing_is_the_last_until_another_uas_is_lost():
     lost = event("uas_lost", 90.0, uas="uas_2")
     world = World(mission(lost))
     first_sortie(world)
@@ -92,7 +92,7 @@ def test_a_sortie_that_covers_nothing_is_the_last_until_somebody_is_lost():
     assert world.state.status[1] == LOST
 
 
-def test_the_mission_goes_on_while_one_swaps_and_ends_when_nobody_is_going_to_fly():
+def test_the_mission_goes_on_while_one_swaps_and_ends_when_no_uas_is_going_to_fly():
     world = World(mission(starts_m=STARTS_M[:1]))
     first_sortie(world)
     assert not world.active
@@ -161,7 +161,7 @@ def test_without_its_radio_it_waits_and_takes_off_when_it_hears_again():
     assert fly(world, has(0, FLYING), BACK) == 100
 
 
-def test_what_a_player_is_told_late_shows_the_fresh_pack_at_once():
+def test_what_a_planner_is_told_late_shows_the_fresh_pack_at_once():
     scenario = mission().model_copy(update={"sensing": {"delay_steps": 4}})
     world = World(Scenario.model_validate(scenario.model_dump(by_alias=True)))
     first_sortie(world)
@@ -198,7 +198,7 @@ def test_no_file_says_together_that_did_not_before():
         parse({**data, "relaunch": True}, Scenario, "mission.toml")
 
 
-def test_where_nobody_lands_with_work_left_flights_are_what_they_were():
+def test_where_no_uas_lands_with_work_left_flights_are_what_they_were():
     plain = mission().model_copy(update={"sorties": None})
     worlds = World(mission()), World(plain)
     for _ in range(20):

@@ -104,7 +104,7 @@ def test_a_record_is_judged_by_the_rule_of_the_world(mission):
         assert asked.max_speed_mps is None or speed_mps <= asked.max_speed_mps
 
 
-def test_what_is_left_is_what_nobody_covered_as_asked(mission):
+def test_what_is_left_is_what_no_uas_covered_as_asked(mission):
     cut = rollout(mission.scenario, load_planner("nearest-waypoint"), max_steps=40)
     left = rest_of(cut)
     assert len(left.waypoints) == 20 - cut.covered[-1]

@@ -29,9 +29,10 @@ from uas_coverage_env.vehicle import (
     lpv_step,
     plant_step,
 )
+from uas_coverage_env.vehicle.layout import SPEED
 from uas_coverage_env.vehicle.tube import FORGETS_S
 from uas_coverage_env.world.commands import CLIMB, VELOCITY, WRENCH
-from uas_coverage_env.world.state import CONSUMPTION, EXPECTED, SINK, WIND
+from uas_coverage_env.world.state import CONSUMPTION, EXPECTED, EXPECTED_DOD, SINK, WIND
 
 SEES_CONSUMPTION_S = 30.0
 """Likewise that in the consumption, which takes longer to tell from noise [s]."""
@@ -113,18 +114,18 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
     if steers:
         command.values[0], command.values[1] = first, second
     if command.kind != WRENCH:
-        lift_N = u[LIFT] - belief[SINK] / vehicle.vertical_B[1]
+        lift_N = u[LIFT] - belief[SINK] / vehicle.vertical_B[SPEED]
         # lift takes from the speed downwards: the lift of the fastest descent is the least
         # neither limit relies on a sink that may have ended: a motor gives less than it is asked
         # for at its limit only, air sinks here and not there
-        held_mps = vehicle.vertical_A[1, 1] * x[VZ]
+        held_mps = vehicle.vertical_A[SPEED, SPEED] * x[VZ]
         margin_mps = vertical_margin_mps(belief)
         down_mps = vehicle.v_down_max_mps - margin_mps
         up_mps = vehicle.v_up_max_mps - margin_mps
         descending_mps = held_mps + max(belief[SINK], 0.0)
         climbing_mps = held_mps + min(belief[SINK], 0.0)
-        lift_N = max(lift_N, (down_mps - descending_mps) / vehicle.vertical_B[1])
-        lift_N = min(lift_N, (-up_mps - climbing_mps) / vehicle.vertical_B[1])
+        lift_N = max(lift_N, (down_mps - descending_mps) / vehicle.vertical_B[SPEED])
+        lift_N = min(lift_N, (-up_mps - climbing_mps) / vehicle.vertical_B[SPEED])
         u[LIFT] = min(max(lift_N, vehicle.lift_min_N), vehicle.lift_max_N)
 
 
@@ -178,7 +179,7 @@ def expect(vehicle, belief, nonlinear, x, u):
     _leave_belief(vehicle, belief, after)
     for axis in range(3):
         belief[EXPECTED + axis] = after[VX + axis]
-    belief[EXPECTED + 3] = after[DOD] - x[DOD]
+    belief[EXPECTED_DOD] = after[DOD] - x[DOD]
 
 
 @inlined_kernel
@@ -195,7 +196,7 @@ def learn(vehicle, belief, step, dod_before, x):
     dt_s = vehicle.dt_s
     gain = max(1.0 - math.exp(-dt_s / FORGETS_S), 1.0 / (1.0 + step))
     # a wind moves the velocity by what drag takes of it in a step
-    per_wind = 1.0 - vehicle.axis_A[1, 1]
+    per_wind = 1.0 - vehicle.axis_A[SPEED, SPEED]
     for axis in range(2):
         off_mps = x[VX + axis] - belief[EXPECTED + axis]
         belief[WIND + axis] += gain * off_mps / per_wind
@@ -206,7 +207,7 @@ def learn(vehicle, belief, step, dod_before, x):
         belief[WIND + 1] *= most_mps / wind_mps
     sink = belief[SINK] + gain * (x[VZ] - belief[EXPECTED + 2])
     belief[SINK] = min(max(sink, -MOST_SINK_MPS2 * dt_s), MOST_SINK_MPS2 * dt_s)
-    if belief[EXPECTED + 3] > _LEAST_DOD:
-        off = (x[DOD] - dod_before) / belief[EXPECTED + 3] - 1.0 - belief[CONSUMPTION]
+    if belief[EXPECTED_DOD] > _LEAST_DOD:
+        off = (x[DOD] - dod_before) / belief[EXPECTED_DOD] - 1.0 - belief[CONSUMPTION]
         seen = belief[CONSUMPTION] + (1.0 - math.exp(-dt_s / SEES_CONSUMPTION_S)) * off
         belief[CONSUMPTION] = min(max(seen, CONSUMPTION_BOUNDS[0]), CONSUMPTION_BOUNDS[1])

@@ -3,8 +3,6 @@
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.vehicle import (
     LIFT,
-    TAU_X,
-    TAU_Y,
     TAU_Z,
     acceleration_wrench,
     clip_wrench,
@@ -21,7 +19,7 @@ def write_command(command, kind, first, second, third):
     command.values[0] = first
     command.values[1] = second
     command.values[2] = third
-    command.values[3] = 0.0
+    command.values[TAU_Z] = 0.0  # of a wrench alone
 
 
 @kernel
@@ -50,9 +48,7 @@ def command_wrench(vehicle, x, reference, command, u):
     elif kind == ACCELERATION:
         acceleration_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
     else:
-        u[LIFT] = values[0]
-        u[TAU_X] = values[1]
-        u[TAU_Y] = values[2]
-        u[TAU_Z] = values[3]
+        for k in range(LIFT, TAU_Z + 1):
+            u[k] = values[k]
     # the set U holds for every input, whoever made it
     clip_wrench(vehicle, u)

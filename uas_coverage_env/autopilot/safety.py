@@ -27,7 +27,7 @@ from uas_coverage_env.autopilot.lookahead import (
 )
 from uas_coverage_env.autopilot.right_of_way import claim_way, decision_order, room_beside
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
-from uas_coverage_env.vehicle import VX, VY, Z
+from uas_coverage_env.vehicle import TAU_Z, VX, VY, Z
 from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 _LEAST_SPEED_MPS = 3.0
@@ -167,7 +167,7 @@ def _make_way(
     """
     n_deflections = _DEFLECTIONS.shape[0]
     own_kind = command.kind
-    own = command.values[0], command.values[1], command.values[2], command.values[3]
+    own = command.values[0], command.values[1], command.values[2], command.values[TAU_Z]
     wish_mps = _wish(arena, state, i, command)
     n_options = n_deflections + 2
     best, best_m = n_options, -math.inf
@@ -191,7 +191,7 @@ def _make_way(
         write_brake(command)
     else:
         write_command(command, own_kind, own[0], own[1], own[2])
-        command.values[3] = own[3]
+        command.values[TAU_Z] = own[TAU_Z]
     _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
     return best < n_options
 
@@ -215,7 +215,7 @@ def filter_commands(arena, state, nonlinear, outcome):
     held_up = np.empty(n_uas, np.int64)
     n_held_up = 0
     brake = arena.rules[0].brake
-    # the first UAS decides before anybody asks where it would brake
+    # the first UAS decides before any other asks where it would brake
     for rank in range(1, n_flying):
         i = order[rank]
         x = state.x[i]

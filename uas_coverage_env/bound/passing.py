@@ -20,6 +20,11 @@ FloatArray = NDArray[np.float64]
 _FIRST, _WARM = 30.0, 1.0  # weights of the barrier, in costs
 _MISSED = 10.0  # price of missing a middle, over that of a metre: no higher ones are of use
 
+# the first pairs of variables: place of the visit, by what it misses both ends and the step before
+# the last; then those of the steps
+_PLACE, _MISSES, _OWN = 0, slice(1, 4), 4
+_MISSES_AHEAD = slice(2 * _MISSES.start, 2 * _MISSES.stop, 2)  # the first of each pair
+
 
 class Half(NamedTuple):
     """How many steps of half a leg are counted.
@@ -167,11 +172,11 @@ class Passing:
         pairs = 7 + plan.count("step") + 4 * plan.count("jump")
         size = 2 * pairs
         variables = np.eye(size).reshape(pairs, 2, size)
-        fresh = iter(range(4, pairs))  # after the place of the visit, and what it misses
+        fresh = iter(range(_OWN, pairs))
         potential_m = float(np.abs(motion.potential) @ motion.largest)
         largest = np.full(pairs, costs.across_m + 2.0 * potential_m)
         limits: list[tuple[FloatArray, float]] = []
-        priced = [(row, _MISSED * costs.per_m) for row in variables[1:4]]
+        priced = [(row, _MISSED * costs.per_m) for row in variables[_MISSES]]
 
         def new_state() -> FloatArray:
             own = [next(fresh) for _ in motion.largest]
@@ -204,7 +209,7 @@ class Passing:
                 x = np.einsum("ij,jax->iax", motion.A, x) + motion.B[:, None, None] * push
                 limits += zip(x, motion.largest, strict=True)
         state = np.stack([first, x])
-        places = variables[0] + np.stack([-at_visit, place - at_visit, last - at_visit])
+        places = variables[_PLACE] + np.stack([-at_visit, place - at_visit, last - at_visit])
         priced = [(row, weight) for row, weight in priced if weight > 0.0]
         rows = np.concatenate([variables, *(row[None] for row, _ in limits + priced)])
         axis = rows[:, 0, ::2]  # both axes alike
@@ -235,15 +240,15 @@ class Passing:
         # the last step leads past the middle: the sample before it is short of it
         leg = np.array([0, 1, 1])
         middles = np.einsum("nea,eax->nex", passages.along[:, leg], shape.place)
-        middles -= np.eye(size)[2:8:2]
+        middles -= np.eye(size)[_MISSES_AHEAD]
         beyond_m = (sides * passages.half_m)[:, leg] - np.array([1, 1, -1]) * 0.5 * costs.step_m
         ending = np.array([half.ends for half in halves])[leg]
         ending[2] &= halves[1].middle + halves[1].visit > 0
         largest = np.broadcast_to(shape.largest, (n, len(shape.largest))).copy()
-        largest[:, 0] = passages.radius_m
+        largest[:, _PLACE] = passages.radius_m
         if begin is None:
             z, barrier = np.zeros((n, size)), _FIRST
-            z[:, 2:8:2] = np.where(ending, beyond_m, 0.0)
+            z[:, _MISSES_AHEAD] = np.where(ending, beyond_m, 0.0)
         else:
             z, barrier = begin.copy(), _WARM
         value = np.zeros(n)

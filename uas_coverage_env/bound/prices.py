@@ -32,6 +32,9 @@ INSCRIBED = math.cos(math.pi / PHYSICAL_SIDES)
 _SLAB = 0.02
 """Widest range of the depth of discharge that one minorant holds for."""
 
+_BASE, _HORIZONTAL, _POLARISATION, _VERTICAL = range(4)
+"""Variables of a minorant; from _VERTICAL on one for each slab."""
+
 _LIKELY = 2.5
 """What speed and tilt mostly add to the thrust, over what full speed adds."""
 
@@ -176,23 +179,23 @@ def _minorant(vehicle: VehicleParams, ranges: _Ranges, dod_max: float) -> _Minor
         for vertical, horizontal in product(ranges.vertical_N, ranges.horizontal_N):
             for depth, u in product(dod, u_th_V):
                 power_W, excess_V = _settled(vehicle, segment, depth, u, vertical + horizontal)
-                row = np.zeros(3 + len(slabs))
-                row[:3], row[3 + n] = (1.0, horizontal, -excess_V), vertical
+                row = np.zeros(_VERTICAL + len(slabs))
+                row[:_VERTICAL], row[_VERTICAL + n] = (1.0, horizontal, -excess_V), vertical
                 rows.append(row)
                 powers_W.append(power_W)
-    cost = np.zeros(3 + len(slabs))
-    cost[:2] = -1.0, -ranges.likely_N
+    cost = np.zeros(_VERTICAL + len(slabs))
+    cost[_BASE], cost[_HORIZONTAL] = -1.0, -ranges.likely_N
     positive = (0.0, None)
     found = linprog(
-        cost, np.array(rows), powers_W, bounds=[(None, None)] + [positive] * (2 + len(slabs))
+        cost, np.array(rows), powers_W, bounds=[(None, None)] + [positive] * (len(cost) - 1)
     )
-    if not found.success or found.x[0] <= 0.0:
+    if not found.success or found.x[_BASE] <= 0.0:
         raise ValueError(f"the power of {vehicle.name!r} has no linear minorant")
     return _Minorant(
-        base_W=float(found.x[0]),
-        vertical_W_per_N=found.x[3:].tolist(),
-        horizontal_W_per_N=float(found.x[1]),
-        polarisation_A=float(found.x[2]),
+        base_W=float(found.x[_BASE]),
+        vertical_W_per_N=found.x[_VERTICAL:].tolist(),
+        horizontal_W_per_N=float(found.x[_HORIZONTAL]),
+        polarisation_A=float(found.x[_POLARISATION]),
     )
 
 

@@ -27,6 +27,7 @@ LONGEST = 4
 LONGEST_START = 6
 """Steps that setting off is counted in at most."""
 
+_N_STATES = 3  # of an axis, see `Motion`; both axes come first among the variables
 _REACHED_STEPS = 16
 _SIDES = 24
 _ANGLES = 25  # from straight on to back, half the change of heading in steps of 3.75 degrees
@@ -177,11 +178,11 @@ def _reach_m(motion: Motion, at_rest: bool = False) -> FloatArray:
     for n in range(1, _REACHED_STEPS + 1):
         states = _states(motion, n, 1)
         gained = np.sum([motion.position @ x for x in states[:-1]], axis=0)
-        gained[3:] += motion.input_m
+        gained[_N_STATES:] += motion.input_m
         rows = [sign * x for x in states[:-1] for sign in (1.0, -1.0)]
         rows += [states[-1][:1], -states[-1][:1]]
         bounds = np.concatenate([np.tile(motion.largest, 2 * n), np.tile(motion.largest[:1], 2)])
-        allowed = [(0.0, 0.0) if at_rest else (None, None)] * 3 + [
+        allowed = [(0.0, 0.0) if at_rest else (None, None)] * _N_STATES + [
             (-motion.largest_input, motion.largest_input)
         ] * n
         found = linprog(-gained, np.vstack(rows), bounds, bounds=allowed)
@@ -191,10 +192,10 @@ def _reach_m(motion: Motion, at_rest: bool = False) -> FloatArray:
 
 def _states(motion: Motion, n: int, extra: int) -> list[FloatArray]:
     """States 0..n of one axis, (3, 3 + n) each, linear in the first state and the inputs."""
-    states = [np.hstack([np.eye(3), np.zeros((3, n * extra))])]
+    states = [np.hstack([np.eye(_N_STATES), np.zeros((_N_STATES, n * extra))])]
     for k in range(n):
         following = motion.A @ states[-1]
-        following[:, 3 + k] += motion.B
+        following[:, _N_STATES + k] += motion.B
         states.append(following)
     return states
 
@@ -239,11 +240,12 @@ class _Window:
     ) -> float:
         """Least of the cost of all steps, less that of the way they go ahead at full speed."""
         n, motion, prices = len(directions), self._motion, self._prices
-        size = 6 + 3 * n
-        tilts = slice(6 + 2 * n, size)
+        inputs_from = 2 * _N_STATES
+        tilts_from = inputs_from + 2 * n
+        size = tilts_from + n
         states = self._both_axes(n)
         cost = np.zeros(size)
-        cost[tilts] = prices.rad
+        cost[tilts_from:] = prices.rad
         rows, bounds = [], []
         sides = np.vstack([self._sides, *directions])
         for k, x in enumerate(states):
@@ -256,16 +258,16 @@ class _Window:
             if k < n:
                 cost -= prices.step / self._speed_mps * (directions[k] @ x[:, 0])
                 beyond = sides @ (x[:, 1] - motion.trim * x[:, 0])
-                beyond[:, 6 + 2 * n + k] -= 1.0
+                beyond[:, tilts_from + k] -= 1.0
                 rows.append(beyond)
                 bounds.append(np.zeros(len(sides)))
                 inputs = np.zeros((len(sides), size))
-                inputs[:, 6 + 2 * k : 8 + 2 * k] = sides
+                inputs[:, inputs_from + 2 * k : inputs_from + 2 * k + 2] = sides
                 rows.append(inputs)
                 bounds.append(np.full(len(sides), motion.largest_input))
         for k, direction in potentials:
             cost -= self._per_m * (direction @ np.einsum("i,aix->ax", motion.potential, states[k]))
-        allowed = [(0.0, 0.0) if at_rest else (None, None)] * 6
+        allowed = [(0.0, 0.0) if at_rest else (None, None)] * inputs_from
         allowed += [(None, None)] * (2 * n) + [(0.0, None)] * n
         found = linprog(cost, np.vstack(rows), np.concatenate(bounds), bounds=allowed)
         if not found.success:
@@ -274,13 +276,12 @@ class _Window:
 
     def _both_axes(self, n: int) -> list[FloatArray]:
         """States 0..n, (2, 3, size) each: axis, state, variable."""
-        motion, size = self._motion, 6 + 3 * n
-        first = np.zeros((2, 3, size))
-        first[0, :, :3] = first[1, :, 3:6] = np.eye(3)
+        motion, size = self._motion, 2 * _N_STATES + 3 * n
+        first = np.eye(2 * _N_STATES, size).reshape(2, _N_STATES, size)
         states = [first]
         for k in range(n):
             following = np.einsum("ij,ajx->aix", motion.A, states[-1])
             for axis in range(2):
-                following[axis, :, 6 + 2 * k + axis] += motion.B
+                following[axis, :, 2 * (_N_STATES + k) + axis] += motion.B
             states.append(following)
         return states

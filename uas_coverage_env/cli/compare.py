@@ -120,7 +120,7 @@ def compare(
             f"--scenarios, --planners and --seeds ask for {sweep.size} flights; "
             f"give fewer, at most {_MOST_FLIGHTS}"
         )
-    reference = _reference(reference, list(sweep.players))
+    reference = _reference(reference, list(sweep.planners))
     side_by_side = jobs_of(jobs, backend)
     command = _command(
         *("--scenarios", ",".join(scenarios), "--planners", ",".join(planners)),
@@ -139,7 +139,7 @@ def compare(
     with opened(out, sweep.description(), overwrite=overwrite) as store:
         _take(others, entries, store)
         _warn(sweep)
-        source = source_of(sweep.players.values())
+        source = source_of(sweep.planners.values())
         trouble = fly_sweep(entries, store, screen, side_by_side, backend, source)
         rows = store.rows()
     if not rows:
@@ -256,7 +256,7 @@ def _shown(screen: Console, total: int, kept: int) -> Iterator[Callable[[Row], o
         task = bar.add_task("flying", total=total, completed=kept)
 
         def told(row: Row) -> None:
-            bar.update(task, description=f"{row.scenario} {row.player} {row.seed}", advance=1)
+            bar.update(task, description=f"{row.scenario} {row.label} {row.seed}", advance=1)
 
         yield told
 
@@ -293,7 +293,7 @@ def _report(screen: Console, comparison: Comparison, out: Path, names: Sequence[
         screen.print(line, markup=False)
     wide.print(tables.rich_table(tables.outcome_cells(scores), "\nOutcome"))
     wide.print(tables.rich_table(tables.effort_cells(scores), "\nEffort"))
-    if len(scores) > 1 and reference in {one.player for one in scores}:
+    if len(scores) > 1 and reference in {one.label for one in scores}:
         cells = tables.reference_cells(scores, reference)
         wide.print(tables.rich_table(cells, f"\nAgainst {reference}"))
     for line in tables.notes(rows, reference):

@@ -81,7 +81,7 @@ def front(
     entries, screen = list(sweep.entries()), console()
     side_by_side = jobs_of(jobs, "process")
     with opened(out, sweep.description(), overwrite=overwrite) as store:
-        source = source_of(sweep.players.values())
+        source = source_of(sweep.planners.values())
         trouble = fly_sweep(entries, store, screen, side_by_side, "process", source, out / FLIGHTS)
         rows = store.rows()
     bounds = bounds_shown(rows, sweep.scenarios, screen, side_by_side)
@@ -112,7 +112,7 @@ def _flying(rows: Iterable[Row], flights: Path) -> dict[str, int]:
             with contextlib.suppress(InputError):
                 flight = Flight.load(flights / kept_as(row))
                 moved_m = np.abs(flight.x[:, :, :3] - flight.x[0, :, :3]).max(axis=(0, 2))
-                result[row.player] = int((moved_m > _MOVED_M).sum())
+                result[row.label] = int((moved_m > _MOVED_M).sum())
     return result
 
 

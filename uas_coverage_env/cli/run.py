@@ -128,21 +128,21 @@ def run(
             f"again some time after they were covered (again_after_s): leave --sorties out; "
             f"[sorties] with together = false gives UAS packs"
         )
-    player = load_planner(planner, options_of(option or ()))
+    flies = load_planner(planner, options_of(option or ()))
     # KIND:ARGUMENT may hold a path
-    player_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")
-    directory = out or free_directory(f"{mission.name}-{player_name}-{seed}")
+    planner_name = re.sub(r"[^\w.-]+", "-", planner).strip("-.")
+    directory = out or free_directory(f"{mission.name}-{planner_name}-{seed}")
     check_directory(directory, overwrite=overwrite)
 
     screen = console(quiet=quiet or as_json)
     window = ExitStack()
 
     def fly(what: Scenario) -> Flight:
-        watched, after = player if watch else None, window if sorties is None else None
+        watched, after = flies if watch else None, window if sorties is None else None
         with shown(screen, what, watch=watched, live=live, after=after) as on_step:
             return rollout(
                 what,
-                player,
+                flies,
                 seed,
                 dynamics=dynamics,
                 safety_filter=True if safety_filter else None,

@@ -16,7 +16,7 @@ from uas_coverage_env.tasks.store import ScoreStore
 from uas_coverage_env.tasks.table import markdown
 from uas_coverage_env.tasks.task import SPLITS
 
-_PLAYERS = "random,nearest-waypoint,lawnmower,tour,trajectory"
+_PLANNERS = "random,nearest-waypoint,lawnmower,tour,trajectory"
 _SPLITS = tuple(split for split in SPLITS if split != "training")
 
 
@@ -24,17 +24,18 @@ def score_command(
     level: Annotated[
         str, typer.Option(metavar="NAME,...", help=f"Of {', '.join(LEVELS)}.")
     ] = "easy",
-    players: Annotated[
+    planners: Annotated[
         str,
         typer.Option(
             metavar="NAME,...", help="`random`, names of planners, `policy:DIR` of a training."
         ),
-    ] = _PLAYERS,
+    ] = _PLANNERS,
     missions: Annotated[int, typer.Option(min=1, help="How many of the split.")] = 20,
     split: Annotated[str, typer.Option(help=f"{' or '.join(_SPLITS)}.")] = "test",
     out: Annotated[Path, typer.Option(help="Folder of the scores; resumed if it exists.")] = Path(
         "scores"
     ),
+    players: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """Fly the missions of a level and print the scores (docs/levels.md).
 
@@ -43,7 +44,10 @@ def score_command(
     """
     levels = _named("--level", level, tuple(LEVELS))
     _named("--split", split, _SPLITS)
-    names = [name for name in players.split(",") if name]
+    if players is not None:
+        sys.stderr.write("--players is called --planners now\n")
+        planners = players
+    names = [name for name in planners.split(",") if name]
     if missions > len(SPLITS[split]):
         raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
     for name in names:
@@ -52,19 +56,19 @@ def score_command(
     store, screen = ScoreStore(out / split), console()
     for name in levels:
         scores: dict[str, Score] = {}
-        for player in names:
-            scores[player] = _scored(store, player, name, missions, split)
+        for planner in names:
+            scores[planner] = _scored(store, planner, name, missions, split)
         screen.print(f"{LEVELS[name].id}, {split} missions", markup=False)
         # a table in a file is not to be wrapped
         sys.stdout.write(f"\n{markdown(scores)}\n\n")
 
 
-def _scored(store: ScoreStore, player: str, level: str, missions: int, split: str) -> Score:
+def _scored(store: ScoreStore, planner: str, level: str, missions: int, split: str) -> Score:
     def keep(mission: MissionScore) -> None:
-        store.add(level, player, mission)
+        store.add(level, planner, mission)
 
-    known = store.missions(level, player)
-    return score(player, level, missions=missions, split=split, known=known, on_mission=keep)
+    known = store.missions(level, planner)
+    return score(planner, level, missions=missions, split=split, known=known, on_mission=keep)
 
 
 def _named(option: str, text: str, allowed: tuple[str, ...]) -> list[str]:

@@ -38,13 +38,13 @@ def warm_up(
     disk until the package changes, and is not compiled again.
     """
     scenario = load_scenario(_SCENARIO)
-    players = [load_planner(name) for name in planner or [_PLANNER]]
+    planners = [load_planner(name) for name in planner or [_PLANNER]]
     started, before = time.perf_counter(), COMPILATIONS.n_compiled
     with compilation_shown():
         world = compile_world(scenario, return_mode=True, safety_filter=True)
         picture(scenario, world.swarm_state())  # of the flight directory
-        for player in players:
-            _compile_planner(player, scenario)
+        for each in planners:
+            _compile_planner(each, scenario)
         if environments:
             _compile_environments()
     n = COMPILATIONS.n_compiled - before
@@ -54,14 +54,14 @@ def warm_up(
     )
 
 
-def _compile_planner(player: Planner, scenario: Scenario) -> None:
-    prepare = getattr(player, "warm_up", None)
+def _compile_planner(planner: Planner, scenario: Scenario) -> None:
+    prepare = getattr(planner, "warm_up", None)
     if prepare is None:
-        rollout(scenario, player, max_steps=1)
+        rollout(scenario, planner, max_steps=1)
     else:
         brief = MissionBrief.of(scenario)
         prepare(brief)
-        player.reset(brief, 0)
+        planner.reset(brief, 0)
 
 
 def _compile_environments() -> None:

@@ -168,14 +168,15 @@ def lane_view(memory: Memory[T], sized_by: Memory) -> Callable[[T, Any, Pool, An
 
     def typed(typing_context, lanes, lane, pool, s):
         def generate(context, builder, signature, arguments):
-            parts = cgutils.unpack_tuple(builder, arguments[0])
+            given_lanes, given_lane, given_pool, given_s = arguments
+            parts = cgutils.unpack_tuple(builder, given_lanes)
             arrays = [
                 make_array(array_type)(context, builder, part)
                 for array_type, part in zip(lanes, parts, strict=True)
             ]
-            at = context.cast(builder, arguments[1], lane, types.intp)
-            mission = context.cast(builder, arguments[3], s, types.intp)
-            _, _, sizes = _unpacked(context, builder, pool, arguments[2])
+            at = context.cast(builder, given_lane, lane, types.intp)
+            mission = context.cast(builder, given_s, s, types.intp)
+            _, _, sizes = _unpacked(context, builder, pool, given_pool)
             known = {
                 name: _element(context, builder, sizes, mission, k)
                 for k, name in enumerate(sized_by.names)

@@ -12,8 +12,9 @@ from uas_coverage_env.scenario.air import Wind
 from uas_coverage_env.world.disturbance import Disturbance
 
 _FULL_TURN = 2.0 * math.pi
-_PER_GUST = 5
-_BLOWS, _BEGAN_S, _PEAK_MPS = range(3)  # places in the memory
+_AT_S, _LASTS_S, _PEAK, _PER_GUST = 0, 1, 2, 5  # parameters of each gust; its peak is NED
+_PER_S, _EACH_LASTS_S, _LARGEST = 0, 1, 2  # parameters of gusts at random times; likewise
+_BLOWS, _BEGAN_S, _SIZE = range(3)  # places in the memory
 
 
 @inlined_kernel
@@ -35,9 +36,9 @@ def gust(arena, state, outcome, i, parameters, memory, random):
     dt_s = arena.rules[0].dt_s
     now_s = state.step[0] * dt_s
     for first in range(0, parameters.shape[0], _PER_GUST):
-        share = gust_share(now_s - parameters[first], dt_s, parameters[first + 1])
+        share = gust_share(now_s - parameters[first + _AT_S], dt_s, parameters[first + _LASTS_S])
         for axis in range(3):
-            outcome[i].wind_mps[axis] += share * parameters[first + 2 + axis]
+            outcome[i].wind_mps[axis] += share * parameters[first + _PEAK + axis]
 
 
 @kernel
@@ -51,16 +52,16 @@ def gust_at_random(arena, state, outcome, i, parameters, memory, random):
     # as many numbers in each step: UAS that draw the same numbers stay together
     chance = uniform(random)
     size = uniform(random)
-    if memory[_BLOWS] == 0.0 and chance < 1.0 - math.exp(-parameters[0] * dt_s):
+    if memory[_BLOWS] == 0.0 and chance < 1.0 - math.exp(-parameters[_PER_S] * dt_s):
         memory[_BLOWS] = 1.0
         memory[_BEGAN_S] = now_s
-        memory[_PEAK_MPS] = size
+        memory[_SIZE] = size
     if memory[_BLOWS] != 0.0:
         since_s = now_s - memory[_BEGAN_S]
-        share = memory[_PEAK_MPS] * gust_share(since_s, dt_s, parameters[1])
+        share = memory[_SIZE] * gust_share(since_s, dt_s, parameters[_EACH_LASTS_S])
         for axis in range(3):
-            outcome[i].wind_mps[axis] += share * parameters[2 + axis]
-        if since_s + dt_s >= parameters[1]:
+            outcome[i].wind_mps[axis] += share * parameters[_LARGEST + axis]
+        if since_s + dt_s >= parameters[_EACH_LASTS_S]:
             memory[_BLOWS] = 0.0
 
 

@@ -29,6 +29,7 @@ SLOWEST_MPS = 1.0
 """The least airspeed at which turbulence is flown through: eddies decay, too [m/s]."""
 
 _ROOT_3 = math.sqrt(3.0)
+_SIGMA_W, _NORTH, _EAST = range(3)  # parameters
 _ALONG, _ACROSS, _VERTICAL, _BEGUN = 0, 1, 3, 5  # places in the memory
 
 
@@ -86,9 +87,9 @@ def swirl(arena, state, outcome, i, parameters, memory, random):
     Parameters: sigma_w [m/s], and the direction in which the mean wind blows, a unit vector (2,).
     """
     event = outcome[i]
-    sigma_w = parameters[0]
-    north = parameters[1]
-    east = parameters[2]
+    sigma_w = parameters[_SIGMA_W]
+    north = parameters[_NORTH]
+    east = parameters[_EAST]
     sigma_u, length_u, length_w = scales(-state.x[i, Z], sigma_w)
     square = 0.0
     for axis in range(3):

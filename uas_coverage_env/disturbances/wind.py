@@ -16,6 +16,8 @@ LOWEST_M = 1.0
 
 CONSTANT, LOGARITHMIC, POWER_LAW = range(3)
 
+_LAW, _VALUE, _REFERENCE_M, _ROTOR_POWER = range(3, 7)  # parameters after the velocity, see `blow`
+
 
 @kernel
 def profile_share(law, value, reference_m, height_m):
@@ -38,11 +40,13 @@ def profile_share(law, value, reference_m, height_m):
 @inlined_kernel
 def _blow_by_profile(state, outcome, i, parameters):
     event = outcome[i]
-    share = profile_share(parameters[3], parameters[4], parameters[5], -state.x[i, Z])
+    share = profile_share(
+        parameters[_LAW], parameters[_VALUE], parameters[_REFERENCE_M], -state.x[i, Z]
+    )
     for axis in range(2):
         event.wind_mps[axis] += share * parameters[axis]
     event.wind_mps[2] += parameters[2]
-    event.rotor_power = parameters[6] != 0.0
+    event.rotor_power = parameters[_ROTOR_POWER] != 0.0
 
 
 @kernel
@@ -53,7 +57,7 @@ def blow(arena, state, outcome, i, parameters, memory, random):
     the LPV model takes its power from the rotor model.
     """
     event = outcome[i]
-    if parameters.shape[0] > 3:
+    if parameters.shape[0] > _LAW:
         _blow_by_profile(state, outcome, i, parameters)
         return
     for axis in range(3):

@@ -77,13 +77,10 @@ def flying(
     """
     unit = frame.unit
     radius = 11.5 * unit
-    box = (x - radius, y - radius, x + radius, y + radius)
+    box = left, top, right, bottom = (x - radius, y - radius, x + radius, y + radius)
     draw.ellipse(box, outline=colours.WHITE, width=round(4.5 * unit))
-    draw.ellipse(
-        (box[0] + unit, box[1] + unit, box[2] - unit, box[3] - unit),
-        outline=colours.FAINT,
-        width=round(unit),
-    )
+    inner = (left + unit, top + unit, right - unit, bottom - unit)
+    draw.ellipse(inner, outline=colours.FAINT, width=round(unit))
     end = -90 + 360 * min(1.0, max(0.0, soc))
     draw.arc(box, -90, end, fill=colours.of_charge(soc), width=round(4 * unit))
     arm = 7.5 * unit

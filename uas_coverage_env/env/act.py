@@ -19,7 +19,18 @@ from uas_coverage_env.env.actions.acceleration import write as write_acceleratio
 from uas_coverage_env.env.actions.velocity import write as write_velocity
 from uas_coverage_env.env.actions.waypoint import write as write_waypoint
 from uas_coverage_env.env.actions.wrench import write as write_wrench
-from uas_coverage_env.env.memory import LEARNERS, TABLES, Acting
+from uas_coverage_env.env.memory import (
+    ADDRESS,
+    CHOOSES,
+    GOES_TO,
+    HIGHEST,
+    LEARNERS,
+    LOWEST,
+    MIDDLE,
+    TABLES,
+    WHICH,
+    Acting,
+)
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME, VELOCITY
@@ -27,9 +38,6 @@ from uas_coverage_env.world.state import STATE
 
 _KIND = namedtuple("kinds", ACTION_NAMES)(*range(len(ACTIONS)))
 _OWN = len(ACTIONS)
-
-_WHICH, _ADDRESS, _CHOOSES, _GOES_TO = range(4)
-"""Columns of `Acting.call`."""
 
 
 @cache
@@ -69,7 +77,7 @@ def acting_of(kind: ActionKind, *, on_gpu: bool = False) -> Acting:
 
 def is_own(acting: Acting) -> bool:
     """Whether the kind is none of `ACTIONS`: what it writes is checked."""
-    return int(acting.call[_WHICH]) == _OWN
+    return int(acting.call[WHICH]) == _OWN
 
 
 def refuse_what_it_wrote(
@@ -114,12 +122,12 @@ def begin_command(tables, learners, scratch, acting, i):
         command.values[k] = 0.0
     for k in range(learners.asked.shape[1]):
         value = learners.asked[i, k]
-        if not acting.call[_CHOOSES]:
+        if not acting.call[CHOOSES]:
             share = min(max(value, -1.0), 1.0)
-            middle = tables.ranges[i, k, 1]
-            reach = tables.ranges[i, k, 2] - middle
+            middle = tables.ranges[i, k, MIDDLE]
+            reach = tables.ranges[i, k, HIGHEST] - middle
             if share < 0.0:
-                reach = middle - tables.ranges[i, k, 0]
+                reach = middle - tables.ranges[i, k, LOWEST]
             value = middle + share * reach
         scratch.values[i, k] = value
 
@@ -146,7 +154,7 @@ def refuse_unflyable(arena, learners, acting, i, command):
     if flyable and command.kind == GO_TO:
         target = values[0]
         exists = target == math.floor(target) and HOME <= target < arena.waypoints.shape[0]
-        flyable = exists and acting.call[_GOES_TO] != 0
+        flyable = exists and acting.call[GOES_TO] != 0
     if not flyable:
         write_brake(command)
         learners.asked[i, 0] = math.nan
@@ -167,7 +175,7 @@ def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
         on_gpu: None on the processor. A GPU calls nothing at an address: the commands of an own
             kind are already written there.
     """
-    which = acting.call[_WHICH]
+    which = acting.call[WHICH]
     size = learners.asked.shape[1]
     if on_gpu is not None and which == _OWN:
         return
@@ -178,7 +186,7 @@ def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
         if rarely(which == _OWN):
             if on_gpu is None and state.status[i] == FLYING:
                 _write_command(
-                    acting.call[_ADDRESS], arena, state, tables, learners, i, acting.parameters,
+                    acting.call[ADDRESS], arena, state, tables, learners, i, acting.parameters,
                     values, command,
                 )  # fmt: skip
                 refuse_unflyable(arena, learners, acting, i, command)

@@ -40,7 +40,7 @@ from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.scenes import change_scenes, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.state_dict import check_like
+from uas_coverage_env.env.state_dict import by_present_names, check_like
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.simulation import swarm_state
@@ -285,7 +285,7 @@ class CoverageBatch:
             ValueError: An array is missing, surplus, of another shape or dtype, or holds what no
                 mission of this batch can have.
         """
-        own = self._changing()
+        own, state = self._changing(), by_present_names(state)
         check_like(state, own)
         drawn, changed = checked(self.pool, state)
         if isinstance(self.pool, DrawnPool):
@@ -309,7 +309,7 @@ class CoverageBatch:
         return arrays
 
     def swarm_state(self, lane: int) -> SwarmState:
-        """What a player of this lane sees now, in arrays of their own."""
+        """What a planner of this lane sees now, in arrays of their own."""
         arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
         state = STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
         return swarm_state(self.scenario_of(lane), arena, state)

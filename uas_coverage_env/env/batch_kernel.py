@@ -190,7 +190,7 @@ def _fetch_ahead(state, learners, observation):
 
     Of 1000 missions most lies far from the processor.
     """
-    prefetch(learners.company)
+    prefetch(learners.around)
     for i in range(observation.shape[0]):
         if state.status[i] == FLYING:
             prefetch(observation[i])

@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote, write_commands
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, SCRATCH
-from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
+from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import learners_sizes, tables_of
@@ -64,7 +64,7 @@ class Cockpit:
         """
         self._view.update(swarm)
         state, learners = self._view.state, self._learners
-        count_company(state.uncovered, self._tables.neighbours, learners.company)
+        write_around(state.uncovered, self._tables.neighbours, learners.around)
         observe(
             self._view.arena, state, self._tables, learners, self._observing, self._flew,
             self._observation,

@@ -237,7 +237,7 @@ class Episode:
         return self._world.state.x[:, :3]
 
     def swarm_state(self) -> SwarmState:
-        """What a player sees now."""
+        """What a planner sees now."""
         return self._world.swarm_state()
 
     def moment(self) -> Moment:

@@ -85,7 +85,9 @@ def action_of(actions: Actions, moment: Moment, name: str, command: Command, cli
         flown = command
         if isinstance(command, GoTo) and not kind.goes_to:
             flown = velocity_of(moment.arena, state, i, command, nonlinear=moment.nonlinear)
-        values = kind.express(*moment[1:5], i, kind.parameters, flown)
+        values = kind.express(
+            moment.arena, state, moment.tables, moment.learners, i, kind.parameters, flown
+        )
         if kind.choices:
             return np.int64(values[0])
         return _shares(kind.numbers, actions.ranges[i], values, clip)

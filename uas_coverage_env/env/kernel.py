@@ -21,7 +21,7 @@ from uas_coverage_env.env.memory import (
     Observing,
     Paying,
 )
-from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
+from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.reward_kernel import compute_rewards
 from uas_coverage_env.simulation import advance
@@ -69,7 +69,7 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         amounts[i, ENERGY] += event.energy_Wh
         amounts[i, REWARD] = reward
     if newly_covered > 0:
-        count_company(state.uncovered, tables.neighbours, learners.company)
+        write_around(state.uncovered, tables.neighbours, learners.around)
     seen = as_told(arena, state)
     for i in range(report.shape[0]):
         flew = outcome[i].flew

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.views import Layout
-from uas_coverage_env.env.observation.nearest import NEIGHBOURS_DTYPE, NO_TARGET
+from uas_coverage_env.env.observation.nearest import N_AROUND, NEIGHBOURS_DTYPE, NO_TARGET
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
@@ -26,11 +26,25 @@ weighted terms. The reward is their sum in their order (Python's own `sum` round
 since 3.12)."""
 
 
+LOWEST, MIDDLE, HIGHEST = range(3)
+"""Columns of the ranges: what -1, 0 and 1 mean for a number of an action."""
+
+WHICH, ADDRESS, CHOOSES, GOES_TO = range(4)
+"""Columns of the call of an action: which kind it is, the address of its kernel, whether it is a
+choice, and whether it goes to places (see `act`)."""
+
+TERM_ADDRESS, TERM, TERM_FIRST, TERM_PARAMETERS = range(4)
+"""Columns of the call of a term: address, which it is, first parameter, and how many."""
+
+BLOCK_ADDRESS, BLOCK_COLUMN, BLOCK_SIZE, BLOCK_FIRST, BLOCK_PARAMETERS = range(5)
+"""Columns of the call of a block: address, first column, size, first parameter, and how many."""
+
+
 class Tables(NamedTuple):
     """What does not change during a mission."""
 
-    ranges: Annotated[NDArray[np.float64], "U", "A", 3]
-    """What -1, 0 and 1 mean for the numbers of an action."""
+    ranges: Annotated[NDArray[np.float64], "U", "A", HIGHEST + 1]
+    """Of the numbers of an action, see `LOWEST`."""
     scales: Annotated[NDArray[np.void], SCALES_DTYPE, "U"]
     """What the numbers of an observation are divided by."""
     neighbours: Annotated[NDArray[np.void], NEIGHBOURS_DTYPE, "W"]
@@ -45,8 +59,8 @@ class Learners(NamedTuple):
     """Where each is flying to (waypoint action)."""
     candidates: Annotated[NDArray[np.int64], "U", K_WAYPOINTS, Values(-1, "W")]
     """The open waypoints in the order of the latest observation; -1 where there are no more."""
-    company: Annotated[NDArray[np.float32], "W", 2]
-    """See `count_company`."""
+    around: Annotated[NDArray[np.float32], "W", N_AROUND]
+    """What is open around each waypoint, see `write_around`."""
     report: Annotated[NDArray[np.int64], "U", REPORT_SIZE]
     """Of the latest step: the columns named above."""
     amounts: Annotated[NDArray[np.float64], "U", "P"]
@@ -72,9 +86,8 @@ class Scratch(NamedTuple):
 class Acting(NamedTuple):
     """The kind of action, for kernels."""
 
-    call: Annotated[NDArray[np.int64], 4]
-    """Which it is, the address of a kernel, whether it is a choice, and whether it goes to places
-    (see `act`)."""
+    call: Annotated[NDArray[np.int64], GOES_TO + 1]
+    """See `WHICH` and the names beside it."""
     parameters: Annotated[NDArray[np.float64], "action parameters"]
 
 
@@ -84,8 +97,8 @@ class Paying(NamedTuple):
     weights: Annotated[NDArray[np.float64], "R"]
     begins_as_usual: Annotated[NDArray[np.bool_], 1]
     """The terms of `REWARD` come first: they are part of the step."""
-    calls: Annotated[NDArray[np.int64], "reward calls", 4]
-    """Of each other term: address, which it is, first parameter, and how many."""
+    calls: Annotated[NDArray[np.int64], "reward calls", TERM_PARAMETERS + 1]
+    """Of each other term, see `TERM_ADDRESS`."""
     parameters: Annotated[NDArray[np.float64], "reward parameters"]
     """Of all of them."""
 
@@ -95,8 +108,8 @@ class Observing(NamedTuple):
 
     begins_as_usual: Annotated[NDArray[np.bool_], 1]
     """The blocks of `OBSERVATION` come first: they are part of the step."""
-    calls: Annotated[NDArray[np.int64], "observation calls", 5]
-    """Of each other block: address, first column, size, first parameter, and how many."""
+    calls: Annotated[NDArray[np.int64], "observation calls", BLOCK_PARAMETERS + 1]
+    """Of each other block, see `BLOCK_ADDRESS`."""
     parameters: Annotated[NDArray[np.float64], "observation parameters"]
     """Of all of them."""
 

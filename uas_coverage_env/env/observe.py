@@ -9,7 +9,16 @@ from numba import types
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
-from uas_coverage_env.env.memory import LEARNERS, TABLES, Observing
+from uas_coverage_env.env.memory import (
+    BLOCK_ADDRESS,
+    BLOCK_COLUMN,
+    BLOCK_FIRST,
+    BLOCK_PARAMETERS,
+    BLOCK_SIZE,
+    LEARNERS,
+    TABLES,
+    Observing,
+)
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.block import firsts_of
 from uas_coverage_env.env.observation.home import write_home
@@ -62,7 +71,7 @@ def observing_of(blocks: Sequence[ObservationBlock]) -> Observing:
         column += block.size
     return Observing(
         begins_as_usual=np.array([begins_as_usual]),
-        calls=np.array(calls, dtype=np.int64).reshape(-1, 5),
+        calls=np.array(calls, dtype=np.int64).reshape(-1, BLOCK_PARAMETERS + 1),
         parameters=np.array(parameters, dtype=np.float64),
     )
 
@@ -107,9 +116,9 @@ def observe_one(arena, state, tables, learners, observing, i, row, on_gpu):
             for b in range(observing.calls.shape[0]):
                 call = observing.calls[b]
                 _write_block(
-                    call[0], arena, state, tables, learners, i,
-                    slice_view(observing.parameters, call[3], call[4]),
-                    slice_view(row, call[1], call[2]),
+                    call[BLOCK_ADDRESS], arena, state, tables, learners, i,
+                    slice_view(observing.parameters, call[BLOCK_FIRST], call[BLOCK_PARAMETERS]),
+                    slice_view(row, call[BLOCK_COLUMN], call[BLOCK_SIZE]),
                 )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
-from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company
+from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import learners_sizes, tables_of
@@ -59,7 +59,7 @@ class Observer:
         """
         self._view.update(swarm)
         state = self._view.state
-        count_company(state.uncovered, self._tables.neighbours, self._learners.company)
+        write_around(state.uncovered, self._tables.neighbours, self._learners.around)
         self._learners.targets[:] = NO_TARGET if targets is None else targets
         flying = state.status == FLYING
         observe(

@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
-from uas_coverage_env.env.memory import FIRST_TERM, LEARNERS, SCRATCH, TABLES, Paying
+from uas_coverage_env.env.memory import (
+    FIRST_TERM,
+    LEARNERS,
+    SCRATCH,
+    TABLES,
+    TERM,
+    TERM_ADDRESS,
+    TERM_FIRST,
+    TERM_PARAMETERS,
+    Paying,
+)
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
 from uas_coverage_env.env.rewards import terms as default
 from uas_coverage_env.world.arena import ARENA
@@ -57,7 +67,7 @@ def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64]) -> Payi
     return Paying(
         weights=weights,
         begins_as_usual=np.array([begins_as_usual]),
-        calls=np.array(calls, dtype=np.int64).reshape(-1, 4),
+        calls=np.array(calls, dtype=np.int64).reshape(-1, TERM_PARAMETERS + 1),
         parameters=np.array(parameters, dtype=np.float64),
     )
 
@@ -108,9 +118,9 @@ def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
             if rarely(paying.calls.shape[0] > 0):
                 for t in range(paying.calls.shape[0]):
                     call = paying.calls[t]
-                    amounts[i, FIRST_TERM + call[1]] = _value_of(
-                        call[0], arena, state, tables, learners, scratch, i,
-                        slice_view(paying.parameters, call[2], call[3]),
+                    amounts[i, FIRST_TERM + call[TERM]] = _value_of(
+                        call[TERM_ADDRESS], arena, state, tables, learners, scratch, i,
+                        slice_view(paying.parameters, call[TERM_FIRST], call[TERM_PARAMETERS]),
                     )  # fmt: skip
         for term in range(n_terms):
             # adding zero makes -0.0 a plain zero

@@ -14,7 +14,7 @@ from uas_coverage_env.env.memory import (
     Observing,
     Tables,
 )
-from uas_coverage_env.env.observation.nearest import NO_TARGET, count_company, neighbours_of
+from uas_coverage_env.env.observation.nearest import NO_TARGET, neighbours_of, write_around
 from uas_coverage_env.env.observation.scales import scales_of
 from uas_coverage_env.env.observe import observe
 from uas_coverage_env.env.settings import MissionSettings
@@ -92,6 +92,6 @@ def look_around(
         observing: What is observed.
         observation: (U, V); the rows of UAS that fly are written.
     """
-    count_company(state.uncovered, tables.neighbours, learners.company)
+    write_around(state.uncovered, tables.neighbours, learners.around)
     flying = state.status == FLYING
     observe(arena, state.as_told(), tables, learners, observing, flying, observation)

@@ -77,7 +77,7 @@ class Episode:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Some missions of one player; `print` shows the means.
+    """Some missions of one planner or policy; `print` shows the means.
 
     Attributes:
         episodes: In the order of the seeds.
@@ -110,7 +110,7 @@ class Evaluation:
 
 
 def evaluate(
-    player: str | Planner | Callable[[Any], Any],
+    planner: str | Planner | Callable[[Any], Any],
     scenario: ScenarioLike = "village",
     *,
     seeds: Iterable[int] = range(10),
@@ -125,7 +125,7 @@ def evaluate(
     `action` and `observation` do not concern them.
 
     Args:
-        player: Name of a planner, a planner, or a policy: a function from observation to action,
+        planner: Name of a planner, a planner, or a policy: a function from observation to action,
             such as `lambda seen: model.predict(seen, deterministic=True)[0]`.
         scenario: What is flown, as the environments take it; a family draws a mission per seed.
         seeds: Of the missions, of what disturbances draw in them, and of the planner.
@@ -140,17 +140,15 @@ def evaluate(
     """
     source = MissionSource.of(scenario)
     made = MissionSettings.of(settings, beside=("seeds", "swarm_of", "on_episode"))
-    if isinstance(player, str):
-        player = load_planner(player)
-    planner: Any = player
-    if not hasattr(player, "act"):
-        planner = as_planner(planner, swarm_of=swarm_of, **settings)
+    flies: Any = load_planner(planner) if isinstance(planner, str) else planner
+    if not hasattr(flies, "act"):
+        flies = as_planner(flies, swarm_of=swarm_of, **settings)
     episodes = []
     for seed in seeds:
         drawn = made.limited(source.draw(np.random.default_rng(seed)))
         flight = rollout(
             drawn,
-            planner,
+            flies,
             seed,
             dynamics=made.dynamics,
             return_mode=settings.get("return_mode"),

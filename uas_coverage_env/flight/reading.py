@@ -204,11 +204,12 @@ def _plan_array(text: str, scenario: Scenario) -> NDArray[np.void]:
     index = {uas.name: i for i, uas in enumerate(scenario.uas)}
 
     def point(row: list[str]) -> tuple[Any, ...]:
+        time_s, uas, n, *position_m = row
         return (
-            _step(row[0], scenario),
-            _chosen("uas", row[1], index),
-            _whole("n", row[2], _LONGEST_PLAN),
-            tuple(_number(value) for value in row[3:]),
+            _step(time_s, scenario),
+            _chosen("uas", uas, index),
+            _whole("n", n, _LONGEST_PLAN),
+            tuple(_number(value) for value in position_m),
         )
 
     return np.array(_each(_rows(text, PLAN_COLUMNS), point), dtype=PLAN_DTYPE)

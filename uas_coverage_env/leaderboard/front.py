@@ -86,7 +86,7 @@ def choices_of(
         bounds: See `bounds_of`.
     """
     done = [row for row in rows if row.accomplished and row.steps and row.energy_Wh]
-    done.sort(key=lambda row: (row.steps, row.energy_Wh, row.player))
+    done.sort(key=lambda row: (row.steps, row.energy_Wh, row.label))
     found, least_Wh = [], float("inf")
     for row in done:
         steps, energy_Wh = row.steps or 0, row.energy_Wh or 0.0
@@ -97,7 +97,7 @@ def choices_of(
                 settings,
                 row,
                 steps * dt_s,
-                flying.get(row.player),
+                flying.get(row.label),
                 bounds.get((row.scenario, steps)),
                 energy_Wh < least_Wh,
             )

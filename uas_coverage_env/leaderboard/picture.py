@@ -1,4 +1,4 @@
-"""The picture of a comparison: coverage and energy, a row per player, a dot per flight."""
+"""The picture of a comparison: coverage and energy, a row per planner, a dot per flight."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -18,13 +18,13 @@ _LONGEST_NAME = 26
 
 
 def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference: str) -> "Figure":
-    """Coverage on the left, energy on the right, players in the order of their scores.
+    """Coverage on the left, energy on the right, planners in the order of their scores.
 
     Energy is in percent of the reference's mean on the same scenario, so that small and large
     scenarios can stand in one picture; flights with a violation have none.
 
     Args:
-        scores: Of each player, best first.
+        scores: Of each planner, best first.
         rows: The flights.
         reference: Label of the planner that the others are compared with.
 
@@ -40,12 +40,12 @@ def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference:
         figure = Figure(figsize=size, layout="constrained")
         coverage, energy = figure.subplots(1, 2, sharey=True)
         for place, one in enumerate(scores):
-            covered = [100.0 * row.coverage for row in rows if row.player == one.player]
+            covered = [100.0 * row.coverage for row in rows if row.label == one.label]
             _draw(coverage, place, covered, one.mean_coverage_percent)
-            relative = _relative_energies(rows, one.player, reference)
+            relative = _relative_energies(rows, one.label, reference)
             _draw(energy, place, relative, one.relative_energy_percent)
         energy.axvline(100.0, color=shade(colours.FAINT), linewidth=0.8, linestyle=":", zorder=1)
-        coverage.set_yticks(range(len(scores)), [_short(one.player) for one in scores])
+        coverage.set_yticks(range(len(scores)), [_short(one.label) for one in scores])
         coverage.set_ylim(len(scores) - 0.5, -0.5)
         worst = min(one.worst_coverage_percent for one in scores)
         coverage.set_xlim(min(worst, 90.0) - 2.0, 102.0)
@@ -68,7 +68,7 @@ def picture(scores: Sequence[Scores], rows: Sequence[Row], reference: str) -> by
 
 
 def _draw(axes: "Axes", place: int, values: Sequence[float], found: Estimate) -> None:
-    """One player in one panel."""
+    """One planner in one panel."""
     from uas_coverage_env.replay.figures.style import shade
 
     heights = [place + _FIRST_LINE + _SPREAD * (k % _LINES) / _LINES for k in range(len(values))]
@@ -87,12 +87,12 @@ def _short(name: str) -> str:
     return name if len(name) <= _LONGEST_NAME else f"...{name[3 - _LONGEST_NAME :]}"
 
 
-def _relative_energies(rows: Sequence[Row], player: str, reference: str) -> list[float]:
-    """Energy of each flight of a player that counts, in percent."""
+def _relative_energies(rows: Sequence[Row], label: str, reference: str) -> list[float]:
+    """Energy of each flight of a planner that counts, in percent."""
     base: dict[str, list[float]] = {}
     for row in rows:
-        if row.player == reference and row.ranked and row.energy_Wh:
+        if row.label == reference and row.ranked and row.energy_Wh:
             base.setdefault(row.scenario, []).append(row.energy_Wh)
     mean = {scenario: sum(energies) / len(energies) for scenario, energies in base.items()}
-    mine = [row for row in rows if row.player == player and row.ranked and row.scenario in mean]
+    mine = [row for row in rows if row.label == label and row.ranked and row.scenario in mean]
     return [100.0 * (row.energy_Wh or 0.0) / mean[row.scenario] for row in mine]

@@ -16,7 +16,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.machine import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
-from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, FAILED, Row
+from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, FAILED, FORMER, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
 from uas_coverage_env.leaderboard.table import (
     effort_cells,
@@ -41,7 +41,7 @@ class Comparison:
         reference: Label of the planner that the others are compared with.
         command: The command line that made it.
         jobs: How it was flown, for people.
-        scores: Of each player, best first.
+        scores: Of each planner, best first.
     """
 
     rows: Sequence[Row]
@@ -117,6 +117,7 @@ def published(directory: Path) -> tuple[list[Row], str]:
     except (OSError, polars.exceptions.PolarsError) as error:
         raise InputError(f"{flights}: cannot be read ({error})") from error
     schema = _schema()
+    frame = frame.rename({old: new for new, old in FORMER.items()}, strict=False)
     frame = frame.with_columns(
         polars.lit(None, schema[name]).alias(name) for name in ADDED if name not in frame.columns
     )
@@ -132,7 +133,7 @@ def published(directory: Path) -> tuple[list[Row], str]:
         raise InputError(f"{flights}: was damaged ({error}); compare again") from error
     if not rows:
         raise InputError(f"{flights}: holds no flight")
-    if not isinstance(reference, str) or reference not in {row.player for row in rows}:
+    if not isinstance(reference, str) or reference not in {row.label for row in rows}:
         raise InputError(f"{table}: the reference {reference!r} has no flight in {flights.name}")
     return rows, reference
 
@@ -182,29 +183,29 @@ def _json(comparison: Comparison) -> str:
 
 def _markdown(comparison: Comparison) -> str:
     rows, reference = comparison.rows, comparison.reference
-    players = [one.player for one in comparison.scores]
+    labels = [one.label for one in comparison.scores]
     command, *circumstances = comparison.circumstances()
     parts = [f"`{command}`\n", *(f"{line}\n" for line in circumstances)]
     parts.append(markdown(outcome_cells(comparison.scores)))
     parts.append(markdown(effort_cells(comparison.scores)))
-    if len(players) > 1 and reference in players:
+    if len(labels) > 1 and reference in labels:
         parts.append(markdown(reference_cells(comparison.scores, reference)))
     parts += [f"{line}\n" for line in notes(rows, reference)]
     failed = [row for row in rows if row.status == FAILED]
     if failed:
         parts.append("".join(f"- {line}\n" for line in failures(failed)))
     parts.append("Energy and steps on each scenario, means of the accomplished flights:\n")
-    parts.append(markdown(scenarios_cells(rows, players)))
+    parts.append(markdown(scenarios_cells(rows, labels)))
     return "\n".join(parts)
 
 
 def failures(failed: Sequence[Row]) -> list[str]:
-    """Why flights failed, a line for each reason of each player."""
+    """Why flights failed, a line for each reason of each planner."""
     found: dict[tuple[str, str], list[Row]] = {}
     for row in failed:
-        found.setdefault((row.player, row.reason or ""), []).append(row)
+        found.setdefault((row.label, row.reason or ""), []).append(row)
     return [
-        f"{player} failed {len(rows)} {'flight' if len(rows) == 1 else 'flights'} "
+        f"{label} failed {len(rows)} {'flight' if len(rows) == 1 else 'flights'} "
         f"(first: {rows[0].scenario}, seed {rows[0].seed}): {reason}"
-        for (player, reason), rows in found.items()
+        for (label, reason), rows in found.items()
     ]

@@ -33,7 +33,7 @@ class Row:
         key: Hash of all that decides how the flight goes.
         scenario: Name of the scenario.
         scenario_sha256: Hash of the scenario.
-        player: Label of the player.
+        label: Of the planner with its options.
         planner: Name of the planner.
         options: Its options, as JSON.
         seed: The seed of the planner.
@@ -66,7 +66,7 @@ class Row:
     key: str
     scenario: str
     scenario_sha256: str
-    player: str
+    label: str
     planner: str
     options: str
     seed: int
@@ -185,15 +185,18 @@ COLUMNS = {field.name: get_args(field.type) or (field.type,) for field in fields
 ADDED = ("episode_return",)
 """Columns that older sweeps do not have; there, they are None."""
 
+FORMER = {"label": "player"}
+"""Columns that older sweeps have under another name."""
+
 
 def _identity(entry: Entry) -> dict[str, Any]:
     return {
         "key": entry.key,
         "scenario": entry.scenario.name,
         "scenario_sha256": entry.scenario_sha256,
-        "player": entry.player.label,
-        "planner": entry.player.planner,
-        "options": json.dumps(dict(entry.player.options), sort_keys=True),
+        "label": entry.spec.label,
+        "planner": entry.spec.planner,
+        "options": json.dumps(dict(entry.spec.options), sort_keys=True),
         "seed": entry.seed,
         "dynamics": entry.dynamics,
         "safety_filter": entry.safety_filter,

@@ -1,4 +1,4 @@
-"""The scenarios that players are compared on: sets by name, shipped scenarios, files, seeds."""
+"""The scenarios that planners are compared on: sets by name, shipped scenarios, files, seeds."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What the flights of a sweep say about each player: pure functions of the rows."""
+"""What the flights of a sweep say about each planner: pure functions of the rows."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -26,10 +26,10 @@ _MS_PER_S = 1000.0
 
 @dataclass(frozen=True)
 class Scores:
-    """One player. Energy is that of flights without a violation.
+    """One planner with its options. Energy is that of flights without a violation.
 
     Attributes:
-        player: Label.
+        label: Its label.
         flights: How many rows, failed ones included.
         failed: Flights that there are none of: refused, or crashed.
         accomplished: Flights in which everything was covered, all UAS home, nothing touched.
@@ -61,7 +61,7 @@ class Scores:
             default; over all flights that there are, violating ones included.
     """
 
-    player: str
+    label: str
     flights: int
     failed: int
     accomplished: int
@@ -108,7 +108,7 @@ def drawn_anew(rows: Sequence[Row]) -> Over:
 def scores_of(
     rows: Sequence[Row], reference: str, bounds: Bounds = MappingProxyType({})
 ) -> list[Scores]:
-    """The scores of every player, best first.
+    """The scores of every planner, best first.
 
     More flights accomplished come first, then more coverage, then less energy.
 
@@ -120,8 +120,8 @@ def scores_of(
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
     over = drawn_anew(rows)
     tables = {
-        label: _by_scenario([row for row in rows if row.player == label], scenarios)
-        for label in dict.fromkeys(row.player for row in rows)
+        label: _by_scenario([row for row in rows if row.label == label], scenarios)
+        for label in dict.fromkeys(row.label for row in rows)
     }
     theirs = tables.get(reference, [[] for _ in scenarios])
     found = [_scores(label, mine, theirs, over, bounds) for label, mine in tables.items()]
@@ -134,7 +134,7 @@ def _place(scores: Scores) -> tuple[Any, ...]:
         -scores.accomplished / scores.flights,
         -(scores.mean_coverage_percent.value or 0.0),
         np.inf if energy is None else energy,
-        scores.player,
+        scores.label,
     )
 
 
@@ -150,7 +150,7 @@ def _scores(
     compared: Over = "scenarios" if len(mine) > 1 else "seeds"
     coverage = _values(mine, lambda row: _PERCENT * row.coverage)
     return Scores(
-        player=label,
+        label=label,
         flights=len(rows),
         failed=sum(row.status != FLOWN for row in rows),
         accomplished=sum(row.accomplished for row in rows),

@@ -2,7 +2,7 @@
 
 After R. Agarwal et al., "Deep reinforcement learning at the edge of the statistical precipice"
 (NeurIPS 2021): a few flights per scenario are summed up by the interquartile mean over all of
-them, with a 95 % percentile interval of a bootstrap, and players are compared by the probability
+them, with a 95 % percentile interval of a bootstrap, and planners are compared by the probability
 that one does better.
 
 What is measured comes as one array per scenario, its flights along the axis. Two intervals answer

@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, Row
+from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, FORMER, Row
 from uas_coverage_env.leaderboard.sweep import difference
 
 STORE = "flights.sqlite"
@@ -56,10 +56,10 @@ class Store:
 
     def rows(self) -> list[Row]:
         """All flights, in an order that does not depend on when they were flown."""
-        lacking = _lacking(self._connection)
-        columns = ", ".join("NULL" if name in lacking else name for name in COLUMNS)
+        there = _there(self._connection)
+        columns = ", ".join(_as_stored(name, there) for name in COLUMNS)
         found = self._connection.execute(
-            f"SELECT {columns} FROM flights ORDER BY scenario, player, seed, key"
+            f"SELECT {columns} FROM flights ORDER BY scenario, label, seed, key"
         )
         try:
             return [Row.checked(dict(zip(COLUMNS, values, strict=True))) for values in found]
@@ -75,6 +75,8 @@ class Store:
             description = None
         if not isinstance(description, dict):
             raise sqlite3.DatabaseError("what it says of its sweep cannot be read")
+        if "players" in description:  # as older versions wrote it
+            description["planners"] = description.pop("players")
         return description
 
     def begin(self, description: Mapping[str, Any]) -> None:
@@ -193,8 +195,13 @@ def _connection(path: Path) -> sqlite3.Connection:
                 connection.execute(f"PRAGMA user_version = {_SCHEMA_VERSION}")
         elif version != _SCHEMA_VERSION:
             raise sqlite3.DatabaseError(f"its schema is {version}, this is {_SCHEMA_VERSION}")
-        for name in _lacking(connection):
-            connection.execute(f"ALTER TABLE flights ADD COLUMN {_column(name)}")
+        there = _there(connection)
+        for name, former in FORMER.items():
+            if former in there:
+                connection.execute(f"ALTER TABLE flights RENAME COLUMN {former} TO {name}")
+        for name in ADDED:
+            if name not in there:
+                connection.execute(f"ALTER TABLE flights ADD COLUMN {_column(name)}")
         (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if verdict != "ok":
             raise sqlite3.DatabaseError(" ".join(verdict.split()))
@@ -212,10 +219,16 @@ def _column(name: str) -> str:
     return f"{name} {_SQL_TYPES[kind]}{'' if optional else ' NOT NULL'}{key}"
 
 
-def _lacking(connection: sqlite3.Connection) -> list[str]:
-    """The columns that the store of an older version does not have."""
-    there = {name for _, name, *_ in connection.execute("PRAGMA table_info(flights)")}
-    return [name for name in ADDED if name not in there]
+def _there(connection: sqlite3.Connection) -> set[str]:
+    """The columns that a store has, of this version or an older one."""
+    return {name for _, name, *_ in connection.execute("PRAGMA table_info(flights)")}
+
+
+def _as_stored(name: str, there: set[str]) -> str:
+    """A column of ours in a query."""
+    if FORMER.get(name) in there:
+        return f"{FORMER[name]} AS {name}"
+    return name if name in there or name not in ADDED else "NULL"
 
 
 def _remove(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The list of flights to fly: scenarios x players x seeds, each known by what it is."""
+"""The list of flights to fly: scenarios x planners x seeds, each known by what it is."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Entry:
         key: Hash of all that decides how the flight goes.
         scenario_sha256: Hash of the scenario.
         scenario: On what it is flown.
-        player: The planner with its options.
+        spec: The planner with its options.
         seed: The seed of the planner.
         dynamics: `lpv` or `nonlinear`.
         safety_filter: Whether the filter is on, whatever the planner asks for.
@@ -32,7 +32,7 @@ class Entry:
     key: str
     scenario_sha256: str
     scenario: Scenario
-    player: PlannerSpec
+    spec: PlannerSpec
     seed: int
     dynamics: Dynamics
     safety_filter: bool
@@ -44,14 +44,14 @@ class Sweep:
 
     Attributes:
         scenarios: By name.
-        players: By label.
+        planners: By label.
         seeds: Of the planners.
         dynamics: `lpv` or `nonlinear`.
         safety_filter: Whether the filter is on for all UAS.
     """
 
     scenarios: Mapping[str, Scenario]
-    players: Mapping[str, PlannerSpec]
+    planners: Mapping[str, PlannerSpec]
     seeds: range
     dynamics: Dynamics = "lpv"
     safety_filter: bool = False
@@ -59,24 +59,24 @@ class Sweep:
     @property
     def size(self) -> int:
         """Number of flights."""
-        return len(self.seeds) * len(self.scenarios) * len(self.players)
+        return len(self.seeds) * len(self.scenarios) * len(self.planners)
 
     def entries(self) -> Iterator[Entry]:
         """Every flight; seed by seed, so that a sweep under way compares like with like."""
         common = self._common()
         for seed in self.seeds:
             for name, scenario in self.scenarios.items():
-                for label, player in self.players.items():
+                for label, spec in self.planners.items():
                     # the label too: two labels of one planner are two rows
                     content = {
-                        **{"label": label, **player.identity(), **common},
+                        **{"label": label, **spec.identity(), **common},
                         **{"scenario": self._scenario_hashes[name], "seed": seed},
                     }
                     yield Entry(
                         content_hash(content),
                         self._scenario_hashes[name],
                         scenario,
-                        player,
+                        spec,
                         seed,
                         self.dynamics,
                         self.safety_filter,
@@ -88,7 +88,7 @@ class Sweep:
             **self._common(),
             "seeds": f"{self.seeds.start}:{self.seeds.stop}",
             "scenarios": dict(self._scenario_hashes),
-            "players": {label: player.identity() for label, player in self.players.items()},
+            "planners": {label: spec.identity() for label, spec in self.planners.items()},
         }
 
     def _common(self) -> dict[str, Any]:
@@ -103,13 +103,13 @@ class Sweep:
         return {name: scenario_hash(scenario) for name, scenario in self.scenarios.items()}
 
 
-def source_of(players: Iterable[PlannerSpec]) -> str:
-    """Hash of the source code that flies: the world's and the players'.
+def source_of(planners: Iterable[PlannerSpec]) -> str:
+    """Hash of the source code that flies: the world's and the planners'.
 
     It is kept with each flight but is not part of its key: a comment that changes should not
     undo a sweep. The table says where flights of several sources stand in it.
     """
-    return source_hash(["uas_coverage_env", *(player.package for player in players)])
+    return source_hash(["uas_coverage_env", *(spec.package for spec in planners)])
 
 
 def difference(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> str:

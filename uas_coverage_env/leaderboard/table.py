@@ -21,7 +21,7 @@ def outcome_cells(scores: Sequence[Scores]) -> Cells:
     ]
     return headings, [
         [
-            one.player,
+            one.label,
             f"{one.flights} ({one.failed} failed)" if one.failed else str(one.flights),
             f"{one.accomplished}/{one.flights}",
             _text(one.coverage_percent, ".1f"),
@@ -45,7 +45,7 @@ def effort_cells(scores: Sequence[Scores]) -> Cells:
     ]
     return headings, [
         [
-            one.player,
+            one.label,
             _text(one.energy_Wh, ".2f"),
             _text(one.above_bound_percent, ".1f"),
             _text(one.Wh_per_percent, ".3f"),
@@ -65,7 +65,7 @@ def reference_cells(scores: Sequence[Scores], reference: str) -> Cells:
     ]
     return headings, [
         [
-            one.player,
+            one.label,
             str(one.energy_difference_percent.n),
             _text(one.energy_difference_percent, "+.1f"),
             _text(one.steps_difference_percent, "+.1f"),
@@ -74,20 +74,20 @@ def reference_cells(scores: Sequence[Scores], reference: str) -> Cells:
             _text(one.relative_energy_percent, ".1f"),
         ]
         for one in scores
-        if one.player != reference
+        if one.label != reference
     ]
 
 
-def scenarios_cells(rows: Sequence[Row], players: Sequence[str]) -> Cells:
+def scenarios_cells(rows: Sequence[Row], labels: Sequence[str]) -> Cells:
     """Means per scenario: energy and steps of the flights that accomplished the mission."""
     table = []
     for name in dict.fromkeys(row.scenario for row in rows):
         cells = [name]
-        for player in players:
-            mine = [row for row in rows if (row.scenario, row.player) == (name, player)]
+        for label in labels:
+            mine = [row for row in rows if (row.scenario, row.label) == (name, label)]
             cells.append(_scenario_cell(mine))
         table.append(cells)
-    return ["scenario", *players], table
+    return ["scenario", *labels], table
 
 
 def notes(rows: Sequence[Row], reference: str) -> list[str]:

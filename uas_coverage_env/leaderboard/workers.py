@@ -87,17 +87,17 @@ def fly_all(
 def kept_as(row: Row | Entry) -> str:
     """The name of a flight's directory where flights are kept."""
     if isinstance(row, Entry):
-        return f"{row.scenario.name}-{row.player.label}-{row.seed}"
-    return f"{row.scenario}-{row.player}-{row.seed}"
+        return f"{row.scenario.name}-{row.spec.label}-{row.seed}"
+    return f"{row.scenario}-{row.label}-{row.seed}"
 
 
 def fly(entry: Entry, source_sha256: str, keep: Path | None = None) -> Row | None:
     """Fly one flight; None: it was stopped by hand."""
-    player = entry.player
+    spec = entry.spec
     try:
-        planner = load_planner(player.planner, player.options)
-        if getattr(planner, "fingerprint", "") != player.fingerprint:
-            raise InputError(f"{player.label}: its files have changed since the sweep has begun")
+        planner = load_planner(spec.planner, spec.options)
+        if getattr(planner, "fingerprint", "") != spec.fingerprint:
+            raise InputError(f"{spec.label}: its files have changed since the sweep has begun")
         flight = rollout(
             entry.scenario,
             planner,

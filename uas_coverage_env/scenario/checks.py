@@ -48,8 +48,8 @@ def problems(scenario: UncheckedScenario) -> list[str]:
 def warnings(scenario: UncheckedScenario) -> list[str]:
     """What is allowed but probably not meant; one line each."""
     return [
-        *_waypoints_nobody_covers(scenario),
-        *_nobody_flies_again(scenario),
+        *_waypoints_no_uas_covers(scenario),
+        *_no_uas_flies_again(scenario),
         *_waypoints_out_of_reach(scenario),
         *_mission_too_long(scenario),
     ]
@@ -206,7 +206,7 @@ def _asked_again(scenario: UncheckedScenario) -> Iterator[str]:
         )
 
 
-def _nobody_flies_again(scenario: UncheckedScenario) -> Iterator[str]:
+def _no_uas_flies_again(scenario: UncheckedScenario) -> Iterator[str]:
     if scenario.asks_again and not scenario.relaunch and not scenario.sorties:
         index = next(w for w, waypoint in enumerate(scenario.waypoints) if waypoint.again_after_s)
         yield (
@@ -241,13 +241,13 @@ def _scene(scenario: UncheckedScenario) -> list[str]:
     ]
 
 
-def _waypoints_nobody_covers(scenario: UncheckedScenario) -> Iterator[str]:
+def _waypoints_no_uas_covers(scenario: UncheckedScenario) -> Iterator[str]:
     """One line for each sensor that is asked for and nowhere carried."""
-    nobody = ~scenario.can_cover.any(axis=0)
+    uncarried = ~scenario.can_cover.any(axis=0)
     carried = sorted({sensor.name for uas in scenario.uas for sensor in uas.sensors})
     wanted = [waypoint.sensor or "" for waypoint in scenario.waypoints]
-    for name in dict.fromkeys(wanted[index] for index in np.flatnonzero(nobody)):
-        indices = [index for index in np.flatnonzero(nobody) if wanted[index] == name]
+    for name in dict.fromkeys(wanted[index] for index in np.flatnonzero(uncarried)):
+        indices = [index for index in np.flatnonzero(uncarried) if wanted[index] == name]
         more = f" (+{len(indices) - 1} more)" if len(indices) > 1 else ""
         instead = did_you_mean(name, carried, f"they carry {', '.join(carried) or 'no sensor'}")
         yield (

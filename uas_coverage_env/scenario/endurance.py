@@ -1,4 +1,4 @@
-"""Do the batteries suffice? A rough plan that anybody could fly: back and forth, row by row.
+"""Do the batteries suffice? A rough plan that any fleet could fly: back and forth, row by row.
 
 The plan bounds from above what a mission takes: a sensible planner needs less. Legs that an
 obstacle blocks are flown over the top of it.

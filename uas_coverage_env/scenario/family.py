@@ -21,7 +21,7 @@ N_UAS, N_WAYPOINTS, N_OBSTACLES = (1, 4), (20, 60), (5, 20)
 MIN_HEIGHT_M = 3.0
 """The least height of the benchmarks, of the family and of the leaderboard's sets [m]."""
 
-# above the seeds of every set that players are compared on: nothing is trained on those
+# above the seeds of every set that planners are compared on: nothing is trained on those
 _SEEDS = (2**31, 2**32)
 
 

@@ -66,7 +66,7 @@ def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
 
 
 def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmState:
-    """What players see of a mission, in arrays of their own.
+    """What planners see of a mission, in arrays of their own.
 
     Args:
         scenario: As it is now.
@@ -338,5 +338,5 @@ class World:
         return int(self.state.step[0]) * self.scenario.dt_s
 
     def swarm_state(self) -> SwarmState:
-        """What players see now, in arrays of their own."""
+        """What planners see now, in arrays of their own."""
         return swarm_state(self.known, self.arena, self.state)

@@ -25,16 +25,16 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.flight import Episode, Planner, Policy, as_planner, evaluate, load_planner
+from uas_coverage_env.flight import Episode, Planner, Policy, as_planner, evaluate
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.tasks.levels import level_named
 from uas_coverage_env.tasks.task import Task, seeds_of
 
 RANDOM = "random"
-"""The player that draws each action uniformly from the action space of the level."""
+"""The policy that draws each action uniformly from the action space of the level."""
 
-Player = str | Planner | Policy
+Entry = str | Planner | Policy
 """A name (of a planner, or `random`), a planner, or a function from observation to action."""
 
 
@@ -45,19 +45,19 @@ class Anchors:
     Attributes:
         random: Mean value of the random policy: score 0.
         best: Mean value of the best planner: score 1.
-        best_player: Which planner that is.
+        best_planner: Which planner that is.
         missions: Of how many test missions these are means.
     """
 
     random: float
     best: float
-    best_player: str
+    best_planner: str
     missions: int
 
 
 @dataclass(frozen=True)
 class MissionScore:
-    """One mission of a player.
+    """One mission of a planner.
 
     Attributes:
         seed: Of the mission.
@@ -84,7 +84,7 @@ class MissionScore:
 
 @dataclass(frozen=True)
 class Score:
-    """A player on a level, summed up over missions.
+    """A planner on a level, summed up over missions.
 
     Attributes:
         level: Which.
@@ -126,7 +126,7 @@ def anchors_of(level: str) -> Anchors | None:
 
 
 def score(
-    player: Player,
+    planner: Entry,
     level: str,
     *,
     missions: int = 20,
@@ -139,7 +139,7 @@ def score(
     """Fly the first missions of a split and score them.
 
     Args:
-        player: `random`, the name of a planner, a planner, or a policy. Planners fly with the
+        planner: `random`, the name of a planner, a planner, or a policy. Planners fly with the
             assistants of the level, whatever they ask for.
         level: Its name.
         missions: How many.
@@ -163,7 +163,7 @@ def score(
     for seed in seeds[:missions]:
         mission = before.get(seed)
         if mission is None:
-            mission = _flown(player, task, seed, swarm_of, chosen)
+            mission = _flown(planner, task, seed, swarm_of, chosen)
             if on_mission is not None:
                 on_mission(mission)
         flown.append(mission)
@@ -171,7 +171,7 @@ def score(
 
 
 def scored(level: str, missions: Sequence[MissionScore]) -> Score:
-    """Missions of a player, summed up."""
+    """Missions of a planner, summed up."""
     anchors = anchors_of(level)
     values = np.array([mission.value for mission in missions])
     if anchors is None or not anchors.best > anchors.random:
@@ -187,12 +187,12 @@ def as_row(mission: MissionScore) -> dict[str, Any]:
 
 
 def _flown(
-    player: Player, task: Task, seed: int, swarm_of: int | None, chosen: Mapping[str, Any]
+    planner: Entry, task: Task, seed: int, swarm_of: int | None, chosen: Mapping[str, Any]
 ) -> MissionScore:
     scenario = task.scenario(seed)
     settings = task.settings(**chosen)
-    flies: Any = load_planner(player) if isinstance(player, str) and player != RANDOM else player
-    if player == RANDOM:
+    flies = planner
+    if planner == RANDOM:
         space = actions_of(task.action, scenario).space()
         space.seed(seed)
         flies = as_planner(lambda seen: space.sample(), **settings)

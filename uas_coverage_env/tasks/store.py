@@ -14,7 +14,7 @@ from uas_coverage_env.tasks.scoring import MissionScore
 
 FILE = "scores.jsonl"
 
-_HEAD = ("level", "player", "scenario_sha256")
+_HEAD = ("level", "planner", "scenario_sha256")
 
 
 class ScoreStore:
@@ -39,22 +39,22 @@ class ScoreStore:
         # of a line that a kill has cut short
         self._torn_at = len((whole + newline).encode()) if rest else None
         for number, line in enumerate(whole.split("\n") if whole else (), start=1):
-            level, player, mission = _read(line, f"{self.path}, line {number}")
-            self._missions.setdefault((level, player), []).append(mission)
+            level, planner, mission = _read(line, f"{self.path}, line {number}")
+            self._missions.setdefault((level, planner), []).append(mission)
 
-    def missions(self, level: str, player: str) -> tuple[MissionScore, ...]:
-        """What was flown of a player on a level."""
-        return tuple(self._missions.get((level, player), ()))
+    def missions(self, level: str, planner: str) -> tuple[MissionScore, ...]:
+        """What was flown of a planner on a level."""
+        return tuple(self._missions.get((level, planner), ()))
 
-    def players(self, level: str) -> tuple[str, ...]:
-        """Names of the players that have flown on a level."""
-        return tuple(player for name, player in self._missions if name == level)
+    def planners(self, level: str) -> tuple[str, ...]:
+        """Names of the planners that have flown on a level."""
+        return tuple(planner for name, planner in self._missions if name == level)
 
-    def add(self, level: str, player: str, mission: MissionScore) -> None:
+    def add(self, level: str, planner: str, mission: MissionScore) -> None:
         """Keep a mission."""
-        self._missions.setdefault((level, player), []).append(mission)
+        self._missions.setdefault((level, planner), []).append(mission)
         sha256 = _sha256(level, mission.seed)
-        row = {**dict(zip(_HEAD, (level, player, sha256), strict=True)), **asdict(mission)}
+        row = {**dict(zip(_HEAD, (level, planner, sha256), strict=True)), **asdict(mission)}
         if self._torn_at is not None:
             os.truncate(self.path, self._torn_at)
             self._torn_at = None
@@ -75,16 +75,18 @@ def _read(line: str, place: str) -> tuple[str, str, MissionScore]:
         row = json.loads(line)
     except ValueError:
         row = None
+    if isinstance(row, dict) and "player" in row:  # as versions before wrote it
+        row = {"planner": row.pop("player"), **row}
     if not isinstance(row, dict) or set(row) != set(wanted):
         raise InputError(f"{place}: is no scored mission; give another --out")
     for name, kind in wanted.items():
         if type(row[name]) is not kind:
             raise InputError(f"{place}: {name} is {row[name]!r}; give another --out")
-    level, player, sha256 = (row.pop(name) for name in _HEAD)
+    level, planner, sha256 = (row.pop(name) for name in _HEAD)
     if level not in LEVELS:
         raise InputError(f"{place}: level is {level[:40]!r}; there are {', '.join(LEVELS)}")
     if _sha256(level, row["seed"]) != sha256:
         raise InputError(
             f"{place}: mission {row['seed']} of {level} is another one now; give another --out"
         )
-    return level, player, MissionScore(**row)
+    return level, planner, MissionScore(**row)

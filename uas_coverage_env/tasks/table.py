@@ -6,17 +6,17 @@ from uas_coverage_env.leaderboard.statistics import Estimate
 from uas_coverage_env.tasks.scoring import Score
 
 HEADER = (
-    "player", "score [95 %]", "value", "covered, %", "lost or not home", "energy, %", "return",
+    "planner", "score [95 %]", "value", "covered, %", "lost or not home", "energy, %", "return",
     "missions",
 )  # fmt: skip
 
 
 def cells(scores: Mapping[str, Score]) -> list[tuple[str, ...]]:
-    """A row for each player, the best mean value first."""
+    """A row for each planner, the best mean value first."""
     ordered = sorted(scores.items(), key=lambda item: -item[1].mean("value"))
     return [
         (
-            player,
+            planner,
             _shown(score.score),
             f"{score.mean('value'):.3f}",
             f"{100.0 * score.mean('coverage'):.1f}",
@@ -25,7 +25,7 @@ def cells(scores: Mapping[str, Score]) -> list[tuple[str, ...]]:
             f"{score.mean('episode_return'):.1f}",
             f"{len(score.missions)}",
         )
-        for player, score in ordered
+        for planner, score in ordered
     ]
 
 

@@ -10,7 +10,7 @@ models' translation is linear in it. Of the power, it has no part in this step.
 """
 
 from uas_coverage_env.compiled.kernels import inlined_kernel
-from uas_coverage_env.vehicle.layout import VX, VZ, X, Z
+from uas_coverage_env.vehicle.layout import POSITION, SPEED, VX, VZ, X, Z
 
 
 @inlined_kernel
@@ -44,8 +44,8 @@ def push(vehicle, x, force_N):
         force_N: (3,) NED [N].
     """
     for axis in range(2):
-        x[X + axis] += vehicle.horizontal_force_B[0] * force_N[axis]
-        x[VX + axis] += vehicle.horizontal_force_B[1] * force_N[axis]
+        x[X + axis] += vehicle.horizontal_force_B[POSITION] * force_N[axis]
+        x[VX + axis] += vehicle.horizontal_force_B[SPEED] * force_N[axis]
     # lift is a force, too, but it acts upward
-    x[Z] -= vehicle.vertical_B[0] * force_N[2]
-    x[VZ] -= vehicle.vertical_B[1] * force_N[2]
+    x[Z] -= vehicle.vertical_B[POSITION] * force_N[2]
+    x[VZ] -= vehicle.vertical_B[SPEED] * force_N[2]

@@ -5,7 +5,12 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
-from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.governor import (
+    N_ROW_COLUMNS,
+    ORDER,
+    design_velocity_loop,
+    horizontal_axis,
+)
 from uas_coverage_env.vehicle.layout import LIFT, VX, VZ, X, Z
 from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
@@ -17,6 +22,10 @@ GOVERNOR_BLOCK = 8
 """So many governor rows are looked at together."""
 
 MAX_MOTORS = 32
+OF_THRUST, OF_ROLL, OF_PITCH, OF_YAW = range(4)
+"""Columns of the mixer: of the thrust, and of the torques about the three axes."""
+
+N_MIXED = OF_YAW + 1
 PHYSICAL_SIDES = 8
 """H_P, the sides of the polygons that stand for norms in the thrust correction."""
 
@@ -84,11 +93,11 @@ VEHICLE_DTYPE = np.dtype(
                 ("gain", _f8, (3,)),
                 ("n_governor_rows", _i8),
                 # row by row side by side, so that a processor takes several at a time; zero beyond
-                ("governor_rows", _f8, (5, MAX_GOVERNOR_ROWS)),
+                ("governor_rows", _f8, (N_ROW_COLUMNS, MAX_GOVERNOR_ROWS)),
                 # nonlinear plant
                 ("n_motors", _i8),
                 # motor thrusts from (thrust, torques), and torques from each motor's thrust
-                ("mixer", _f8, (MAX_MOTORS, 4)),
+                ("mixer", _f8, (MAX_MOTORS, N_MIXED)),
                 ("rotor_map", _f8, (MAX_MOTORS, 3)),
                 ("drag_kgps", _f8),
                 ("drag_vertical_kgps", _f8),

@@ -17,7 +17,9 @@ from uas_coverage_env.vehicle.layout import (
     LIFT,
     N_STATES,
     PHI,
+    POSITION,
     PSI,
+    SPEED,
     TAU_X,
     TAU_Y,
     TAU_Z,
@@ -164,8 +166,8 @@ def _fly_kinematics(vehicle, deviation, x, u):
     x[Z] = z + series[1] * vz - series[2] * up / mass
     x[VZ] = series[0] * vz - series[1] * up / mass
     alpha = u[TAU_Z] / inertia[2]
-    x[PSI] += vehicle.dt_s * x[WZ] + vehicle.yaw_B[0] * alpha
-    x[WZ] += vehicle.yaw_B[1] * alpha
+    x[PSI] += vehicle.dt_s * x[WZ] + vehicle.yaw_B[POSITION] * alpha
+    x[WZ] += vehicle.yaw_B[SPEED] * alpha
 
 
 @inlined_kernel

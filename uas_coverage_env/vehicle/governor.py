@@ -23,6 +23,11 @@ FloatArray = NDArray[np.float64]
 ORDER = 4
 """N_dis of the compiled vehicle."""
 
+ON_SPEED, ON_TILT, ON_RATE, ON_REFERENCE, BOUND = range(5)
+"""Columns of a governor row, see `VelocityLoop`; the first three are also those of the gain."""
+
+N_ROW_COLUMNS = BOUND + 1
+
 _TORQUE_COST = 30.0  # settles 12 m/s in about 7 s, near the time optimum
 _REFERENCE_SHARE = 0.999  # of the speed limit: a bound that is only approached is certified
 _SETTLED_S = 10.0
@@ -33,8 +38,9 @@ _IMPLIED = 1.0 - 1e-6  # the linear programs are exact to 1e-7
 class VelocityLoop(NamedTuple):
     """Angular acceleration = -gain · (v - r, tilt - trim r, rate) for a governed reference r.
 
-    A row (a_v, a_tilt, a_rate, b, bound) says that a · (v, tilt, rate) + b r, a quantity of one of
-    the coming steps while r is held, stays within its bound.
+    A row (a_v, a_tilt, a_rate, b, bound), in the order of `ON_SPEED` and the names beside it, says
+    that a · (v, tilt, rate) + b r, a quantity of one of the coming steps while r is held, stays
+    within its bound.
     """
 
     gain: FloatArray
@@ -119,9 +125,9 @@ def _predicted(
 
 def _is_implied(row: FloatArray, known: FloatArray) -> bool:
     """Whether the known rows alone keep |a · s + b r| within its bound, by a linear program."""
-    scaled = known[:, :4] / known[:, 4:]
+    scaled = known[:, :BOUND] / known[:, BOUND:]
     result = linprog(
-        -row[:4] / row[4],
+        -row[:BOUND] / row[BOUND],
         A_ub=np.vstack([scaled, -scaled]),
         b_ub=np.ones(2 * len(scaled)),
         bounds=(None, None),

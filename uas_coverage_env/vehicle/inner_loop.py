@@ -16,10 +16,13 @@ import math
 
 from uas_coverage_env.compiled.kernels import kernel, rare_kernel
 from uas_coverage_env.vehicle.compiled import GOVERNOR_BLOCK
+from uas_coverage_env.vehicle.governor import BOUND, ON_RATE, ON_REFERENCE, ON_SPEED, ON_TILT
 from uas_coverage_env.vehicle.layout import (
     LIFT,
     PHI,
+    POSITION,
     PSI,
+    SPEED,
     TAU_X,
     TAU_Y,
     TAU_Z,
@@ -66,13 +69,13 @@ def reseed_reference(vehicle, x, reference):
         moved = False
         for q in range(vehicle.n_governor_rows):
             # tilt and rate forward along north are negative pitch and pitch rate
-            n = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
-            n += rows[3, q] * reference[0]
-            e = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
-            e += rows[3, q] * reference[1]
+            n = rows[ON_SPEED, q] * x[VX] - rows[ON_TILT, q] * x[THETA] - rows[ON_RATE, q] * x[WY]
+            n += rows[ON_REFERENCE, q] * reference[0]
+            e = rows[ON_SPEED, q] * x[VY] + rows[ON_TILT, q] * x[PHI] + rows[ON_RATE, q] * x[WX]
+            e += rows[ON_REFERENCE, q] * reference[1]
             length = math.sqrt(n * n + e * e)
-            if length > rows[4, q] and abs(rows[3, q]) > _TINY:
-                back = (_INSIDE * rows[4, q] / length - 1.0) / rows[3, q]
+            if length > rows[BOUND, q] and abs(rows[ON_REFERENCE, q]) > _TINY:
+                back = (_INSIDE * rows[BOUND, q] / length - 1.0) / rows[ON_REFERENCE, q]
                 reference[0] += back * n
                 reference[1] += back * e
                 moved = True
@@ -101,13 +104,13 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
     rows = vehicle.governor_rows
     for q in range(vehicle.n_governor_rows):
         # tilt and rate forward along north are negative pitch and pitch rate
-        n0 = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
-        n0 += rows[3, q] * reference[0]
-        e0 = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
-        e0 += rows[3, q] * reference[1]
-        n1 = rows[3, q] * dn
-        e1 = rows[3, q] * de
-        bound = rows[4, q] * rows[4, q]
+        n0 = rows[ON_SPEED, q] * x[VX] - rows[ON_TILT, q] * x[THETA] - rows[ON_RATE, q] * x[WY]
+        n0 += rows[ON_REFERENCE, q] * reference[0]
+        e0 = rows[ON_SPEED, q] * x[VY] + rows[ON_TILT, q] * x[PHI] + rows[ON_RATE, q] * x[WX]
+        e0 += rows[ON_REFERENCE, q] * reference[1]
+        n1 = rows[ON_REFERENCE, q] * dn
+        e1 = rows[ON_REFERENCE, q] * de
+        bound = rows[BOUND, q] * rows[BOUND, q]
         n = n0 + share * n1
         e = e0 + share * e1
         if n * n + e * e > bound:
@@ -120,7 +123,7 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
                 c = min(c, 0.0)
             if a < _TINY:
                 return
-            # Beyond a bound, where a wrench of the player's own led, the reference moves on as far
+            # Beyond a bound, where a commanded wrench led, the reference moves on as far
             # as that leads back: inside by the larger root, or to where the line is nearest.
             share = min(share, (-b + math.sqrt(max(b * b - a * c, 0.0))) / a)
             if share <= 0.0:
@@ -134,11 +137,11 @@ def _track(vehicle, x, reference, u):
     """Roll and pitch torques that track the reference."""
     k = vehicle.gain
     trim = vehicle.trim_rad_per_mps
-    north = -k[0] * (x[VX] - reference[0]) - k[1] * (-x[THETA] - trim * reference[0])
-    north += k[2] * x[WY]
-    east = -k[0] * (x[VY] - reference[1]) - k[1] * (x[PHI] - trim * reference[1])
-    east -= k[2] * x[WX]
-    # never active on a governed flight: it is for states that a player's wrench led to
+    north = -k[ON_SPEED] * (x[VX] - reference[0]) - k[ON_TILT] * (-x[THETA] - trim * reference[0])
+    north += k[ON_RATE] * x[WY]
+    east = -k[ON_SPEED] * (x[VY] - reference[1]) - k[ON_TILT] * (x[PHI] - trim * reference[1])
+    east -= k[ON_RATE] * x[WX]
+    # never active on a governed flight: it is for states that a commanded wrench led to
     share = _within_limit(north, east, vehicle.alpha_xy_max_radps2)
     u[TAU_X] = vehicle.inertia_kgm2[0] * share * east
     u[TAU_Y] = -vehicle.inertia_kgm2[1] * share * north
@@ -179,11 +182,11 @@ def _far_outside(vehicle, x, reference):
     # are zero
     n_rows = (vehicle.n_governor_rows + GOVERNOR_BLOCK - 1) & _BLOCKS
     for q in range(n_rows):
-        n = rows[0, q] * x[VX] - rows[1, q] * x[THETA] - rows[2, q] * x[WY]
-        n += rows[3, q] * reference[0]
-        e = rows[0, q] * x[VY] + rows[1, q] * x[PHI] + rows[2, q] * x[WX]
-        e += rows[3, q] * reference[1]
-        bound = _FAR_OUTSIDE * rows[4, q]
+        n = rows[ON_SPEED, q] * x[VX] - rows[ON_TILT, q] * x[THETA] - rows[ON_RATE, q] * x[WY]
+        n += rows[ON_REFERENCE, q] * reference[0]
+        e = rows[ON_SPEED, q] * x[VY] + rows[ON_TILT, q] * x[PHI] + rows[ON_RATE, q] * x[WX]
+        e += rows[ON_REFERENCE, q] * reference[1]
+        bound = _FAR_OUTSIDE * rows[BOUND, q]
         outside |= n * n + e * e > bound * bound
     return outside
 
@@ -257,7 +260,7 @@ def face_course(vehicle, x, u):
 def _lift_towards(vehicle, x, down_mps, u):
     """Lift that reaches a vertical speed in one step, or as nearly as its limits allow."""
     down = min(max(down_mps, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
-    needed = (down - vehicle.vertical_A[1, 1] * x[VZ]) / vehicle.vertical_B[1]
+    needed = (down - vehicle.vertical_A[SPEED, SPEED] * x[VZ]) / vehicle.vertical_B[SPEED]
     u[LIFT] = min(max(needed, vehicle.lift_min_N), vehicle.lift_max_N)
 
 
@@ -292,14 +295,15 @@ def velocity_wrench(vehicle, x, reference, north_mps, east_mps, altitude_m, u):
     The altitude is approached as fast as the limits allow and is not overshot where a stop at it
     is possible. Arguments as for `velocity_climb_wrench`.
     """
-    per_next_speed = vehicle.vertical_B[0] / vehicle.vertical_B[1]
-    per_speed = vehicle.vertical_A[0, 1] - per_next_speed * vehicle.vertical_A[1, 1]
+    A, B = vehicle.vertical_A, vehicle.vertical_B
+    per_next_speed = B[POSITION] / B[SPEED]
+    per_speed = A[POSITION, SPEED] - per_next_speed * A[SPEED, SPEED]
     way = -altitude_m - x[Z]
     if way > 0.0:
-        brake = -vehicle.vertical_B[1] * vehicle.lift_max_N
+        brake = -vehicle.vertical_B[SPEED] * vehicle.lift_max_N
         down = _speed_towards(way, x[VZ], per_speed, per_next_speed, brake)
     else:
-        brake = vehicle.vertical_B[1] * vehicle.lift_min_N
+        brake = vehicle.vertical_B[SPEED] * vehicle.lift_min_N
         down = -_speed_towards(-way, -x[VZ], per_speed, per_next_speed, brake)
     velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down, u)
 
@@ -314,6 +318,6 @@ def acceleration_wrench(vehicle, x, reference, north_mps2, east_mps2, down_mps2,
     dt = vehicle.dt_s
     north = reference[0] + dt * north_mps2
     east = reference[1] + dt * east_mps2
-    push = -vehicle.vertical_B[1] * vehicle.mass_kg
-    down = vehicle.vertical_A[1, 1] * x[VZ] + push * down_mps2
+    push = -vehicle.vertical_B[SPEED] * vehicle.mass_kg
+    down = vehicle.vertical_A[SPEED, SPEED] * x[VZ] + push * down_mps2
     velocity_climb_wrench(vehicle, x, reference, north, east, down, u)

@@ -13,6 +13,10 @@ and WY are those of a body that has not turned; PSI is the angle by which it has
 own vertical axis from there, which goes on counting beyond a half turn, and WZ its rate; torques
 are about the axes of the tilts. `attitude.body_attitude` has roll, pitch and yaw of its body."""
 
+POSITION, SPEED, TILT, RATE = range(4)
+"""States of the model of one axis: place and speed along it, and for a horizontal one the tilt that
+pushes along it and the rate of this tilt (`governor.horizontal_axis`)."""
+
 LIFT, TAU_X, TAU_Y, TAU_Z, DELTA_THRUST = range(5)
 """Lift in excess of the weight [N], torques [N m], corrected thrust deviation [N]."""
 

@@ -19,6 +19,7 @@ from uas_coverage_env.vehicle.layout import (
     N_INPUTS,
     N_STATES,
     PHI,
+    PSI,
     TAU_X,
     THETA,
     U_TH,
@@ -26,6 +27,9 @@ from uas_coverage_env.vehicle.layout import (
     VY,
     VZ,
     WX,
+    WZ,
+    X,
+    Z,
 )
 from uas_coverage_env.vehicle.params import VehicleParams
 
@@ -56,8 +60,8 @@ def rigid_body(vehicle: VehicleParams) -> tuple[FloatArray, FloatArray]:
     """A (14, 14) and B (14, 5) of the continuous rigid body, linearised at hover and heading 0."""
     body = vehicle.airframe
     A, B = np.zeros((N_STATES, N_STATES)), np.zeros((N_STATES, N_INPUTS))
-    A[0:3, 3:6] = np.eye(3)
-    A[6:9, 9:12] = np.eye(3)
+    A[X : Z + 1, VX : VZ + 1] = np.eye(3)
+    A[PHI : PSI + 1, WX : WZ + 1] = np.eye(3)
     A[VX, THETA], A[VY, PHI] = -body.gravity_mps2, body.gravity_mps2
     A[VX, VX] = A[VY, VY] = -body.drag_kgps / body.mass_kg
     A[VZ, VZ] = -body.drag_vertical_kgps / body.mass_kg

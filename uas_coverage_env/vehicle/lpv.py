@@ -7,11 +7,15 @@ from uas_coverage_env.vehicle.layout import (
     LIFT,
     N_STATES,
     PHI,
+    POSITION,
     PSI,
+    RATE,
+    SPEED,
     TAU_X,
     TAU_Y,
     TAU_Z,
     THETA,
+    TILT,
     U_TH,
     VX,
     VY,
@@ -109,11 +113,11 @@ def fly_kinematics(vehicle, x, u):
     _axis_step(vehicle, x, Y, VY, PHI, WX, 1.0, u[TAU_X] / inertia[0])
     A, B = vehicle.vertical_A, vehicle.vertical_B
     z, vz = x[Z], x[VZ]
-    x[Z] = A[0, 0] * z + A[0, 1] * vz + B[0] * u[LIFT]
-    x[VZ] = A[1, 1] * vz + B[1] * u[LIFT]
+    x[Z] = A[POSITION, POSITION] * z + A[POSITION, SPEED] * vz + B[POSITION] * u[LIFT]
+    x[VZ] = A[SPEED, SPEED] * vz + B[SPEED] * u[LIFT]
     alpha = u[TAU_Z] / inertia[2]
-    x[PSI] += vehicle.dt_s * x[WZ] + vehicle.yaw_B[0] * alpha
-    x[WZ] += vehicle.yaw_B[1] * alpha
+    x[PSI] += vehicle.dt_s * x[WZ] + vehicle.yaw_B[POSITION] * alpha
+    x[WZ] += vehicle.yaw_B[SPEED] * alpha
 
 
 @inlined_kernel
@@ -122,10 +126,12 @@ def _axis_step(vehicle, x, position, velocity, angle, rate, sign, angular_accele
     A, B = vehicle.axis_A, vehicle.axis_B
     v, tilt, w = x[velocity], sign * x[angle], sign * x[rate]
     alpha = sign * angular_acceleration
-    x[position] += A[0, 1] * v + A[0, 2] * tilt + A[0, 3] * w + B[0] * alpha
-    x[velocity] = A[1, 1] * v + A[1, 2] * tilt + A[1, 3] * w + B[1] * alpha
-    x[angle] = sign * (tilt + A[2, 3] * w + B[2] * alpha)
-    x[rate] = sign * (w + B[3] * alpha)
+    moved = A[POSITION, SPEED] * v + A[POSITION, TILT] * tilt + A[POSITION, RATE] * w
+    x[position] += moved + B[POSITION] * alpha
+    faster = A[SPEED, SPEED] * v + A[SPEED, TILT] * tilt + A[SPEED, RATE] * w
+    x[velocity] = faster + B[SPEED] * alpha
+    x[angle] = sign * (tilt + A[TILT, RATE] * w + B[TILT] * alpha)
+    x[rate] = sign * (w + B[RATE] * alpha)
 
 
 @kernel

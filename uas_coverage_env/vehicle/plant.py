@@ -17,7 +17,7 @@ loss of motor speed with a falling battery voltage.
 import math
 
 from uas_coverage_env.compiled.kernels import kernel, rarely, stack_array
-from uas_coverage_env.vehicle.compiled import MAX_MOTORS
+from uas_coverage_env.vehicle.compiled import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
 from uas_coverage_env.vehicle.deviation import (
     CAPACITY,
     DRAG,
@@ -81,8 +81,9 @@ def mix(vehicle, thrust_N, torque, motor_thrust_N):
     yaw = 0.0
     for i in range(n):
         mixer = vehicle.mixer[i]
-        share = mixer[0] * thrust_N + mixer[1] * torque[0] + mixer[2] * torque[1]
-        share = min(max(share + mixer[3] * torque[2], 0.0), strongest)
+        share = mixer[OF_THRUST] * thrust_N + mixer[OF_ROLL] * torque[0]
+        share += mixer[OF_PITCH] * torque[1]
+        share = min(max(share + mixer[OF_YAW] * torque[2], 0.0), strongest)
         motor_thrust_N[i] = share
         rotor = vehicle.rotor_map[i]
         total += share

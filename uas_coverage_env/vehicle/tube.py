@@ -20,12 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED
 from uas_coverage_env.vehicle.params import VehicleParams
 
 FORGETS_S = 2.0
 """The belief in wind and sink follows what is seen with this time constant [s]."""
 
 _STEPS = 400
+_BELIEF = RATE + 1  # the fifth state
 
 
 @dataclass(frozen=True)
@@ -69,13 +71,15 @@ def tube_of(vehicle: VehicleParams, dt_s: float, steps: int, learns: bool = Fals
     # what is held against a wind believed in is its trim tilt
     gain = np.array([0.0, k_velocity, k_tilt, k_rate, k_tilt * vehicle.trim_tilt_rad_per_mps])
     learnt = belief_gain(dt_s) if learns else 0.0
-    closed = np.zeros((5, 5))
-    closed[:4, :4] = A
-    closed[:4] -= np.outer(B, gain)
-    closed[4, 4] = 1.0 - learnt
+    closed = np.zeros((_BELIEF + 1, _BELIEF + 1))
+    closed[:_BELIEF, :_BELIEF] = A
+    closed[:_BELIEF] -= np.outer(B, gain)
+    closed[_BELIEF, _BELIEF] = 1.0 - learnt
     # a step in wind is a step in still air at the airspeed, moved by what the air moves
-    response = np.array([dt_s - A[0, 1], 1.0 - A[1, 1], -A[2, 1], -A[3, 1], learnt])
-    total, alpha, position_m = np.zeros(5), 0.0, [0.0]
+    response = np.append(-A[:, SPEED], learnt)
+    response[POSITION] += dt_s
+    response[SPEED] += 1.0
+    total, alpha, position_m = np.zeros(len(response)), 0.0, [0.0]
     for _ in range(max(_STEPS, steps)):
         total += np.abs(response)
         alpha += abs(float(gain @ response))

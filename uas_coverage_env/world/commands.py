@@ -1,4 +1,4 @@
-"""What a player may tell a UAS to do in one step, and its form in an array."""
+"""What a planner may tell a UAS to do in one step, and its form in an array."""
 
 import math
 import numbers
@@ -40,7 +40,7 @@ class Velocity:
         north_mps: [m/s].
         east_mps: [m/s].
         altitude_m: [m] positive up.
-        mode: What the player is doing; "return" lets the UAS land without having left.
+        mode: What the planner is doing; "return" lets the UAS land without having left.
     """
 
     north_mps: float

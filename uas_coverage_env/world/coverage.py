@@ -10,15 +10,16 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.outcome import NONE
 from uas_coverage_env.world.state import FLYING, LANDED
+from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, REACH_M2, WEIGHT
 
 
 @inlined_kernel
 def _reaches(columns, w, x, y, z):
     """Whether a place is within the radius of a waypoint."""
-    dx = x - columns[0, w]
-    dy = y - columns[1, w]
-    dz = z - columns[2, w]
-    return dx * dx + dy * dy + dz * dz <= columns[3, w]
+    dx = x - columns[NORTH_M, w]
+    dy = y - columns[EAST_M, w]
+    dz = z - columns[DOWN_M, w]
+    return dx * dx + dy * dy + dz * dz <= columns[REACH_M2, w]
 
 
 @inlined_kernel
@@ -102,7 +103,7 @@ def cover(arena, state, sample, outcome):
                 if rarely(state.due_step.shape[0] > 0) and arena.again_steps[w] > 0:
                     state.due_step[w] = sample + arena.again_steps[w]
                 event.newly_covered += 1
-                event.newly_covered_weight += columns[4, w]
+                event.newly_covered_weight += columns[WEIGHT, w]
 
 
 @inlined_kernel

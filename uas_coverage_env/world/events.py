@@ -29,8 +29,17 @@ NEVER = 2**62
 BY_LOT, EVERY = -1, -2
 """In place of the index of a UAS."""
 
-N_HEARD = 6
-"""Numbers of a command that a UAS remembers: kind, four values, whether it returns."""
+HEARD_KIND, HEARD_VALUES, HEARD_RETURNING = 0, 1, 5
+"""Columns of `WorldState.heard`, a command as numbers: kind, four values from HEARD_VALUES on, and
+whether it returns."""
+
+N_HEARD = HEARD_RETURNING + 1
+
+POSITION_BIAS, VELOCITY_BIAS, CHARGE_BIAS, DRIFT_DIRECTION = 0, 3, 6, 7
+"""Columns of `WorldState.bias`, errors that a mission draws: position [m] and velocity [m/s], three
+numbers each, depth of discharge [-], and the direction in which dead reckoning drifts [rad]."""
+
+N_BIASES = DRIFT_DIRECTION + 1
 
 N_DELAYED = 8
 """Samples that are kept of what is sensed late."""
@@ -151,11 +160,10 @@ def begin_events(arena, state, seed, mission):
         random = state.sensing_random[i]
         random[0] = counted(counted(seed, mission) ^ _SENSING_KEY, i)
         for axis in range(3):
-            state.bias[i, axis] = sensing.position_bias_m * normal(random)
-            state.bias[i, 3 + axis] = sensing.velocity_bias_mps * normal(random)
-        state.bias[i, 6] = sensing.charge_bias * normal(random)
-        # the direction of a drift
-        state.bias[i, 7] = 2.0 * math.pi * uniform(random)
+            state.bias[i, POSITION_BIAS + axis] = sensing.position_bias_m * normal(random)
+            state.bias[i, VELOCITY_BIAS + axis] = sensing.velocity_bias_mps * normal(random)
+        state.bias[i, CHARGE_BIAS] = sensing.charge_bias * normal(random)
+        state.bias[i, DRIFT_DIRECTION] = 2.0 * math.pi * uniform(random)
 
 
 @inlined_kernel
@@ -195,15 +203,15 @@ def heed(arena, state, outcome):
                 then = int(arena.events[e].values[0])
         heard = state.heard[i]
         if then == -1:
-            heard[0] = command.kind
+            heard[HEARD_KIND] = command.kind
             for k in range(4):
-                heard[1 + k] = command.values[k]
-            heard[5] = command.returning
-        elif then == GO_ON and heard[0] != WRENCH:
-            command.kind = int(heard[0])
+                heard[HEARD_VALUES + k] = command.values[k]
+            heard[HEARD_RETURNING] = command.returning
+        elif then == GO_ON and heard[HEARD_KIND] != WRENCH:
+            command.kind = int(heard[HEARD_KIND])
             for k in range(4):
-                command.values[k] = heard[1 + k]
-            command.returning = heard[5] > 0.0
+                command.values[k] = heard[HEARD_VALUES + k]
+            command.returning = heard[HEARD_RETURNING] > 0.0
         else:
             # torques that are held on would turn it over: it hovers
             command.kind = GO_TO if then == RETURN else CLIMB
@@ -275,13 +283,13 @@ def sense(arena, state):
             if blinds and lasts(arena, state, e, step):
                 drift_mps = max(drift_mps, arena.events[e].values[0])
         for axis in range(3):
-            felt[X + axis] += state.bias[i, axis]
-            felt[VX + axis] += state.bias[i, 3 + axis]
-        felt[DOD] = min(max(felt[DOD] + state.bias[i, 6], 0.0), 1.0)
+            felt[X + axis] += state.bias[i, POSITION_BIAS + axis]
+            felt[VX + axis] += state.bias[i, VELOCITY_BIAS + axis]
+        felt[DOD] = min(max(felt[DOD] + state.bias[i, CHARGE_BIAS], 0.0), 1.0)
         if drift_mps >= 0.0:
             dt_s = arena.rules[0].dt_s
-            felt[VX] += drift_mps * math.cos(state.bias[i, 7])
-            felt[VY] += drift_mps * math.sin(state.bias[i, 7])
+            felt[VX] += drift_mps * math.cos(state.bias[i, DRIFT_DIRECTION])
+            felt[VY] += drift_mps * math.sin(state.bias[i, DRIFT_DIRECTION])
             felt[X] = north_m + 0.5 * dt_s * (north_mps + felt[VX])
             felt[Y] = east_m + 0.5 * dt_s * (east_mps + felt[VY])
         for k in range(N_STATES):

@@ -61,7 +61,7 @@ OUTCOME_DTYPE = np.dtype(
                 ("applied_command", COMMAND_DTYPE),
                 # the safety filter changed the command
                 ("filtered", "?"),
-                # the player returns, or return mode took over
+                # the planner returns it, or return mode took over
                 ("returning", "?"),
                 ("landed", "?"),
                 # it waits at its start with its motors off

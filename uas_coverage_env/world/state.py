@@ -1,4 +1,4 @@
-"""The state of the world, and the part of it that a player sees."""
+"""The state of the world, and the part of it that a planner sees."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Self
@@ -10,7 +10,14 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES, PSI
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
-from uas_coverage_env.world.events import EVERY, N_DELAYED, N_HEARD, NEVER, write_responds
+from uas_coverage_env.world.events import (
+    EVERY,
+    N_BIASES,
+    N_DELAYED,
+    N_HEARD,
+    NEVER,
+    write_responds,
+)
 
 FLYING, LANDED, LOST, SWAPPING = range(4)
 """Status of a UAS. Landed and lost are final; one that swaps has landed, and may fly again with a
@@ -19,18 +26,20 @@ fresh battery pack (`world.packs`)."""
 ABSENT = -1
 """Status of a UAS that a mission does not have, in arrays with room for more."""
 
-WIND, SINK, CONSUMPTION, EXPECTED = 0, 2, 3, 4
+WIND, SINK, CONSUMPTION, EXPECTED, EXPECTED_DOD = 0, 2, 3, 4, 7
 """Places in `WorldState.belief`: wind north and east [m/s], of which drag and every other steady
 horizontal force are taken to come; change of the vertical speed in a step that the model does not
 know [m/s]; consumption over that of the model, less 1 [-]; and what is expected at the next sample,
 velocity north, east, down [m/s], and depth of discharge [-]."""
 
-N_BELIEF = 8
+N_BELIEF = EXPECTED_DOD + 1
 
 PACK_NUMBER, PACK_READY, PACK_COVERED, PACK_OUT = range(4)
 """Places in `WorldState.packs`: which of its packs a UAS flies with, from 0 on; the sample at which
 it has the next one; whether it has covered anything with this one; and how many UAS were lost or
 had landed for good at its take-off."""
+
+N_PACK = PACK_OUT + 1
 
 STATUS_NAMES = ("flying", "landed", "lost", "swapping")
 
@@ -77,14 +86,13 @@ class WorldState(NamedTuple):
     """What planners and learners are told of it: the same, later."""
     delayed: Annotated[NDArray[np.float64], "S", N_DELAYED, N_STATES]
     """The latest of `sensed`; that of sample k at k modulo their number."""
-    bias: Annotated[NDArray[np.float64], "S", 8]
-    """Errors that a mission draws: position [m], velocity [m/s], depth of discharge [-], and the
-    direction in which dead reckoning drifts [rad]."""
+    bias: Annotated[NDArray[np.float64], "S", N_BIASES]
+    """Errors that a mission draws, see `events.POSITION_BIAS` and the names beside it."""
     sensing_random: Annotated[NDArray[np.uint64], "S", 1]
     """The states of the generators that sensors draw from."""
     heard: Annotated[NDArray[np.float64], "S", N_HEARD]
     """The latest command that reached each UAS."""
-    packs: Annotated[NDArray[np.int64], "B", 4]
+    packs: Annotated[NDArray[np.int64], "B", N_PACK]
     """Of each UAS what is named beside `PACK_NUMBER`; of none where none swaps on its own."""
     due_step: Annotated[NDArray[np.int64], "repeats", Values(0, 2**40)]
     """The sample at which each waypoint that was covered is asked for again, 0 where it is not; of
@@ -147,7 +155,7 @@ def responding(arena: Any, state: WorldState) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True)
 class SwarmState:
-    """What a player sees at a sample. The future of moving obstacles is not part of it.
+    """What a planner sees at a sample. The future of moving obstacles is not part of it.
 
     Attributes:
         time_s: [s] since the start.
@@ -155,7 +163,7 @@ class SwarmState:
         names: (U,) names of the UAS.
         x: (U, 14) states as they are sensed, in the order of `vehicle.layout`. A UAS that looks
             where it flies has heading and yaw rate 0 here: its autopilot turns it, and nothing that
-            a player plans depends on that.
+            a planner decides depends on that.
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST; one that swaps packs has landed.
         departed: (U,) has been farther from its start than the landing distance.

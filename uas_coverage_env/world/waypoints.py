@@ -13,9 +13,12 @@ ALL_SHARES = 2.0**30
 """The weight of all waypoints, as a whole number. With it and positions of at most 2²², every sum
 of `Arena.waypoint_columns` stays below 2⁵³, up to where floats hold all whole numbers."""
 
-N_WAYPOINT_COLUMNS = 8
+NORTH_M, EAST_M, DOWN_M, REACH_M2, WEIGHT, SHARE, SHARE_NORTH, SHARE_EAST = range(8)
+"""Rows of `Arena.waypoint_columns`, whole numbers from SHARE on."""
 
-_NOBODY_HAS = 1 << 62
+N_WAYPOINT_COLUMNS = SHARE_EAST + 1
+
+_NOT_CARRIED = 1 << 62
 
 WAYPOINT_DTYPE = np.dtype(
     (
@@ -45,7 +48,7 @@ def waypoint_records(scenario: Scenario) -> NDArray[np.void]:
     rows = [
         (
             *(w.position_m, w.radius_m, w.weight, asks(w)),
-            0 if w.sensor is None else bits.get(w.sensor, _NOBODY_HAS),
+            0 if w.sensor is None else bits.get(w.sensor, _NOT_CARRIED),
             *(w.heights_m or (-math.inf, math.inf)),
             math.inf if w.max_speed_mps is None else w.max_speed_mps,
         )

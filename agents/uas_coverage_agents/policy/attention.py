@@ -1,10 +1,10 @@
-"""The gaze network: weighs the waypoints it sees, and flies by what the weighted one is like."""
+"""Attention over the waypoints that are seen: what the weighted one is like decides."""
 
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from uas_coverage_agents.policy.tensors import Tensors, Width
 from uas_coverage_env.files.strict_toml import StrictModel
@@ -22,7 +22,7 @@ class Attention(StrictModel):
     h = tanh(W₅ [c, a] + b₅), and the outputs are W₆ [h, a, own] + b₆.
 
     Attributes:
-        kind: "gaze".
+        kind: "attention"; older files say "gaze".
         inputs: `before` numbers, `features` of each of the `candidates`, and some more numbers.
         outputs: How many.
         before: Numbers before the candidates.
@@ -32,7 +32,7 @@ class Attention(StrictModel):
         hidden: Width of c and h.
     """
 
-    kind: Literal["gaze"] = "gaze"
+    kind: Literal["attention", "gaze"] = "attention"
     inputs: Width
     outputs: Width
     before: Width
@@ -40,6 +40,11 @@ class Attention(StrictModel):
     features: Width
     keys: Width
     hidden: Width
+
+    @field_validator("kind")
+    @classmethod
+    def _present_name(cls, kind: str) -> str:
+        return "attention"
 
     @model_validator(mode="after")
     def _sizes_fit(self) -> Self:

@@ -21,7 +21,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
 from uas_coverage_agents.reference.central_critic import CentralCriticPolicy
-from uas_coverage_agents.reference.player import ReferencePlayer
+from uas_coverage_agents.reference.policy import ReferencePolicy
 from uas_coverage_agents.reference.settings import Reference
 from uas_coverage_agents.training.model_arrays import learned, take_over
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
@@ -40,12 +40,12 @@ class Trained:
     """What a training has come to.
 
     Attributes:
-        player: Flies what was learned.
+        policy: Flies what was learned.
         steps: Learned from, of all agents together.
         process_s: Processor time of the rounds [s].
     """
 
-    player: ReferencePlayer
+    policy: ReferencePolicy
     steps: int
     process_s: float
 
@@ -96,8 +96,8 @@ def train_reference(
     lanes.close()
     room = task.missions().room
     swarm_of = room.n_uas if reference.agent == "swarm" else None
-    player = ReferencePlayer(model, task.settings(**chosen_of(reference, level)), swarm_of)
-    return Trained(player, model.num_timesteps, process_s)
+    policy = ReferencePolicy(model, task.settings(**chosen_of(reference, level)), swarm_of)
+    return Trained(policy, model.num_timesteps, process_s)
 
 
 def chosen_of(reference: Reference, level: str) -> dict[str, Any]:

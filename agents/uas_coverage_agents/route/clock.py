@@ -36,7 +36,7 @@ class Mission(NamedTuple):
         may: (U,) takes part.
         late: (W,) waypoints that are to come last.
         unit_s: Mean leg time from a waypoint to its nearest neighbour.
-        weight: Worth of a second of anybody's flight against one of the longest.
+        weight: Worth of a second of any flight against one of the longest.
     """
 
     place_m: NDArray[np.float64]

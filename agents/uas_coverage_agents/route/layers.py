@@ -24,8 +24,8 @@ class Layers(NamedTuple):
 def layers_of(network: Mlp, tensors: Tensors, name: str) -> Layers:
     """The tensors of a part of a policy, in the order in which they are used."""
     arrays = [np.array(tensors[name + part].T, np.float64, order="C") for part in network.shapes()]
-    arrays[4] = arrays[4][:, 0].copy()
-    return Layers(*arrays)
+    layers = Layers(*arrays)
+    return layers._replace(weight_2=layers.weight_2[:, 0].copy())
 
 
 @allocating_kernel

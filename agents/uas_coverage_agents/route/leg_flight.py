@@ -41,6 +41,8 @@ _EVERY = 11  # of the velocities is one that they are changed to
 AHEAD = 4
 """Places ahead that matter: three are looked at after the first is covered."""
 
+_LAST = AHEAD - 1
+
 NORTH, EAST, DOWN, RADIUS, IS_HOME = range(5)
 """Columns of the places ahead."""
 
@@ -218,9 +220,10 @@ def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
 def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
     """Time [s] to the last of the places ahead, after so many steps (see `_fly_on`)."""
     if steps < 0:
-        rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[3], row)
+        rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[_LAST], row)
     else:
-        beyond_m = math.hypot(ahead[3, NORTH] - ahead[2, NORTH], ahead[3, EAST] - ahead[2, EAST])
+        last, before = ahead[_LAST], ahead[_LAST - 1]
+        beyond_m = math.hypot(last[NORTH] - before[NORTH], last[EAST] - before[EAST])
         rest_s = beyond_m / speed_mps
         rest_s += look_ahead(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
     return abs(steps) * vehicle.dt_s + rest_s + value_of(layers, row)

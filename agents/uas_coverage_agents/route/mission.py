@@ -11,7 +11,7 @@ from uas_coverage_env.vehicle import DOD, VX, VY
 from uas_coverage_env.world import FLYING, SwarmState, build_arena
 
 WEIGHT = 0.6
-"""Of a second of anybody's flight against one of the longest: the default of `trajectory`."""
+"""Of a second of any flight against one of the longest: the default of `trajectory`."""
 
 _LEGS = 0.96
 """Flights along a route take about this share of its legs."""

@@ -28,7 +28,11 @@ from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.height import lowest_altitude
 
 LAYOUT = "route_velocity_v1"
-N_FRAME = 5
+ALONG_NORTH, ALONG_EAST, ACROSS_NORTH, ACROSS_EAST, AIMED_M = range(5)
+"""Columns of a frame: unit vectors along and across the way, and the altitude aimed at [m]."""
+
+N_FRAME = AIMED_M + 1
+_ALONG, _ACROSS = slice(ALONG_NORTH, ACROSS_NORTH), slice(ACROSS_NORTH, AIMED_M)
 OUTPUTS = 3
 """Velocity along and across over top speed, and altitude above the place aimed at over 10 m."""
 
@@ -110,8 +114,8 @@ def commanded(
         (N, 3) velocity north and east [m/s], altitude [m].
     """
     along, across = outputs[:, :1], outputs[:, 1:2]
-    level_mps = speeds_mps[:, None] * (along * frames[:, 0:2] + across * frames[:, 2:4])
-    return np.column_stack([level_mps, frames[:, 4] + _RISE_M * outputs[:, 2]])
+    level_mps = speeds_mps[:, None] * (along * frames[:, _ALONG] + across * frames[:, _ACROSS])
+    return np.column_stack([level_mps, frames[:, AIMED_M] + _RISE_M * outputs[:, 2]])
 
 
 def outputs_of(
@@ -119,8 +123,9 @@ def outputs_of(
 ) -> NDArray[np.float64]:
     """The outputs that mean some commands: the inverse of `commanded`."""
     level = values[:, :2] / speeds_mps[:, None]
-    along, across = (level * frames[:, 0:2]).sum(axis=1), (level * frames[:, 2:4]).sum(axis=1)
-    return np.column_stack([along, across, (values[:, 2] - frames[:, 4]) / _RISE_M])
+    along = (level * frames[:, _ALONG]).sum(axis=1)
+    across = (level * frames[:, _ACROSS]).sum(axis=1)
+    return np.column_stack([along, across, (values[:, 2] - frames[:, AIMED_M]) / _RISE_M])
 
 
 @allocating_kernel
@@ -144,7 +149,7 @@ def look_along(arena, i, x, reference, targets, n_targets, row, frame):
         targets: (AHEAD,) the next waypoints of its route.
         n_targets: How many of them; after them comes home.
         row: (N_VELOCITY,) written.
-        frame: (N_FRAME,) written: north and east of along, and of across; altitude aimed at [m].
+        frame: (N_FRAME,) written, see `ALONG_NORTH`.
 
     Returns:
         Kind of the first leg, see `route`.
@@ -162,7 +167,9 @@ def look_along(arena, i, x, reference, targets, n_targets, row, frame):
     px, py = -side * ey, side * ex
     aim_m, floor_m = -aims_m[0, 2], max(lowest_altitude(arena, i, x[X], x[Y]), needed_m)
     aimed_m = min(max(aim_m, floor_m), max(arena.rules[0].ceiling_m, aim_m))
-    frame[0], frame[1], frame[2], frame[3], frame[4] = ex, ey, px, py, aimed_m
+    frame[ALONG_NORTH], frame[ALONG_EAST] = ex, ey
+    frame[ACROSS_NORTH], frame[ACROSS_EAST] = px, py
+    frame[AIMED_M] = aimed_m
 
     row[_OWN.velocity] = (x[VX] * ex + x[VY] * ey) / _SPEED_MPS
     row[_OWN.velocity + 1] = (x[VX] * px + x[VY] * py) / _SPEED_MPS

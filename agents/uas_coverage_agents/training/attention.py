@@ -1,4 +1,4 @@
-"""The gaze network in torch, as a policy of Stable-Baselines3; see `policy.network.Attention`."""
+"""The attention network in torch, as a policy of Stable-Baselines3 (`policy.attention`)."""
 
 from typing import Any
 
@@ -66,7 +66,7 @@ class AttentionActor(nn.Module):
 
 
 class AttentionPolicy(ActorCriticPolicy):
-    """Flies with a gaze network; before training, straight to the nearest open waypoint.
+    """Flies with an attention network; before training, straight to the nearest open waypoint.
 
     Args:
         args: As of the base.

@@ -1,4 +1,4 @@
-"""Players that do not learn, beside a learning curve: flown once, on the same missions."""
+"""Planners that do not learn, beside a learning curve: flown once, on the same missions."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ from uas_coverage_env.flight import load_planner, rollout
 from uas_coverage_env.replay.figures import BASELINES
 from uas_coverage_env.scenario import Scenario
 
-NOBODY = "none"
+NO_PLANNER = "none"
 
 
 def planners_of(names: str) -> list[str]:
@@ -27,7 +27,7 @@ def planners_of(names: str) -> list[str]:
     Raises:
         InputError: There is no such planner.
     """
-    if names == NOBODY:
+    if names == NO_PLANNER:
         return []
     planners = [name.strip() for name in names.split(",")]
     for name in planners:

@@ -5,7 +5,7 @@ import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +17,7 @@ from rich.table import Table
 from uas_coverage_agents.training.published import published_names
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.plain_files import read_bytes, write_atomically
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError, parse
 
 if TYPE_CHECKING:
     from uas_coverage_agents.policy import Policy
@@ -157,6 +157,8 @@ def _record(job: "TrainingJob") -> dict[str, Any]:
 
 def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) -> None:
     """Refuse to mix a training with something else."""
+    from uas_coverage_agents.training.config import TrainingConfig
+
     names = prepare_folder(directory) - {".lock"}
     if names and ORDER not in names:
         raise InputError(f"{directory}: is not empty and holds no training; give another --out")
@@ -166,6 +168,10 @@ def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) ->
         there = json.loads(read_bytes(directory / ORDER))
     except (OSError, ValueError, RecursionError):
         there = None
+    if isinstance(there, dict) and isinstance(there.get("config"), dict):
+        with suppress(InputError):  # an older version may have had other names for some things
+            config = parse(there["config"], TrainingConfig, ORDER)
+            there["config"] = config.model_dump(mode="json")
     if there != json.loads(json.dumps(_record(job))):
         raise InputError(
             f"{directory}: holds a training with other settings; give another --out, or start "

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from uas_coverage_agents.policy import ScenarioFamily
 from uas_coverage_agents.training.published import PUBLISHED, published_names
@@ -18,6 +18,9 @@ from uas_coverage_env.scenario import load_scenario
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
+
+_FORMER = {"player": "policy"}
+"""Tables that had another name in version 0.2."""
 
 
 class PpoSettings(StrictModel):
@@ -113,7 +116,7 @@ class TrainingConfig(StrictModel):
             (velocities) or the whole team (waypoints).
         scenarios: Where.
         learning: How the network is improved.
-        player: What it reads, what it commands, and what it is paid for.
+        policy: What it reads, what it commands, and what it is paid for.
     """
 
     summary: str
@@ -121,19 +124,22 @@ class TrainingConfig(StrictModel):
     lanes: Annotated[int, Field(ge=1, le=65_536)]
     scenarios: TrainingScenarios
     learning: Annotated[PpoSettings | SacSettings, Field(discriminator="algorithm")]
-    player: Annotated[VelocitySettings | WaypointSettings, Field(discriminator="interface")]
+    policy: Annotated[
+        VelocitySettings | WaypointSettings,
+        Field(discriminator="interface", validation_alias=AliasChoices("policy", *_FORMER)),
+    ]
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        masked = self.player.interface == "waypoint"
+        masked = self.policy.interface == "waypoint"
         if masked != (self.learning.algorithm == "maskable-ppo"):
             raise ValueError(
-                f"learning.algorithm is {self.learning.algorithm!r}, but player.interface is "
-                f"{self.player.interface!r}; waypoints need maskable-ppo, velocities ppo or sac"
+                f"learning.algorithm is {self.learning.algorithm!r}, but policy.interface is "
+                f"{self.policy.interface!r}; waypoints need maskable-ppo, velocities ppo or sac"
             )
-        attention = isinstance(self.player, VelocitySettings) and self.player.network == "gaze"
+        attention = isinstance(self.policy, VelocitySettings) and self.policy.network == "attention"
         if attention and self.learning.algorithm != "ppo":
-            raise ValueError("player.network is 'gaze', which is learned by ppo alone")
+            raise ValueError("policy.network is 'attention', which is learned by ppo alone")
         return self
 
 
@@ -182,6 +188,7 @@ def _set(data: dict[str, Any], change: str) -> None:
     except (tomllib.TOMLDecodeError, RecursionError):
         value = text  # a plain word is text
     *tables, last = key.split(".")
+    tables = [_FORMER.get(name, name) for name in tables]
     table = data
     for name in tables:
         inner = table.get(name)

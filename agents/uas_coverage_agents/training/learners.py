@@ -6,7 +6,7 @@ from uas_coverage_agents.training.learner import Learner
 
 def learner_of(config: TrainingConfig) -> Learner:
     """The learner for this configuration; only what it needs is imported."""
-    if config.player.interface == "waypoint":
+    if config.policy.interface == "waypoint":
         from uas_coverage_agents.training.waypoint import WaypointLearner
 
         return WaypointLearner()

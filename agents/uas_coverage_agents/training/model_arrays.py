@@ -124,7 +124,8 @@ def _from_arrays(arrays: Arrays, model: BaseAlgorithm, lanes: VecEnv) -> None:
     )
     model._last_obs = arrays["last/observation"].copy()
     model._last_episode_starts = arrays["last/episode_starts"].copy()
-    state = {name[6:]: array for name, array in arrays.items() if name.startswith("lanes/")}
+    own = "lanes/"
+    state = {name.removeprefix(own): a for name, a in arrays.items() if name.startswith(own)}
     cast(StatefulVecEnv, lanes).load_state_dict(state)
     if isinstance(model, OffPolicyAlgorithm):
         model._last_original_obs = model._last_obs

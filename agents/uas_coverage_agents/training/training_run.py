@@ -92,7 +92,7 @@ class TrainingRun:
         network, tensors = self.learner.export(self.model)
         config = self.job.config
         description = PolicyDescription(
-            interface=config.player.interface,
+            interface=config.policy.interface,
             network=network,
             observation=self.learner.observation(config),
             scenarios=config.scenarios.family,
@@ -111,12 +111,12 @@ class TrainingRun:
 
     def flights(self, scenarios: list[Scenario]) -> NDArray[np.float64]:
         """How it flies these now, with the assistants that it learns with; see `fly`."""
-        player = self.job.config.player
+        settings = self.job.config.policy
         return fly(
             self.policy(),
             scenarios,
-            safety_filter=player.safety_filter,
-            return_mode=player.return_mode,
+            safety_filter=settings.safety_filter,
+            return_mode=settings.return_mode,
         )
 
     def publish(self, directory: Path) -> Policy:

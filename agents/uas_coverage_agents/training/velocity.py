@@ -165,24 +165,24 @@ class VelocityLearner:
 
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
         """The environment to learn in."""
-        player = _settings(config)
+        settings = _settings(config)
         lanes = CoverageVecEnv(
             config.lanes,
             some_with_moving_obstacles(
-                training_scenarios(config.scenarios, seed), player.moving_share, seed
+                training_scenarios(config.scenarios, seed), settings.moving_share, seed
             ),
-            return_mode=player.return_mode,
-            safety_filter=player.safety_filter,
-            reward_weights=player.rewards,
+            return_mode=settings.return_mode,
+            safety_filter=settings.safety_filter,
+            reward_weights=settings.rewards,
         )
         lanes.seed(seed)
-        return VelocityVecEnv(lanes, player.nearing, config.learning.gamma)
+        return VelocityVecEnv(lanes, settings.nearing, config.learning.gamma)
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
         """The untrained model."""
-        player, learning = _settings(config), config.learning
-        activation = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[player.activation]
-        network: dict[str, Any] = {"net_arch": list(player.hidden), "activation_fn": activation}
+        settings, learning = _settings(config), config.learning
+        activation = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[settings.activation]
+        network: dict[str, Any] = {"net_arch": list(settings.hidden), "activation_fn": activation}
         if isinstance(learning, SacSettings):
             return SAC(
                 "MlpPolicy",
@@ -200,10 +200,10 @@ class VelocityLearner:
                 seed=seed,
             )
         kind: Any = "MlpPolicy"
-        if player.network == "gaze":
+        if settings.network == "attention":
             kind, network = (
                 AttentionPolicy,
-                {"network": attention_network(player.hidden[0], player.keys)},
+                {"network": attention_network(settings.hidden[0], settings.keys)},
             )
         with warnings.catch_warnings():
             # of a rest that is no whole batch: `DecidingRollouts` leaves it out
@@ -213,11 +213,11 @@ class VelocityLearner:
                 lanes,
                 **learning.keywords,
                 rollout_buffer_class=DecidingRollouts,
-                policy_kwargs={**network, "log_std_init": float(np.log(player.first_deviation))},
+                policy_kwargs={**network, "log_std_init": float(np.log(settings.first_deviation))},
                 device="cpu",
                 seed=seed,
             )
-        model.first_deviation = player.first_deviation
+        model.first_deviation = settings.first_deviation
         policy: Any = model.policy
         policy.log_std.requires_grad_(False)
         return model
@@ -248,9 +248,9 @@ class VelocityLearner:
 
 
 def _settings(config: TrainingConfig) -> VelocitySettings:
-    if not isinstance(config.player, VelocitySettings):
-        raise TypeError(f"the learner of velocities cannot train {config.player.interface}s")
-    return config.player
+    if not isinstance(config.policy, VelocitySettings):
+        raise TypeError(f"the learner of velocities cannot train {config.policy.interface}s")
+    return config.policy
 
 
 def _actor(model: BaseAlgorithm) -> list[torch.nn.Module]:

@@ -23,20 +23,20 @@ class WaypointLearner:
 
     def lanes(self, config: TrainingConfig, seed: int) -> VecEnv:
         """Teams on the scenarios of the configuration, some of them with moving obstacles."""
-        player = _settings(config)
+        settings = _settings(config)
         scenarios = some_with_moving_obstacles(
-            training_scenarios(config.scenarios, seed), player.moving_share, seed
+            training_scenarios(config.scenarios, seed), settings.moving_share, seed
         )
-        return WaypointVecEnv(scenarios, player, config.lanes, seed)
+        return WaypointVecEnv(scenarios, settings, config.lanes, seed)
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
         """A model that takes the nearest waypoint at first."""
-        player, learning = _settings(config), cast(PpoSettings, config.learning)
+        settings, learning = _settings(config), cast(PpoSettings, config.learning)
         return MaskablePPO(
             PointerPolicy,
             lanes,
             **learning.keywords,
-            policy_kwargs={"pointer": network(player.hidden, player.prior)},
+            policy_kwargs={"pointer": network(settings.hidden, settings.prior)},
             device="cpu",
             seed=seed,
         )
@@ -52,4 +52,4 @@ class WaypointLearner:
 
 
 def _settings(config: TrainingConfig) -> WaypointSettings:
-    return cast(WaypointSettings, config.player)
+    return cast(WaypointSettings, config.policy)

@@ -25,7 +25,7 @@ def observation() -> Observation:
 
 
 def attention_network(hidden: int, keys: int) -> Attention:
-    """The gaze network that reads `observation()`."""
+    """The attention network that reads `observation()`."""
     there = observation_columns("waypoints", "valid")[:, 0].tolist()
     return Attention(
         inputs=OBSERVATION_SIZE,

@@ -1,11 +1,15 @@
 """What a velocity learner reads and is paid for."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from uas_coverage_agents.policy.tensors import Width
 from uas_coverage_env.files.strict_toml import StrictModel
+
+
+def _present_name(network: Any) -> Any:
+    return "attention" if network == "gaze" else network  # as version 0.2 called it
 
 
 class VelocitySettings(StrictModel):
@@ -13,9 +17,9 @@ class VelocitySettings(StrictModel):
 
     Attributes:
         interface: "velocity".
-        network: "layers", one after the other; or "gaze", see `policy.attention.Attention`.
-        hidden: Widths of the layers of actor and of critic; of "gaze" the one of its actor.
-        keys: Of "gaze", see there.
+        network: "layers", one after the other; or "attention", see `policy.attention.Attention`.
+        hidden: Widths of the layers of actor and of critic; of "attention" the one of its actor.
+        keys: Of "attention", see there.
         activation: Of the layers of "layers".
         first_deviation: Of the actions before training, 1: the largest action. In PPO it falls as
             the learning rate does.
@@ -27,7 +31,7 @@ class VelocitySettings(StrictModel):
     """
 
     interface: Literal["velocity"]
-    network: Literal["layers", "gaze"] = "layers"
+    network: Annotated[Literal["layers", "attention"], BeforeValidator(_present_name)] = "layers"
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)] = (128, 128)
     keys: Width = 32
     activation: Literal["tanh", "relu"] = "tanh"
@@ -40,6 +44,6 @@ class VelocitySettings(StrictModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if self.network == "gaze" and len(self.hidden) != 1:
-            raise ValueError(f"hidden is {list(self.hidden)}; the network 'gaze' has one width")
+        if self.network == "attention" and len(self.hidden) != 1:
+            raise ValueError(f"hidden is {list(self.hidden)}; 'attention' has one width")
         return self

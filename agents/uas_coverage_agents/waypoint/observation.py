@@ -265,7 +265,7 @@ def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
             values[CANDIDATE_AT.margin] = to_spare_s
             values[CANDIDATE_AT.blocked] = blocked[w]
             values[CANDIDATE_AT.claimed] = claimed[w]
-            _company(legs, state, w, values)
+            _write_around(legs, state, w, values)
             first_s = math.inf
             for j in range(n_uas):
                 if j != i and place[j] != ABSENT:
@@ -362,7 +362,7 @@ def _worth(total_s, longest_s, left, k, best):
 
 
 @allocating_kernel
-def _company(legs, state, w, values):
+def _write_around(legs, state, w, values):
     """Write what is open around waypoint w."""
     unit_s = legs.unit[1]
     nearest_s = math.inf

@@ -29,7 +29,7 @@ from uas_coverage_env.world.state import STATE
 NO_UAS = -1
 
 ENERGY, TIME, FILTERED, LOST_UAS, NOT_HOME, LEFT = range(6)
-"""Columns of an account: energy of all [Wh], time while anybody flew [s], steps of single UAS in
+"""Columns of an account: energy of all [Wh], time while any UAS flew [s], steps of single UAS in
 which the filter changed the command; at the end: UAS lost, UAS in the air, waypoints left."""
 
 ACCOUNT_SIZE = LEFT + 1

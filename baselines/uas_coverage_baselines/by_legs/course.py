@@ -186,7 +186,8 @@ class CoursePlanner:
         return float(chord_m.min()) / self._brief.dt_s
 
     def _is_clear(self, row: int, a: FloatArray, b: FloatArray) -> bool:
-        return route(self.terrain.arena, row, *a, *b)[3] == CLEAR
+        _, _, _, leg = route(self.terrain.arena, row, *a, *b)
+        return leg == CLEAR
 
     def _fly_to(
         self,

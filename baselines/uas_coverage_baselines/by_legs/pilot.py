@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs.course import Course, CoursePlanner
-from uas_coverage_env.autopilot import has_to_return
-from uas_coverage_env.mission import MissionBrief, WorldView
+from uas_coverage_env.mission import MissionBrief, Recall, WorldView
 from uas_coverage_env.mission.separation import Waits, separate
-from uas_coverage_env.world import FLYING, Command, GoTo, SwarmState, Velocity
+from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 
@@ -48,7 +47,7 @@ class LegPilot:
         self._courses: list[Course | None] = [None] * n_uas
         self._clock_s, self._held_s = np.zeros(n_uas), np.zeros(n_uas)
         self._view, self._begun = WorldView(brief), False
-        self._returns = np.zeros(n_uas, np.bool_)
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._guided: dict[int, tuple[int | None, float]] = {}
         self._missed = np.zeros((n_uas, len(brief.waypoints)), np.int64)
 
@@ -99,10 +98,9 @@ class LegPilot:
     def _call_home(self, swarm: SwarmState) -> None:
         """Note whose charge suffices for nothing more than the way home."""
         self._view.update(swarm)
-        for u in np.flatnonzero((swarm.status == FLYING) & ~self._returns):
-            # asked before it departs, too, so that nothing is compiled in mid-flight
-            called = has_to_return(self._view.arena, self._view.state, u)
-            self._returns[u] = called and swarm.departed[u]
+        # asked before it departs, too, so that nothing is compiled in mid-flight
+        self._returns = self._recall.update(swarm, self._view)
+        self._recall.keep(swarm.departed)
 
     def _command(self, swarm: SwarmState, u: int, route: list[int]) -> Command:
         if self._returns[u] or (not route and not swarm.departed[u]):

@@ -46,6 +46,7 @@ from uas_coverage_env.vehicle import (
     Z,
 )
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.layout import RATE, SPEED
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.tube import belief_gain
 from uas_coverage_env.world import FLYING, Mode, SwarmState, Velocity
@@ -124,11 +125,11 @@ class InWind:
 
     def _learn(self, i: int, before: FloatArray, now: FloatArray) -> None:
         A, B = self._axis[i]
-        alpha = (now[:, 3] - before[:, 3]) / B[3]  # whatever was flown
-        off_mps = now[:, 1] - (before @ A[1] + B[1] * alpha)
+        alpha = (now[:, RATE] - before[:, RATE]) / B[RATE]  # whatever was flown
+        off_mps = now[:, SPEED] - (before @ A[SPEED] + B[SPEED] * alpha)
         gain = max(belief_gain(self._dt_s), 1.0 / (1.0 + self._seen[i]))
         self._seen[i] += 1
-        self.wind_mps[i] += gain * (off_mps / (1.0 - A[1, 1]) - self.wind_mps[i])
+        self.wind_mps[i] += gain * (off_mps / (1.0 - A[SPEED, SPEED]) - self.wind_mps[i])
 
     def from_here(self, plan: Plan | None, problem: PlanningProblem) -> Plan | None:
         """What is left of a plan, from where the UAS of the problem are."""

@@ -74,7 +74,7 @@ def reproduce(
             screen,
             _jobs(jobs),
             "process",
-            source_of(sweep.players.values()),
+            source_of(sweep.planners.values()),
             keep=out / _FLIGHTS,
         )
         flights = {} if trouble else _flown(published, store, out)

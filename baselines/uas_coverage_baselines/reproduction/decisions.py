@@ -12,6 +12,7 @@ from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.flight import MODES, Flight, covered_at
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.vehicle import VX, VY
 from uas_coverage_env.world import FLYING, LANDED, LOST, SwarmState
 
 _NO_REACH_M = -1e4  # a distance that is kept wherever two UAS are
@@ -27,7 +28,7 @@ def seen_at(flight: Flight, step: int) -> SwarmState:
         step=step,
         names=flight.names,
         x=x.copy(),
-        reference_mps=x[:, 3:5].copy(),
+        reference_mps=x[:, VX : VY + 1].copy(),
         status=np.where(mode < MODES.index("landed"), FLYING, ended),
         departed=np.ones(len(x), bool),
         returning=np.zeros(len(x), bool),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.route_time import (
+    BACKWARD,
     add_piece,
     joined,
     pieces_s,
@@ -79,7 +80,7 @@ def insert_missing(task, routes, lengths, missing, total_weight, by_pieces):
     """
     n_uas, width = len(routes) - 1, routes.shape[1]
     seconds, swaps = np.empty(n_uas), len(task.packs) > 0
-    trial, pieces = np.empty(width, np.int64), np.empty((3, 4), np.int64)
+    trial, pieces = np.empty(width, np.int64), np.empty((3, BACKWARD + 1), np.int64)
     sums = sums_of(task, n_uas, width)
     for u in range(n_uas):
         seconds[u] = route_s(task, u, routes[u], lengths[u])

@@ -12,6 +12,13 @@ from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
 FloatArray = NDArray[np.float64]
 
 
+V_NORTH, V_EAST, CRUISE, ACCELERATION = range(4)
+"""Columns of `RoutingArrays.motion`."""
+
+ROW, FIRST, LAST, BACKWARD = range(4)
+"""Columns of a list of pieces: places FIRST to LAST of a row of routes, in turn or backward."""
+
+
 class RoutingArrays(NamedTuple):
     """What the search reads of a task, for compiled code."""
 
@@ -23,7 +30,7 @@ class RoutingArrays(NamedTuple):
     place: FloatArray
     """(W+2U, 2) of waypoints, UAS and starts, north and east."""
     motion: FloatArray
-    """(U, 4) velocity to the north and east, cruising speed, and acceleration."""
+    """(U, 4) velocity to the north and east, cruising speed, and acceleration, see `V_NORTH`."""
     turn: FloatArray
     opens: FloatArray
     """(U, W) from when on each UAS may visit."""
@@ -56,8 +63,9 @@ def setting_off_s(place, motion, u, here, to):
     """What is lost until the velocity points to the first waypoint."""
     dx, dy = place[to, 0] - place[here, 0], place[to, 1] - place[here, 1]
     length = np.hypot(dx, dy) + 1e-9
-    speed_mps, acceleration_mps2 = motion[u, 2], motion[u, 3]
-    ax, ay = motion[u, 0] - speed_mps * dx / length, motion[u, 1] - speed_mps * dy / length
+    speed_mps, acceleration_mps2 = motion[u, CRUISE], motion[u, ACCELERATION]
+    ax = motion[u, V_NORTH] - speed_mps * dx / length
+    ay = motion[u, V_EAST] - speed_mps * dy / length
     return (ax * ax + ay * ay) / (2.0 * acceleration_mps2 * speed_mps)
 
 
@@ -144,7 +152,8 @@ def add_piece(pieces, n, row, first, last, backward):
     """Add the places `first` to `last` of a row to a list of pieces; how many there are then."""
     if last < first:
         return n
-    pieces[n, 0], pieces[n, 1], pieces[n, 2], pieces[n, 3] = row, first, last, backward
+    pieces[n, ROW], pieces[n, FIRST], pieces[n, LAST] = row, first, last
+    pieces[n, BACKWARD] = backward
     return n + 1
 
 
@@ -153,9 +162,9 @@ def joined(routes, pieces, n, out):
     """Write the route that pieces make; its length."""
     length = 0
     for p in range(n):
-        row, first, last = pieces[p, 0], pieces[p, 1], pieces[p, 2]
+        row, first, last = pieces[p, ROW], pieces[p, FIRST], pieces[p, LAST]
         for k in range(last - first + 1):
-            out[length] = routes[row, last - k] if pieces[p, 3] else routes[row, first + k]
+            out[length] = routes[row, last - k] if pieces[p, BACKWARD] else routes[row, first + k]
             length += 1
     return length
 
@@ -169,8 +178,8 @@ def pieces_s(task, sums, u, routes, pieces, n):
     n_waypoints, n_uas = task.opens.shape[1], len(task.kind)
     before, here, time = n_waypoints + u, -1, 0.0
     for p in range(n):
-        row, low, high = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-        step = -1 if pieces[p, 3] else 1
+        row, low, high = pieces[p, ROW], pieces[p, FIRST], pieces[p, LAST]
+        step = -1 if pieces[p, BACKWARD] else 1
         at, end = (high, low) if step < 0 else (low, high)
         following = routes[row, at]
         if here < 0:

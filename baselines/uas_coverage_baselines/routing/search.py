@@ -40,7 +40,7 @@ class SearchEffort:
         hottest_s: temperature at the beginning; worse orders by about this much are accepted.
         coldest_s: temperature at the end.
         window: only the first so many waypoints of each route are moved; 0 for all.
-        total_weight: worth of a second of anybody's flight against one of the longest.
+        total_weight: worth of a second of any flight against one of the longest.
         by_pieces: whether a change is judged by sums along the routes, which takes the same time
             however long they are, and rounds otherwise: another order may come of it.
     """
@@ -83,7 +83,7 @@ class Routes:
 
 
 def empty_routes(n_uas: int) -> Routes:
-    """Nobody visits anything: where a search begins."""
+    """No UAS visits anything: where a search begins."""
     nothing = np.zeros(0, np.int64)
     return Routes((nothing,) * n_uas, nothing, np.zeros(n_uas), np.inf)
 

@@ -30,6 +30,7 @@ BRAKING_S = 14.0
 
 _LIMIT_USED = 1.001  # the world tolerates 1 %
 _ROUNDING_M = 1e-6
+_AS_PLANNED = 1e-6  # of states
 _DOD_RESERVE = 2e-3
 
 
@@ -58,6 +59,10 @@ class Course:
         """What is left at a sample; hovers go on."""
         done = min(step - self.begin, len(self.u))
         return Course(step, self.x[done:], self.u[done:], self.lands)
+
+    def begins_at(self, x: FloatArray) -> bool:
+        """Whether a UAS in this state (14,) flies what was planned; its battery is left out."""
+        return bool(np.abs(self.x[0, :DOD] - x[:DOD]).max() <= _AS_PLANNED)
 
     def path_m(self, steps: int) -> FloatArray:
         """(K+1, 3) positions, K at most `steps`; a hover is held, a UAS that has landed is gone."""

@@ -35,10 +35,11 @@ from uas_coverage_env.vehicle.limits import N_LIMITS
 
 FloatArray = NDArray[np.float64]
 
-N_X, N_U = 10, 3
-POSITION = np.array([0, 4, 8])
-VELOCITY = np.array([1, 5, 9])
-NORMS = np.array([[1, 5], [2, 6], [3, 7]])
+NORTH, V_NORTH, TILT_NORTH, RATE_NORTH, EAST, V_EAST, TILT_EAST, RATE_EAST, DOWN, V_DOWN = range(10)
+N_X, N_U = V_DOWN + 1, 3
+POSITION = np.array([NORTH, EAST, DOWN])
+VELOCITY = np.array([V_NORTH, V_EAST, V_DOWN])
+NORMS = np.array([[V_NORTH, V_EAST], [TILT_NORTH, TILT_EAST], [RATE_NORTH, RATE_EAST]])
 """Pairs of states whose norms are limited: velocity, tilt, rate."""
 
 _KEPT_BACK = 2e-4  # share of each limit that is left to the tolerance of the solver
@@ -79,10 +80,9 @@ def flight_model(
         speed_share: Of the largest horizontal speed, that is flown at most.
     """
     A, B = np.zeros((N_X, N_X)), np.zeros((N_X, N_U))
-    for axis in range(2):
-        rows = slice(4 * axis, 4 * axis + 4)
+    for axis, rows in enumerate((slice(NORTH, EAST), slice(EAST, DOWN))):
         A[rows, rows], B[rows, axis] = vehicle.axis_A, vehicle.axis_B
-    A[8:, 8:], B[8:, 2] = vehicle.vertical_A, vehicle.vertical_B
+    A[DOWN:, DOWN:], B[DOWN:, N_U - 1] = vehicle.vertical_A, vehicle.vertical_B
     share = 1.0 - kept_back
     alpha = [
         min(vehicle.torque_max_Nm[a] / vehicle.inertia_kgm2[a], vehicle.alpha_xy_max_radps2)

@@ -42,7 +42,6 @@ BoolArray = NDArray[np.bool_]
 _MOVES_PER_STEP = 60  # changes of an order take as long as a step of a flight looked for
 _PROGRAMS = 60  # for each flight; more change next to nothing
 _LEFT_STEPS = 20  # a plan that ends sooner after it would take over is not improved
-_AS_PLANNED = 1e-6  # of states
 _VARIED = 0.1  # of leg times, at most
 _CHEAPER_S = 0.01
 
@@ -242,7 +241,7 @@ def _fits(found: MissionPlan, swarm: SwarmState, planned: Mapping[int, Planned])
         return False
     visited = np.zeros(len(swarm.uncovered), np.bool_)
     for u, new in found.planned.items():
-        if np.abs(new.course.x[0, :12] - swarm.x[u, :12]).max() > _AS_PLANNED:
+        if not new.course.begins_at(swarm.x[u]):
             return False
         visited[new.route] = True
     return not any(

@@ -19,15 +19,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.flight_model import N_U, N_X, NORMS, FlightModel
+from uas_coverage_baselines.trajectory.flight_model import N_U, N_X, NORMS, V_DOWN, FlightModel
 from uas_coverage_baselines.trajectory.riccati import Factors, factor, newton_step
-from uas_coverage_baselines.trajectory.rows import SoftRows, Values, evaluate, violations
+from uas_coverage_baselines.trajectory.rows import (
+    CLIMB,
+    N_HARD,
+    SoftRows,
+    Values,
+    evaluate,
+    violations,
+)
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_HARD = 5  # of a stage: three norms, climb, descent
 _BOUNDS = 2 * N_U
 _REGULAR = 1e-8
 _STEP = 0.995  # of the way to the boundary
@@ -71,7 +77,7 @@ class _Iterate(NamedTuple):
 @allocating_kernel
 def _iterate(n_stages, n_soft):
     return _Iterate(
-        np.zeros((n_stages + 1, _HARD)), np.zeros((n_stages + 1, _HARD)),
+        np.zeros((n_stages + 1, N_HARD)), np.zeros((n_stages + 1, N_HARD)),
         np.zeros((n_stages, _BOUNDS)), np.zeros((n_stages, _BOUNDS)),
         np.zeros(n_soft), np.zeros(n_soft), np.zeros(n_soft), np.zeros(n_soft),
     )  # fmt: skip
@@ -81,8 +87,8 @@ def _iterate(n_stages, n_soft):
 def _begin(model, rows, values, at):
     """First slacks and multipliers, all positive."""
     for n in range(1, len(at.hard)):
-        for k in range(_HARD):
-            scale = model.norms[k] if k < 3 else model.vertical[k - 3]
+        for k in range(N_HARD):
+            scale = model.norms[k] if k < CLIMB else model.vertical[k - CLIMB]
             at.hard[n, k] = max(-values.hard[n, k], 0.1 * scale)
             at.hard_price[n, k] = 0.05 / at.hard[n, k]
     for n in range(len(at.bound)):
@@ -102,7 +108,7 @@ def _add_slacks(at, values):
     """Turn values into residuals; the largest, and the sum of the complementarity products."""
     worst, products = 0.0, 0.0
     for n in range(1, len(at.hard)):
-        for k in range(_HARD):
+        for k in range(N_HARD):
             values.hard[n, k] += at.hard[n, k]
             worst = max(worst, abs(values.hard[n, k]))
             products += at.hard[n, k] * at.hard_price[n, k]
@@ -126,7 +132,7 @@ def _hessian(model, loose, rows, x, at, values, Q, R):
         Q[n] = 0.0
         for i in range(N_X):
             Q[n, i, i] = _REGULAR
-        for k in range(3):
+        for k in range(CLIMB):
             i, j, limit = NORMS[k, 0], NORMS[k, 1], loose[n] * model.norms[k]
             price = at.hard_price[n, k]
             stiff = price / at.hard[n, k] / (limit * limit)
@@ -134,8 +140,8 @@ def _hessian(model, loose, rows, x, at, values, Q, R):
             Q[n, j, j] += stiff * x[n, j] * x[n, j] + price / limit
             Q[n, i, j] += stiff * x[n, i] * x[n, j]
             Q[n, j, i] = Q[n, i, j]
-        for k in range(3, _HARD):
-            Q[n, 9, 9] += at.hard_price[n, k] / at.hard[n, k]
+        for k in range(CLIMB, N_HARD):
+            Q[n, V_DOWN, V_DOWN] += at.hard_price[n, k] / at.hard[n, k]
     for n in range(len(R)):
         for a in range(N_U):
             R[n, a] = model.input_weight[a]
@@ -158,16 +164,16 @@ def _gradient(model, loose, rows, x, u, at, values, aside, target, q, r):
     """Right-hand sides; `aside` holds what the corrector adds to the products."""
     q[:] = 0.0
     for n in range(1, len(x)):
-        for k in range(_HARD):
+        for k in range(N_HARD):
             price, slack = at.hard_price[n, k], at.hard[n, k]
             product = price * slack - target + aside.hard[n, k]
             value = price + (price * values.hard[n, k] - product) / slack
-            if k < 3:
+            if k < CLIMB:
                 for side in range(2):
                     i = NORMS[k, side]
                     q[n, i] += value * x[n, i] / (loose[n] * model.norms[k])
             else:
-                q[n, 9] += -value if k == 3 else value
+                q[n, V_DOWN] += -value if k == CLIMB else value
     for n in range(len(u)):
         for a in range(N_U):
             value = model.input_weight[a] * u[n, a]
@@ -201,12 +207,12 @@ def _changes(model, loose, rows, x, dx, du, at, values, aside, target, change):
     """Write the changes of slacks and multipliers; the longest primal and dual steps."""
     primal, dual = 1.0, 1.0
     for n in range(1, len(dx)):
-        for k in range(_HARD):
-            if k < 3:
+        for k in range(N_HARD):
+            if k < CLIMB:
                 i, j = NORMS[k, 0], NORMS[k, 1]
                 along = (x[n, i] * dx[n, i] + x[n, j] * dx[n, j]) / (loose[n] * model.norms[k])
             else:
-                along = -dx[n, 9] if k == 3 else dx[n, 9]
+                along = -dx[n, V_DOWN] if k == CLIMB else dx[n, V_DOWN]
             price, slack = at.hard_price[n, k], at.hard[n, k]
             product = price * slack - target + aside.hard[n, k]
             change.hard[n, k] = -values.hard[n, k] - along
@@ -290,7 +296,7 @@ def _solve(model, loose, rows, x, u, iterations, complementarity):
         _iterate(n_stages, n_soft), _iterate(n_stages, n_soft), _iterate(n_stages, n_soft)
     )  # fmt: skip
     values = Values(
-        np.zeros((n_stages + 1, _HARD)), np.zeros((n_stages, _BOUNDS)), np.zeros(n_soft),
+        np.zeros((n_stages + 1, N_HARD)), np.zeros((n_stages, _BOUNDS)), np.zeros(n_soft),
         np.zeros((n_soft, 3)), np.zeros((n_stages, N_X)),
     )  # fmt: skip
     factors = Factors(
@@ -301,7 +307,7 @@ def _solve(model, loose, rows, x, u, iterations, complementarity):
     q, r = np.zeros((n_stages + 1, N_X)), np.zeros((n_stages, N_U))
     dx, du = np.zeros((n_stages + 1, N_X)), np.zeros((n_stages, N_U))
     costate, new_costate = np.zeros((n_stages, N_X)), np.zeros((n_stages, N_X))
-    n_products = n_stages * (_HARD + _BOUNDS) + 2 * n_soft
+    n_products = n_stages * (N_HARD + _BOUNDS) + 2 * n_soft
     converged, done = False, 0
     for done in range(iterations):
         evaluate(model, loose, rows, x, u, values)

@@ -38,13 +38,12 @@ from uas_coverage_env.mission import (
     first_sight,
     without,
 )
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle import DELTA_THRUST, VX, VZ
 from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_AS_PLANNED = 1e-6  # of states
 _AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
 _HOME_AFTER_S = 30.0  # without a plan for so long a UAS flies home
 _PLAN_MARGIN_M = 1.0  # plans keep this much more from what moves than what is flown has to
@@ -236,14 +235,14 @@ class Trajectory:
             u_now = course.u[0] if len(course.u) else holds
             flown[u] = u_now
             mode = "covering" if self._has_work(u, swarm) else "return"
-            commands[name] = Wrench(*(float(value) for value in u_now[:4]), mode=mode)
+            commands[name] = Wrench(*(float(value) for value in u_now[:DELTA_THRUST]), mode=mode)
             predicted_m[name] = course.path_m(max(len(course.u), 1))
         if rest:
             late = [u for u in rest if dt_s * (step - self._without_plan_since[u]) >= _HOME_AFTER_S]
             inputs = self._safeguard.evade(rest, flown, late)
             for u in rest:
                 self._safeguard.backups.pop(u, None)
-                wrench = (float(value) for value in inputs[u][:4])
+                wrench = (float(value) for value in inputs[u][:DELTA_THRUST])
                 mode = "return" if u in late else "covering"
                 commands[swarm.names[u]] = Wrench(*wrench, mode=mode)
         self.last_decision = Decision(predicted_m, fallback=fallback is not None, reason=fallback)
@@ -267,7 +266,7 @@ class Trajectory:
         filtered = swarm.filtered if len(swarm.filtered) else np.zeros(len(swarm.x), np.bool_)
         for u, planned in list(self._planned.items()):
             rest = planned.course.rest(swarm.step)
-            if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
+            if rest.begins_at(swarm.x[u]):
                 continue
             if u not in self._flown_as_planned:  # nothing pushed it: it flew something else
                 del self._planned[u]

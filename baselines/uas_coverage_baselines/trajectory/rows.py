@@ -8,11 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.flight_model import N_U, N_X, NORMS
+from uas_coverage_baselines.trajectory.flight_model import N_U, N_X, NORMS, V_DOWN
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+CLIMB, DESCENT = len(NORMS), len(NORMS) + 1
+"""Hard rows of a stage after the `NORMS`."""
+
+N_HARD = DESCENT + 1
 
 
 class SoftRows(NamedTuple):
@@ -47,11 +52,11 @@ class Values(NamedTuple):
 def evaluate(model, loose, rows, x, u, values):
     """Write the rows at a point, without slacks."""
     for n in range(1, len(x)):
-        for k in range(3):
+        for k in range(CLIMB):
             a, b, limit = x[n, NORMS[k, 0]], x[n, NORMS[k, 1]], loose[n] * model.norms[k]
             values.hard[n, k] = 0.5 * (a * a + b * b - limit * limit) / limit
-        values.hard[n, 3] = -x[n, 9] - loose[n] * model.vertical[0]
-        values.hard[n, 4] = x[n, 9] - loose[n] * model.vertical[1]
+        values.hard[n, CLIMB] = -x[n, V_DOWN] - loose[n] * model.vertical[0]
+        values.hard[n, DESCENT] = x[n, V_DOWN] - loose[n] * model.vertical[1]
     for n in range(len(u)):
         for a in range(N_U):
             values.bound[n, 2 * a] = u[n, a] - model.input_high[a]

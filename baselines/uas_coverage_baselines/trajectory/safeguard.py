@@ -30,13 +30,13 @@ from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import Range, WorldView
+from uas_coverage_env.vehicle import DELTA_THRUST
 from uas_coverage_env.world import FLYING, GO_TO, HOME, WRENCH, SwarmState
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 
 FloatArray = NDArray[np.float64]
 
 _FOLLOWED = 30  # steps at most that a course is followed before braking
-_SAME = 1e-6  # of states
 
 
 class Safeguard:
@@ -127,7 +127,7 @@ class Safeguard:
 
     def _holds(self, uas: int, backup: Course, x: FloatArray, movers: Movers) -> bool:
         """Whether what is left of a backup trajectory begins here and is clear of what is seen."""
-        if np.abs(backup.x[0, :12] - x[:12]).max() > _SAME:
+        if not backup.begins_at(x):
             return False
         return self._is_clear(uas, backup, movers)
 
@@ -175,7 +175,7 @@ class Safeguard:
         outcome["applied_command"] = arena.rules[0]["brake"]
         for u, inputs in flown.items():
             outcome["applied_command"]["kind"][u] = WRENCH
-            outcome["applied_command"]["values"][u] = inputs[:4]
+            outcome["applied_command"]["values"][u] = inputs[:DELTA_THRUST]
         for u in homeward:
             outcome["applied_command"]["kind"][u] = GO_TO
             outcome["applied_command"]["values"][u, 0] = HOME

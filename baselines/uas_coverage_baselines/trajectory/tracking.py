@@ -12,6 +12,7 @@ from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import (
     NORMS,
+    V_DOWN,
     FlightModel,
     flight_model,
     reduced_state,
@@ -31,7 +32,7 @@ _LATER = (0, 1, 2, 4)  # steps
 def _loose(model: FlightModel, start: FloatArray) -> FloatArray:
     """Factors on the limits of the first steps, for a start that is beyond them."""
     norms = np.linalg.norm(start[NORMS], axis=1) / model.norms
-    vertical = np.array([-start[9], start[9]]) / model.vertical
+    vertical = np.array([-start[V_DOWN], start[V_DOWN]]) / model.vertical
     excess = max(float(norms.max()), float(vertical.max()), 1.0) - 1.0
     return 1.0 + 1.05 * excess * _SETTLING
 

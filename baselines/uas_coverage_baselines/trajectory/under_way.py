@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from uas_coverage_baselines.routing import Routes
 from uas_coverage_baselines.trajectory.course import Course
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import SwarmState
-
-_AS_PLANNED = 1e-6  # of states
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,7 @@ class UnderWay:
         planned = {}
         for u, each in self.planned.items():
             rest = each.course.rest(swarm.step)
-            if np.abs(rest.x[0, :12] - swarm.x[u, :12]).max() <= _AS_PLANNED:
+            if rest.begins_at(swarm.x[u]):
                 planned[u] = each
         return UnderWay(self.order, planned, self.backups)
 

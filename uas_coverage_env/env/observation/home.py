@@ -41,7 +41,8 @@ def _way_home(arena, state, i):
 @kernel
 def charge_home(arena, state, i):
     """Depth of discharge that the way home costs at top speed."""
-    return _way_home(arena, state, i)[4]
+    _, _, _, _, home_dod = _way_home(arena, state, i)
+    return home_dod
 
 
 @inlined_kernel

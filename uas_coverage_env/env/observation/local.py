@@ -14,7 +14,10 @@ from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
 from uas_coverage_env.env.observation.waypoints import WAYPOINTS, write_waypoints
 
-_OF_THE_SWARM = {"own": ("uncovered",), "waypoints": ("neighbour", "crowd", "rival", "taken")}
+_OF_THE_SWARM = {
+    "own": ("uncovered",),
+    "waypoints": ("neighbour", "density", "nearest_uas", "taken"),
+}
 
 
 def _kept(group: Group) -> tuple[Feature, ...]:
@@ -83,7 +86,8 @@ def local(range_m: float = 100.0) -> tuple[ObservationBlock, ...]:
     """The blocks of `OBSERVATION` for a UAS on its own, with a limited range.
 
     Open waypoints, other UAS and moving obstacles beyond the range are not there; what only the
-    swarm as a whole knows (shares of what is left, rivals, crowds) is left out everywhere.
+    swarm as a whole knows (shares of what is left, and how dense and contested it is) is left out
+    everywhere.
 
     Args:
         range_m: Of sensors and radio [m].

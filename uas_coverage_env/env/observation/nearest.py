@@ -9,16 +9,22 @@ from scipy.spatial import KDTree
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, stack_array
 from uas_coverage_env.env.observation.relative import close
-from uas_coverage_env.env.observation.scales import CROWD, CROWD_M, K_WAYPOINTS
+from uas_coverage_env.env.observation.scales import DENSEST, DENSITY_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world.coverage import can_cover
+from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M
 
 NO_TARGET = -2
 """Target of a UAS that has none; home is world's HOME, waypoints are their indices."""
 
 N_NEIGHBOURS = 24
+
+NEXT, DENSITY = range(2)
+"""Columns of `Learners.around`: closeness of the next open waypoint, and how dense they are."""
+
+N_AROUND = DENSITY + 1
 
 _WORD = 63
 """As many waypoints are asked at once: their answers are the bits of one number that has a sign."""
@@ -55,9 +61,9 @@ def neighbours_of(scenario: Scenario) -> NDArray[np.void]:
 
 @inlined_kernel
 def _away_m2(columns, w, x, y, z):
-    dx = columns[0, w] - x
-    dy = columns[1, w] - y
-    dz = columns[2, w] - z
+    dx = columns[NORTH_M, w] - x
+    dy = columns[EAST_M, w] - y
+    dz = columns[DOWN_M, w] - z
     return dx * dx + dy * dy + dz * dz
 
 
@@ -106,9 +112,10 @@ def nearest_waypoints(arena, state, i, candidates):
         n = min(_WORD, n_waypoints - first)
         limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
         bits = _open_within(
-            slice_view(columns, first, n), slice_view(columns, n_waypoints + first, n),
-            slice_view(columns, 2 * n_waypoints + first, n), slice_view(uncovered, first, n),
-            x, y, z, limit_m2,
+            slice_view(columns, NORTH_M * n_waypoints + first, n),
+            slice_view(columns, EAST_M * n_waypoints + first, n),
+            slice_view(columns, DOWN_M * n_waypoints + first, n),
+            slice_view(uncovered, first, n), x, y, z, limit_m2,
         )  # fmt: skip
         held = 0
         for c in range(found):
@@ -127,28 +134,27 @@ def nearest_waypoints(arena, state, i, candidates):
 
 
 @kernel
-def count_company(uncovered, neighbours, company):
+def write_around(uncovered, neighbours, around):
     """Write what is open around every waypoint; it changes only when a waypoint is covered.
 
     Args:
         uncovered: (W,) still to be covered.
         neighbours: (W,) of NEIGHBOURS_DTYPE.
-        company: (W, 2) of float32, closeness of the next open waypoint, and how crowded it is;
-            written.
+        around: (W, N_AROUND) of float32; written.
     """
-    for w in range(company.shape[0]):
+    for w in range(around.shape[0]):
         index = neighbours[w].index
         distance_m = neighbours[w].distance_m
         next_m = math.inf
-        crowd = 0
+        near = 0
         for n in range(N_NEIGHBOURS):
             other = index[n]
             if other < 0:
                 break
             if uncovered[other]:
                 next_m = min(next_m, distance_m[n])
-                if distance_m[n] > CROWD_M or crowd == CROWD:
+                if distance_m[n] > DENSITY_M or near == DENSEST:
                     break
-                crowd += 1
-        company[w, 0] = close(next_m)
-        company[w, 1] = crowd / CROWD
+                near += 1
+        around[w, NEXT] = close(next_m)
+        around[w, DENSITY] = near / DENSEST

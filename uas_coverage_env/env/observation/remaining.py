@@ -6,9 +6,17 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
 from uas_coverage_env.vehicle import X, Y
-from uas_coverage_env.world.waypoints import ALL_SHARES
+from uas_coverage_env.world.waypoints import (
+    ALL_SHARES,
+    EAST_M,
+    NORTH_M,
+    SHARE,
+    SHARE_EAST,
+    SHARE_NORTH,
+)
 
 _N_SECTORS = 8
+_N_NE, _NE_E, _E_SE, _SE_S, _S_SW, _SW_W, _W_NW, _NW_N = range(_N_SECTORS)  # from, to
 _NORTH, _EAST, _N_SUMS = _N_SECTORS, _N_SECTORS + 1, _N_SECTORS + 2
 
 _FEATURES = (
@@ -53,15 +61,15 @@ def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, 
         all_three += share if in_half & in_quarter & in_eighth else 0.0
         north += shares_north[w] if uncovered[w] else 0.0
         east += shares_east[w] if uncovered[w] else 0.0
-    sums[0] = all_three
-    sums[1] = half_quarter - all_three
-    sums[2] = half_eighth - all_three
-    sums[3] = half - half_quarter - half_eighth + all_three
-    sums[4] = quarter_eighth - all_three
-    sums[5] = quarter - half_quarter - quarter_eighth + all_three
-    sums[6] = eighth - half_eighth - quarter_eighth + all_three
-    sums[7] = every - half - quarter - eighth
-    sums[7] += half_quarter + half_eighth + quarter_eighth - all_three
+    sums[_N_NE] = all_three
+    sums[_NE_E] = half_quarter - all_three
+    sums[_E_SE] = half_eighth - all_three
+    sums[_SE_S] = half - half_quarter - half_eighth + all_three
+    sums[_S_SW] = quarter_eighth - all_three
+    sums[_SW_W] = quarter - half_quarter - quarter_eighth + all_three
+    sums[_W_NW] = eighth - half_eighth - quarter_eighth + all_three
+    sums[_NW_N] = every - half - quarter - eighth
+    sums[_NW_N] += half_quarter + half_eighth + quarter_eighth - all_three
     sums[_NORTH] = north
     sums[_EAST] = east
 
@@ -72,11 +80,11 @@ def _open_weight(arena, state, i, sums):
     n = state.uncovered.shape[0]
     columns = arena.waypoint_columns
     _add_open(
-        slice_view(columns, 0, n),
-        slice_view(columns, n, n),
-        slice_view(columns, 5 * n, n),
-        slice_view(columns, 6 * n, n),
-        slice_view(columns, 7 * n, n),
+        slice_view(columns, NORTH_M * n, n),
+        slice_view(columns, EAST_M * n, n),
+        slice_view(columns, SHARE * n, n),
+        slice_view(columns, SHARE_NORTH * n, n),
+        slice_view(columns, SHARE_EAST * n, n),
         state.uncovered, state.x[i, X], state.x[i, Y], sums,
     )  # fmt: skip
     left = 0.0

@@ -31,11 +31,11 @@ HEIGHT_M = 20.0
 FAR_M = 250.0
 """Scale of the way to the centre of what is left [m]."""
 
-CROWD_M = 100.0
-"""Open waypoints within this distance of a waypoint are its crowd [m]."""
+DENSITY_M = 100.0
+"""Open waypoints within this distance of a waypoint count for how dense they are there [m]."""
 
-CROWD = 8
-"""Size of a full crowd."""
+DENSEST = 8
+"""As many of them count at most."""
 
 MARGIN = 0.3
 """Scale of energy margins, as depth of discharge."""
@@ -45,11 +45,14 @@ SCALES = {
     "ray_m": RAY_M,
     "height_m": HEIGHT_M,
     "far_m": FAR_M,
-    "crowd_m": CROWD_M,
-    "crowd": float(CROWD),
+    "density_m": DENSITY_M,
+    "density": float(DENSEST),
     "margin": MARGIN,
 }
 """All of the scales above by name: a policy that was trained with others sees another world."""
+
+FORMER_NAMES = {"crowd": "density", "crowd_m": "density_m", "rival": "nearest_uas"}
+"""What scales and features of waypoints are called now that had other names in version 0.2."""
 
 SCALES_DTYPE = np.dtype(
     (

@@ -12,10 +12,12 @@ from uas_coverage_env.env.observation.block import (
     ObservationBlock,
     flag,
 )
+from uas_coverage_env.env.observation.nearest import DENSITY, NEXT
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
 from uas_coverage_env.vehicle import DOD, X, Y, Z
 from uas_coverage_env.world import FLYING
+from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, WEIGHT
 
 _ZERO, _ONE, _INFINITE = np.float32(0.0), np.float32(1.0), np.float32(math.inf)
 _NEARBY_M = np.float32(NEARBY_M)
@@ -29,8 +31,8 @@ _FEATURES = (
     Feature("below", 1, -1, 1, "how far it is below / 20 m"),
     flag("weight", "weight / heaviest of the scenario"),
     flag("neighbour", "closeness of the open waypoint next to it"),
-    flag("crowd", "open waypoints within 100 m of it / 8, at most 1"),
-    flag("rival", "its closeness to the nearest other flying UAS"),
+    flag("density", "open waypoints within 100 m of it / 8, at most 1"),
+    flag("nearest_uas", "its closeness to the nearest other flying UAS"),
     flag("taken", "1 where another UAS is on its way to it (waypoint action)"),
     flag("from_home", "its closeness to the start"),
     Feature("energy_margin", 1, -1, 1, "dod left after visiting it and going home / 0.3"),
@@ -42,7 +44,7 @@ _WIDTH = _GROUP.width
 
 
 @inlined_kernel
-def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m2, taken):
+def _others_near(state, i, targets, wanted, n, north_m, east_m, down_m, other_m2, taken):
     """How near the nearest other flying UAS is to each waypoint, and whether one goes there.
 
     Args:
@@ -54,7 +56,7 @@ def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m2, tak
         north_m: (K_WAYPOINTS,) where they are [m]; likewise east_m and down_m.
         east_m: See north_m.
         down_m: See north_m.
-        rival_m2: (K_WAYPOINTS,) [m²] infinite; written.
+        other_m2: (K_WAYPOINTS,) [m²] infinite; written.
         taken: (K_WAYPOINTS,) zero; written, 1 where one goes there.
     """
     for j in range(state.status.shape[0]):
@@ -67,7 +69,7 @@ def _rivals(state, i, targets, wanted, n, north_m, east_m, down_m, rival_m2, tak
             dx = np.float32(north_m[c] - x)
             dy = np.float32(east_m[c] - y)
             dz = np.float32(down_m[c] - z)
-            rival_m2[c] = min(rival_m2[c], dx * dx + dy * dy + dz * dz)
+            other_m2[c] = min(other_m2[c], dx * dx + dy * dy + dz * dz)
         if targets[j] >= 0 and not state.returning[j]:
             target = float(targets[j])
             for c in range(n):
@@ -91,7 +93,7 @@ def write_waypoints(arena, state, tables, learners, i, row):
     """
     uas = arena.uas[i]
     scale = tables.scales[i]
-    company = learners.company
+    around = learners.around
     candidates = learners.candidates[i]
     x = state.x[i, X]
     y = state.x[i, Y]
@@ -107,14 +109,14 @@ def write_waypoints(arena, state, tables, learners, i, row):
     down_m = stack_array(K_WAYPOINTS)
     weight = stack_array_f32(K_WAYPOINTS)
     next_one = stack_array_f32(K_WAYPOINTS)
-    crowd = stack_array_f32(K_WAYPOINTS)
-    rival_m2 = stack_array_f32(K_WAYPOINTS)
+    density = stack_array_f32(K_WAYPOINTS)
+    other_m2 = stack_array_f32(K_WAYPOINTS)
     taken = stack_array_f32(K_WAYPOINTS)
     north = stack_array_f32(K_WAYPOINTS)
     east = stack_array_f32(K_WAYPOINTS)
     there = stack_array_f32(K_WAYPOINTS)
     below = stack_array_f32(K_WAYPOINTS)
-    rival = stack_array_f32(K_WAYPOINTS)
+    other = stack_array_f32(K_WAYPOINTS)
     from_home = stack_array_f32(K_WAYPOINTS)
     margin = stack_array_f32(K_WAYPOINTS)
     columns = arena.waypoint_columns
@@ -123,18 +125,18 @@ def write_waypoints(arena, state, tables, learners, i, row):
         w = max(candidates[c], 0)
         n += candidates[c] >= 0
         wanted[c] = w
-        north_m[c] = columns[0, w]
-        east_m[c] = columns[1, w]
-        down_m[c] = columns[2, w]
-        weight[c] = np.float32(columns[4, w] * scale.per_heaviest)
+        north_m[c] = columns[NORTH_M, w]
+        east_m[c] = columns[EAST_M, w]
+        down_m[c] = columns[DOWN_M, w]
+        weight[c] = np.float32(columns[WEIGHT, w] * scale.per_heaviest)
         # here already: of 1000 missions, most of this lies far from the processor
-        next_one[c] = company[w, 0]
-        crowd[c] = company[w, 1]
-        rival_m2[c] = _INFINITE
+        next_one[c] = around[w, NEXT]
+        density[c] = around[w, DENSITY]
+        other_m2[c] = _INFINITE
         taken[c] = _ZERO
     # in fours, and not always twelve: a loop of known length is unrolled before it is vectorised
-    _rivals(
-        state, i, learners.targets, wanted, (n + 3) & -4, north_m, east_m, down_m, rival_m2, taken
+    _others_near(
+        state, i, learners.targets, wanted, (n + 3) & -4, north_m, east_m, down_m, other_m2, taken
     )
     for c in range(K_WAYPOINTS):
         dx = np.float32(north_m[c] - x)
@@ -151,11 +153,11 @@ def write_waypoints(arena, state, tables, learners, i, row):
         east[c] = within(dy * per_m, -_ONE, _ONE)
         there[c] = _near(there_m)
         below[c] = within(dz * _PER_HEIGHT, -_ONE, _ONE)
-        rival[c] = _near(math.sqrt(rival_m2[c]))
+        other[c] = _near(math.sqrt(other_m2[c]))
         from_home[c] = _near(home_m)
         margin[c] = within(margin_left - (there_m + home_m) * margin_per_m, -_ONE, _ONE)
     for c in range(K_WAYPOINTS):
-        # an end that nobody can foretell: so the compiler does not write four waypoints at a time,
+        # an end that cannot be foretold: so the compiler does not write four waypoints at a time,
         # by instructions for scattered numbers that take longer than one by one
         if candidates[c] < 0:
             break
@@ -166,8 +168,8 @@ def write_waypoints(arena, state, tables, learners, i, row):
         row[_WIDTH * c + _AT.below] = below[c]
         row[_WIDTH * c + _AT.weight] = within(weight[c], _ZERO, _ONE)
         row[_WIDTH * c + _AT.neighbour] = next_one[c]
-        row[_WIDTH * c + _AT.crowd] = crowd[c]
-        row[_WIDTH * c + _AT.rival] = rival[c]
+        row[_WIDTH * c + _AT.density] = density[c]
+        row[_WIDTH * c + _AT.nearest_uas] = other[c]
         row[_WIDTH * c + _AT.taken] = taken[c]
         row[_WIDTH * c + _AT.from_home] = from_home[c]
         row[_WIDTH * c + _AT.energy_margin] = margin[c]

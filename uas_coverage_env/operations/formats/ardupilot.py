@@ -3,7 +3,7 @@
 import math
 
 from uas_coverage_env.operations.exported import Exported
-from uas_coverage_env.operations.formats.items import items_of
+from uas_coverage_env.operations.formats.items import ALTITUDE, LATITUDE, LONGITUDE, items_of
 from uas_coverage_env.operations.tracks import Tolerances
 from uas_coverage_env.scenario import Scenario
 
@@ -25,8 +25,8 @@ def waypoints_text(one: Exported, tolerances: Tolerances) -> str:
     lines = ["QGC WPL 110", f"0\t1\t0\t16\t0\t0\t0\t0\t{place}\t1"]
     for n, item in enumerate(items_of(one, tolerances.corner_m), 1):
         numbers = [0.0 if math.isnan(value) else value for value in item.params]
-        first = "\t".join(f"{value:.3f}" for value in numbers[:4])
-        place = f"{numbers[4]:.8f}\t{numbers[5]:.8f}\t{numbers[6]:.3f}"
+        first = "\t".join(f"{value:.3f}" for value in numbers[:LATITUDE])
+        place = f"{numbers[LATITUDE]:.8f}\t{numbers[LONGITUDE]:.8f}\t{numbers[ALTITUDE]:.3f}"
         lines.append(f"{n}\t0\t{item.frame}\t{item.command}\t{first}\t{place}\t1")
     return "\n".join(lines) + "\n"
 

@@ -11,6 +11,9 @@ WAYPOINT, LAND, TAKE_OFF, DELAY, CHANGE_SPEED, TRIGGER_DISTANCE = 16, 21, 22, 93
 MISSION_FRAME, RELATIVE_FRAME = 2, 3
 """MAV_FRAME: no place; altitude relative to home."""
 
+LATITUDE, LONGITUDE, ALTITUDE = 4, 5, 6
+"""Places in the seven parameters of an item with a place."""
+
 _NORTH_DEG = 0.0
 """Heading at waypoints, as the world flies: cameras keep their wide side from west to east. Without
 one (NaN), an autopilot turns as it is set to, which is towards where it flies."""
@@ -23,7 +26,7 @@ class Item:
     Attributes:
         command: MAV_CMD.
         frame: MAV_FRAME.
-        params: Seven; NaN: as it is. Of a place the last three are latitude, longitude, altitude.
+        params: Seven; NaN: as it is. The last three are of a place, see `LATITUDE`.
     """
 
     command: int

@@ -9,7 +9,14 @@ import shapely
 
 from uas_coverage_env.operations.convex import hull_of
 from uas_coverage_env.operations.exported import Exported
-from uas_coverage_env.operations.formats.items import RELATIVE_FRAME, Item, items_of
+from uas_coverage_env.operations.formats.items import (
+    ALTITUDE,
+    LATITUDE,
+    LONGITUDE,
+    RELATIVE_FRAME,
+    Item,
+    items_of,
+)
 from uas_coverage_env.operations.tracks import Tolerances
 from uas_coverage_env.scenario import Scenario
 
@@ -62,7 +69,7 @@ def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, autopil
 
 def _simple(item: Item, number: int) -> dict[str, Any]:
     params = [
-        None if math.isnan(value) else round(value, 8 if k in (4, 5) else 3)
+        None if math.isnan(value) else round(value, 8 if k in (LATITUDE, LONGITUDE) else 3)
         for k, value in enumerate(item.params)
     ]
     entry = {
@@ -76,7 +83,7 @@ def _simple(item: Item, number: int) -> dict[str, Any]:
     if item.frame == RELATIVE_FRAME:
         # QGroundControl shows and flies Altitude, others the last of params: both are the same
         entry |= {
-            "Altitude": params[6],
+            "Altitude": params[ALTITUDE],
             "AltitudeMode": _RELATIVE_ALTITUDE,
             "AMSLAltAboveTerrain": None,
         }

@@ -27,6 +27,12 @@ _STDERR = 2
 _AUTOPILOT = 1
 """Component of telemetry that flies."""
 
+_TIME = 0
+_LATITUDE, _LONGITUDE, _HEIGHT = range(1, 4)
+_ANGLES = slice(1, 4)
+_VOLTAGE, _CURRENT, _USED = range(1, 4)
+"""Columns of the rows of positions, attitudes and batteries, after the time."""
+
 _BIN: Mapping[str, Callable[[Any], list[float]]] = {
     "POS": lambda m: [m.Lat, m.Lng, m.RelHomeAlt],
     "ATT": lambda m: [m.Roll, m.Pitch, m.Yaw],
@@ -80,8 +86,8 @@ def read_tlog(path: Path) -> list[Logged]:
     if len(systems) > 1:
         numbers = ", ".join(map(str, sorted(systems)))
         raise InputError(f"{path}: holds several vehicles (systems {numbers}); give a file of each")
-    used = [[row[0], 0.0, 0.0, 1e-3 * row[3]] for row in rows.get("BATTERY_STATUS", [])]
-    power = [row for row in rows.get("SYS_STATUS", []) if row[2] >= 0.0]  # below: not known
+    used = [[row[_TIME], 0.0, 0.0, 1e-3 * row[_USED]] for row in rows.get("BATTERY_STATUS", [])]
+    power = [row for row in rows.get("SYS_STATUS", []) if row[_CURRENT] >= 0.0]  # below: not known
     return [_logged(path, rows, "GLOBAL_POSITION_INT", "ATTITUDE", power, used)]
 
 
@@ -140,39 +146,39 @@ def _logged(
         raise InputError(f"{path}: holds no position ({position}); is it the log of a flight?")
     places = np.array(rows[position])
     # places that were not known yet are at 0, 0; a clock may say the same time twice
-    places = places[(np.abs(places[:, 1:3]) > 0.0).any(axis=1)]
-    back_s = -np.diff(places[:, 0])
+    places = places[(np.abs(places[:, _LATITUDE : _LONGITUDE + 1]) > 0.0).any(axis=1)]
+    back_s = -np.diff(places[:, _TIME])
     if (back_s > _LONGEST_STEP_BACK_S).any():
-        at_s = places[int(back_s.argmax()), 0] - places[0, 0]
+        at_s = places[int(back_s.argmax()), _TIME] - places[0, _TIME]
         raise InputError(
             f"{path}: its clock goes back by {back_s.max():.0f} s, {at_s:.0f} s after its "
             f"beginning; cut out one flight"
         )
-    places = places[np.append(True, np.diff(np.maximum.accumulate(places[:, 0])) > 0.0)]
-    times_s = places[:, 0]
+    places = places[np.append(True, np.diff(np.maximum.accumulate(places[:, _TIME])) > 0.0)]
+    times_s = places[:, _TIME]
 
     def at_times(table: list[list[float]] | None, column: int) -> FloatArray | None:
         if not table:
             return None
         found = np.array(table)
-        return np.interp(times_s, found[:, 0], found[:, column])
+        return np.interp(times_s, found[:, _TIME], found[:, column])
 
     angles = rows.get(attitude)
     return Logged(
         uas="",
         time_s=times_s,
-        latitude_deg=places[:, 1],
-        longitude_deg=places[:, 2],
-        height_m=places[:, 3],
+        latitude_deg=places[:, _LATITUDE],
+        longitude_deg=places[:, _LONGITUDE],
+        height_m=places[:, _HEIGHT],
         attitude_rad=_attitude(np.array(angles), times_s) if angles else None,
-        used_Ah=at_times(used, 3),
-        voltage_V=at_times(power, 1),
-        current_A=at_times(power, 2),
+        used_Ah=at_times(used, _USED),
+        voltage_V=at_times(power, _VOLTAGE),
+        current_A=at_times(power, _CURRENT),
     )
 
 
 def _attitude(angles: FloatArray, times_s: FloatArray) -> FloatArray:
     """(N, 3) roll, pitch, yaw at times [rad]; yaw does not go round at the north."""
-    turned = np.unwrap(np.radians(angles[:, 1:4]), axis=0)
-    found = [np.interp(times_s, angles[:, 0], column) for column in turned.T]
+    turned = np.unwrap(np.radians(angles[:, _ANGLES]), axis=0)
+    found = [np.interp(times_s, angles[:, _TIME], column) for column in turned.T]
     return (np.stack(found, axis=1) + np.pi) % (2.0 * np.pi) - np.pi

@@ -23,8 +23,8 @@ from uas_coverage_env.replay.figures.style import (
 CURVE = "learning_curve.csv"
 
 BASELINES = "baselines"
-"""In the directory of a training: a folder for each player that does not learn, with a curve of one
-row, on the same missions."""
+"""In the directory of a training: a folder for each planner that does not learn, with a curve of
+one row, on the same missions."""
 
 Curve = Mapping[str, Sequence[float] | NDArray[np.float64]]
 """Column of `learning_curve.csv` -> its values, a row for each time that the policy was tried."""
@@ -41,7 +41,7 @@ _PANELS = (
 def training_figure(runs: Mapping[str, Curve]) -> Figure:
     """Coverage, violations, energy and duration over the steps learned from, a line per training.
 
-    The return is shown, too, where all tables have it. A table of one row is that of a player that
+    The return is shown, too, where all tables have it. A table of one row is that of a planner that
     does not learn: a level line.
 
     Args:
@@ -113,7 +113,7 @@ def learning_curve(directory: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def baseline_curves(directory: Path) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """The players that do not learn beside a training: name -> curve of one row.
+    """The planners that do not learn beside a training: name -> curve of one row.
 
     Raises:
         InputError: A curve cannot be read.
@@ -133,12 +133,12 @@ def with_baselines(directories: Mapping[str, Path]) -> dict[str, Curve]:
     """
     beside: dict[str, Curve] = {}
     for name, directory in directories.items():
-        for player, curve in baseline_curves(directory).items():
-            known = beside.get(player)
+        for planner, curve in baseline_curves(directory).items():
+            known = beside.get(planner)
             if known is None:
-                beside[player] = curve
+                beside[planner] = curve
             elif any(known[column][0] != curve[column][0] for column in curve if column in known):
-                beside[f"{player}, {name}"] = curve  # other missions
+                beside[f"{planner}, {name}"] = curve  # other missions
     curves: dict[str, Curve] = {}
     for name, directory in directories.items():
         curves[name or (directory.resolve().name if beside else "")] = learning_curve(directory)

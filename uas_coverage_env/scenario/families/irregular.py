@@ -31,11 +31,12 @@ def irregular(rng: Rng, size: Size) -> Scenario:
     n_uas, n_waypoints = size.draw(rng)
     side_m = _PITCH_M * math.sqrt(n_waypoints) + 2.0 * MARGIN_M
     west_m = strip_m(n_uas, side_m)
-    cut_m = rng.uniform(0.15, 0.3, size=4) * side_m
+    # what is cut off at the corners in the north-east and the south-east
+    ne_east_m, ne_north_m, se_north_m, se_east_m = rng.uniform(0.15, 0.3, size=4) * side_m
     far_m = west_m + side_m
     fence = [
-        (0.0, 0.0), (side_m, 0.0), (side_m, far_m - cut_m[0]), (side_m - cut_m[1], far_m),
-        (cut_m[2], far_m), (0.0, far_m - cut_m[3]),
+        (0.0, 0.0), (side_m, 0.0), (side_m, far_m - ne_east_m), (side_m - ne_north_m, far_m),
+        (se_north_m, far_m), (0.0, far_m - se_east_m),
     ]  # fmt: skip
     radius_m = side_m * rng.uniform(0.26, 0.34, size=3)
     turns = rng.uniform(0.0, 2.0 * math.pi) + np.array([0.0, 2.1, 4.2])

@@ -34,12 +34,13 @@ def streets(rng: Rng, size: Size) -> Scenario:
     blocks = []
     for i in range(lots):
         for j in range(lots):
-            lot = rng.uniform(size=4)
-            if lot[0] < _PARKS:
+            use, depth, width, height = rng.uniform(size=4)
+            if use < _PARKS:
                 continue
-            tower = lot[0] > 1.0 - _TOWERS
+            tower = use > 1.0 - _TOWERS
             room_m = _LOT_M - street_m
-            depth_m, width_m = (0.55 if tower else 1.0) * room_m * (0.8 + 0.2 * lot[1:3])
+            longest_m = (0.55 if tower else 1.0) * room_m
+            depth_m, width_m = longest_m * (0.8 + 0.2 * depth), longest_m * (0.8 + 0.2 * width)
             north_m = MARGIN_M + _LOT_M * (i + 0.5)
             east_m = west_m + MARGIN_M + _LOT_M * (j + 0.5)
             low, high = _HIGH_M if tower else _LOW_M
@@ -51,7 +52,7 @@ def streets(rng: Rng, size: Size) -> Scenario:
                         (north_m - 0.5 * depth_m, north_m + 0.5 * depth_m),
                         (east_m - 0.5 * width_m, east_m + 0.5 * width_m),
                     ),
-                    low + (high - low) * lot[3],
+                    low + (high - low) * height,
                 )
             )
     site = Site(outline((0.0, side_m), (0.0, west_m + side_m)), blocks)

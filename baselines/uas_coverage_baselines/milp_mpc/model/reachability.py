@@ -39,6 +39,7 @@ from uas_coverage_env.vehicle import (
     X,
     Z,
 )
+from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED, TILT
 
 FloatArray = NDArray[np.float64]
 _AXES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -213,10 +214,10 @@ class _Chain:
 
     def _telescoped(self) -> tuple[float, float, float, float]:
         """c1, c2, c3 and epsilon of the one-step map as rewritten above."""
-        (_, p_v, p_t, p_w), (_, v_v, v_t, v_w) = self.a[0], self.a[1]
+        (_, p_v, p_t, p_w), (_, v_v, v_t, v_w) = self.a[POSITION], self.a[SPEED]
         b_p, b_v, b_t, _ = self.b
         c2 = p_t / v_t
-        c3 = (c2 * v_w - p_w) / self.a[2, 3]
+        c3 = (c2 * v_w - p_w) / self.a[TILT, RATE]
         return p_v - c2 * v_v, c2, c3, b_p - c2 * b_v + c3 * b_t
 
     def support(self, x: FloatArray, unit: FloatArray) -> FloatArray:
@@ -227,14 +228,14 @@ class _Chain:
         steepest = np.max(unit @ self.tilt_vertices.T, axis=1)
         quickest = np.max(unit @ self.rate_vertices.T, axis=1)
         alpha = np.abs(unit) @ self.alpha_max
-        _, v_v, v_t, v_w = self.a[1]
+        _, v_v, v_t, v_w = self.a[SPEED]
         _, b_v, b_t, b_w = self.b
         c1, c2, c3, epsilon = self._telescoped()
         speeds = [velocity]
         v, t, w = velocity, tilt, rate
         for _ in range(self.horizon):
             v = np.minimum(fastest, v_v * v + v_t * t + v_w * w + b_v * alpha)
-            t = np.minimum(steepest, t + self.a[2, 3] * w + b_t * alpha)
+            t = np.minimum(steepest, t + self.a[TILT, RATE] * w + b_t * alpha)
             w = np.minimum(quickest, w + b_w * alpha)
             speeds.append(v)
         largest = np.array(speeds)

@@ -236,15 +236,20 @@ def _aim_at(center, reach_m, faces, x, following):
 
 
 @allocating_kernel
+def _distance_m(keep_out, o, north, east, down):
+    """Signed distance of a place from hull o [m]."""
+    first, last = keep_out.first[o], keep_out.last[o]
+    return signed_distance(keep_out.normals, keep_out.offsets, first, last, north, east, down)
+
+
+@allocating_kernel
 def _over_roofs(vehicle, x, down_mps, keep_out):
     """Climb instead where the way ahead leads into an obstacle."""
-    normals, offsets, first, last, clearance = keep_out[:5]
     for step in range(1, _ROOF_LOOKAHEAD + 1):
         north, east = x[X] + step * x[VX], x[Y] + step * x[VY]
-        for o in range(len(first) - 1):
-            height = x[Z] + step * down_mps
-            d = signed_distance(normals, offsets, first[o], last[o], north, east, height)
-            if d < clearance[o] + 0.5:
+        for o in range(len(keep_out.first) - 1):
+            d = _distance_m(keep_out, o, north, east, x[Z] + step * down_mps)
+            if d < keep_out.clearance[o] + 0.5:
                 return -vehicle.v_up_max_mps
     return down_mps
 
@@ -265,18 +270,17 @@ def _above_ground(x, down_mps, keep_out):
 @allocating_kernel
 def _depth_inside(x, keep_out):
     """How far the position is inside keep-out zones, too low, or outside the fence [m]."""
-    normals, offsets, first, last, clearance = keep_out[:5]
     depth = 0.0
     if keep_out.min_height_m > 0.0:
         away_m = np.hypot(x[X] - keep_out.home[0], x[Y] - keep_out.home[1])
         if away_m > keep_out.zone_m:
             depth += max(keep_out.min_height_m + x[Z], 0.0)
-    fence = len(first) - 1
+    fence = len(keep_out.first) - 1
     for o in range(fence):
-        d = signed_distance(normals, offsets, first[o], last[o], x[X], x[Y], x[Z])
-        depth += max(clearance[o] - d, 0.0)
-    d = signed_distance(normals, offsets, first[fence], last[fence], x[X], x[Y], x[Z])
-    return depth + max(d + clearance[fence], 0.0)
+        d = _distance_m(keep_out, o, x[X], x[Y], x[Z])
+        depth += max(keep_out.clearance[o] - d, 0.0)
+    d = _distance_m(keep_out, fence, x[X], x[Y], x[Z])
+    return depth + max(d + keep_out.clearance[fence], 0.0)
 
 
 @allocating_kernel(nogil=True)

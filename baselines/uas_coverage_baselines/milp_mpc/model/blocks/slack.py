@@ -68,7 +68,7 @@ def _steadiness_cost(problem: PlanningProblem, uas: int, x: np.ndarray, u: np.nd
     states = np.abs(x[1:, [WX, WY, WZ, PSI]]).sum(axis=0)
     cost = inputs @ np.array([w.lift / limits.lift_max_N, *(w.torque / t for t in torque[:3])])
     cost += states @ np.array([w.rate / rate, w.rate / rate, w.rate / yaw_rate, 0.0])
-    cost += states[3] * w.yaw / limits.yaw_max_rad
+    cost += states[-1] * w.yaw / limits.yaw_max_rad
     cost += float(np.abs(x[1:, VZ]).sum()) * w.climb / limits.v_down_max_mps
     hovering = problem.models[uas].E[DOD]
     in_any_case = x[0, DOD] + hovering * np.arange(1, len(x))

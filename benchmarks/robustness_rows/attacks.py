@@ -1,4 +1,4 @@
-"""R3 and R4: players that mean no good, of the environment and of return mode and filter."""
+"""R3 and R4: hostile calls of the environment; random policies with return mode and filter."""
 
 from __future__ import annotations
 
@@ -154,19 +154,19 @@ HOSTILE = Row(
 )
 
 
-def fly(family: str, player: str, seed: int, wind_mps: float) -> Result:
+def fly(family: str, policy: str, seed: int, wind_mps: float) -> Result:
     """One mission of `return_mode.py`."""
-    tally = return_mode.fly(family, player, seed, wind_mps)
+    tally = return_mode.fly(family, policy, seed, wind_mps)
     return {"family": family, "wind_mps": wind_mps, "tally": dict(tally)}
 
 
 def flights(quick: bool) -> list[Trial]:
-    """Families and players, in still air and in a wind that is known to none."""
+    """Families and policies, in still air and in a wind that is known to none."""
     return [
-        Trial(f"{family} {player} {seed} {wind_mps:g} m/s", fly, (family, player, seed, wind_mps))
+        Trial(f"{family} {policy} {seed} {wind_mps:g} m/s", fly, (family, policy, seed, wind_mps))
         for seed in range(return_mode.FIRST_SEED, return_mode.FIRST_SEED + (1 if quick else 40))
         for wind_mps in (0.0, 4.0, 7.0)
-        for player in return_mode.PLAYERS
+        for policy in return_mode.POLICIES
         for family in return_mode.FAMILIES
     ]
 
@@ -191,13 +191,13 @@ def flights_found(results: Mapping[str, Result]) -> Finding:
 
 RANDOM = Row(
     "R4",
-    "Random players with return mode and safety filter",
+    "Random policies with return mode and safety filter",
     "UAS",
     "no contact with anything, and home before the battery is empty",
     flights,
     flights_found,
     lambda quick: (
-        f"from {return_mode.FIRST_SEED} on, every family and player of `benchmarks/return_mode.py`"
+        f"from {return_mode.FIRST_SEED} on, every family and policy of `benchmarks/return_mode.py`"
     ),
     "Moving obstacles (`benchmarks/safety_filter.py` has them), gusts and wrong models: the wind "
     "is constant, and unknown to planner and file.",

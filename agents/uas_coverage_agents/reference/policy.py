@@ -12,7 +12,7 @@ from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
 
 
-class ReferencePlayer:
+class ReferencePolicy:
     """Flies what a model predicts, without its noise.
 
     Args:
