@@ -98,14 +98,14 @@ class Trajectory:
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
-        options, way_home = self.options, Range(brief)
+        options = self.options
+        way_home = self._way_home = Range(brief)
         moving_m = options.moving_margin_m + _PLAN_MARGIN_M
         self._fleet = Fleet(brief, options.margin_m, options.speed_share, moving_m)
-        self._way_home = way_home
         self._safeguard = Safeguard(self._fleet, self._world, way_home, options.moving_margin_m)
         self._planned: dict[int, Planned] = {}
         self._is_disturbed, self._failures = False, Failures()
-        self._steering: Steering | None = None
+        self.steering: Steering | None = None
         effort = Effort(1, 1, options.moves, options.programs, self.total_weight)
         self._improvement = Improvement(self._fleet, effort, options.idle_work, seed)
         self._is_handed_over = False
@@ -138,7 +138,7 @@ class Trajectory:
         self._safeguard.backups.update(before.backups)
         self._make_plan(swarm, Movers.seen(self._brief, swarm, self._silent))
         if (said := self._brief.conditions) is not None and said.mean_mps > 0.0:
-            self._steering = self._steer()  # no flight that is planned in still air is flown
+            self.steering = self._steer()  # no flight that is planned in still air is flown
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
@@ -162,13 +162,13 @@ class Trajectory:
         self._down = swarm.status == LANDED
         swarm = without(swarm, self._silent)
         home = {swarm.names[u]: GoTo(None, "return") for u in np.flatnonzero(self._silent)}
-        if self._steering is None and self._failures.are_many:
-            self._steering = self._steer()
-        if self._steering is not None:
+        if self.steering is None and self._failures.are_many:
+            self.steering = self._steer()
+        if self.steering is not None:
             if self._repeats is not None:
                 swarm = self._repeats.open_now(swarm)
             self.last_decision = Decision({})
-            return {**self._steering.commands(swarm, self._world), **home}
+            return {**self.steering.commands(swarm, self._world), **home}
         flying = swarm.status == FLYING
         self._planned = {u: planned for u, planned in self._planned.items() if flying[u]}
         self._follow(swarm, movers)
@@ -188,11 +188,6 @@ class Trajectory:
         moves, weight = self.options.moves // 10, self.total_weight
         order = self.mission_plan.order
         return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
-
-    @property
-    def is_steering(self) -> bool:
-        """Whether UAS fly by the world's guidance, since no flight goes as planned."""
-        return self._steering is not None
 
     @property
     def total_weight(self) -> float:
@@ -231,8 +226,7 @@ class Trajectory:
             if course is None or (not as_planned and hovers and waits_s >= _HOME_AFTER_S):
                 rest.append(u)
                 continue
-            holds = hover_inputs(self._fleet, u, swarm.x[u])
-            u_now = course.u[0] if len(course.u) else holds
+            u_now = hover_inputs(self._fleet, u, swarm.x[u]) if hovers else course.u[0]
             flown[u] = u_now
             mode = "covering" if self._has_work(u, swarm) else "return"
             commands[name] = Wrench(*(float(value) for value in u_now[:DELTA_THRUST]), mode=mode)
@@ -273,8 +267,7 @@ class Trajectory:
                 continue
             off = rest.x[0, VX : VZ + 1] - swarm.x[u, VX : VZ + 1]
             obeys = swarm.responds[u] and not filtered[u]  # else it flies something else
-            if obeys:
-                self._failures.see(float(np.linalg.norm(off)))
+            self._failures.see(float(obeys * np.linalg.norm(off)))
             if not self._is_disturbed and not filtered[u]:
                 self._is_disturbed = True
                 self._fleet.leave_room()
