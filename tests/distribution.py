@@ -13,9 +13,8 @@ SECONDS_FILE = Path(__file__).with_name("scope_seconds.json")
 SECONDS: dict[str, float] = json.loads(SECONDS_FILE.read_text(encoding="utf-8"))
 """What stays together -> how long it takes; what is not listed is taken for short."""
 
-FIRST = ("cli/test_warm_up.py", "test_house.py")
-"""One process compiles what most others need: the simulation, the environments and the planners.
-Meanwhile the next one works without kernels, so that neither compiles what the other one does."""
+FIRST = ("missions/test_evasion.py", "test_house.py")
+"""One process compiles what most others need, meanwhile the next one works without kernels."""
 
 APART = ("docs/test_documented_commands.py", "docs/test_notebooks.py")
 """Files whose tests have nothing in common and are long: each goes where there is time for it."""
@@ -29,8 +28,6 @@ def scope_of(nodeid: str) -> str:
     path = nodeid.partition("::")[0].removeprefix("tests/")
     if path in APART:
         return nodeid.removeprefix("tests/")
-    if path in FIRST:
-        return path
     folder, slash, _ = path.partition("/")
     return folder if slash and folder not in BY_FILE else path
 
