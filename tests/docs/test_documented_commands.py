@@ -20,7 +20,7 @@ SOON = "time_limit_s=0.5"  # of the paper's program, which else takes what it ta
 ALONE = ["--jobs", "1"]  # else each of them starts processes of its own
 SHORTER = {
     "run": ["--steps", "1"],
-    "reproduce": ["--steps", "2", "--seeds", "0:1", *ALONE],
+    "reproduce": ["--steps", "1", "--seeds", "0:1", *ALONE],
     "score": ["--missions", "1", "--planners", "nearest-waypoint"],
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
-from uas_coverage_env.cli.compilation import compilation_shown, compile_world
+from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
@@ -204,7 +204,7 @@ def fly_sweep(
         # here and once, not in every process that flies
         first = todo[0]
         with compilation_shown():
-            compile_world(first.scenario, return_mode=True, safety_filter=first.safety_filter)
+            compile_flight(first.scenario, return_mode=True, safety_filter=first.safety_filter)
     try:
         with _shown(screen, len(entries), len(entries) - len(todo)) as told:
             for row in fly_all(todo, jobs, backend, source_sha256, keep):

@@ -7,9 +7,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from uas_coverage_env.compiled.progress import listening
+from uas_coverage_env.flight import rollout
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics, World
-from uas_coverage_env.world import Velocity
 
 _DOING = "compiling for this machine, once"
 
@@ -44,11 +43,6 @@ def compilation_shown(screen: Console | None = None) -> Iterator[None]:
         bar.stop()
 
 
-def compile_world(
-    scenario: Scenario, *, return_mode: bool, safety_filter: bool, dynamics: Dynamics = "lpv"
-) -> World:
-    """Compile what every flight needs, or see that it is there; returns a world that has flown."""
-    world = World(scenario, dynamics=dynamics, return_mode=return_mode, safety_filter=safety_filter)
-    state = world.swarm_state()
-    world.step({name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)})
-    return world
+def compile_flight(scenario: Scenario, *, return_mode: bool, safety_filter: bool) -> None:
+    """Compile what every flight and its record need, or see that it is there."""
+    rollout(scenario, "hover", max_steps=1, return_mode=return_mode, safety_filter=safety_filter)

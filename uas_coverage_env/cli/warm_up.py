@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli.compilation import compilation_shown, compile_world
+from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.draw import picture
@@ -14,6 +14,7 @@ from uas_coverage_env.env.vector import CoverageVectorEnv
 from uas_coverage_env.flight import Planner, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario
+from uas_coverage_env.simulation import World
 
 _SCENARIO = "village"
 _PLANNER = "milp-mpc"
@@ -41,8 +42,8 @@ def warm_up(
     planners = [load_planner(name) for name in planner or [_PLANNER]]
     started, before = time.perf_counter(), COMPILATIONS.n_compiled
     with compilation_shown():
-        world = compile_world(scenario, return_mode=True, safety_filter=True)
-        picture(scenario, world.swarm_state())  # of the flight directory
+        compile_flight(scenario, return_mode=True, safety_filter=True)
+        picture(scenario, World(scenario).swarm_state())  # of the flight directory
         for each in planners:
             _compile_planner(each, scenario)
         if environments:
