@@ -20,6 +20,9 @@ PROGRAM = "uas-coverage"
 _CTRL_C = 130
 _NOTHING_TO_KEEP = "stopped by hand before there was anything to keep"
 
+_FEW = 6
+"""Commands of a group that a message names; of more, the help."""
+
 _CLI = "uas_coverage_env.cli"
 
 COMMANDS = (
@@ -188,7 +191,14 @@ def _of_the_command_line(error: typer.TyperException) -> str:
     close = getattr(error, "possibilities", None)  # of an option that there is not, closest first
     if close:
         return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"
-    return error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
+    message = error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
+    if message.startswith("No such command") and "Did you mean" not in message:
+        context = getattr(error, "ctx", None)
+        known = list(getattr(context and context.command, "commands", ()))
+        if len(known) > _FEW:
+            return f"{message} See `{PROGRAM} --help`."
+        return f"{message} Take {', '.join(known)}."
+    return message
 
 
 def _of_a_file(error: OSError) -> str:
