@@ -5,8 +5,8 @@ import io
 import numpy as np
 import pytest
 from rich.console import Console
-
 from uas_coverage_baselines.hover import Hover
+
 from uas_coverage_env.cli import main
 from uas_coverage_env.cli import run as cli_run
 from uas_coverage_env.cli.compilation import compilation_shown

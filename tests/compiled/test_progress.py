@@ -98,7 +98,9 @@ def test_what_is_on_the_disk_is_not_announced(capfd):
 def test_whoever_has_set_up_logging_is_told_there(capfd, caplog):
     with caplog.at_level(logging.INFO, logger="uas_coverage_env"):
         fresh()(1.0)
-    assert [record.getMessage() for record in caplog.records] == [NOTICE.format(purpose="this program")]
+    assert [record.getMessage() for record in caplog.records] == [
+        NOTICE.format(purpose="this program")
+    ]
     assert capfd.readouterr().err == ""
 
 
