@@ -45,7 +45,7 @@ def demo(
         with shown(screen, mission) as on_step:
             flight = rollout(mission, player, 0, on_step=on_step)
         keep_flight(flight, directory, overwrite=overwrite)
-    page = write_replay([flight], directory / "replay.html", sources=[str(directory)])
+        page = write_replay([flight], directory / "replay.html", sources=[str(directory)])
     report_flight(screen, flight, directory)
     opened = not no_open and _open(page)
     screen.print(f"{'opened' if opened else 'to look at it, open'} {page}", markup=False)
