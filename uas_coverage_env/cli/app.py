@@ -12,6 +12,7 @@ from uas_coverage_env.cli.lazy import MARKUP, CommandEntry, LazyGroup, at
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.plugins import plugin_entries
 from uas_coverage_env.cli.termination import terminated_as_by_hand
+from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.files.errors import InputError, PlannerError
 
 PROGRAM = "uas-coverage"
@@ -162,10 +163,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    words = sys.argv[1:] if argv is None else argv
     try:
         command = command_group()
         _never_stop_at_a_letter()
-        code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
+        with compiling_for(" ".join([PROGRAM, *words[:1]])):
+            code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
         return _refuse(_of_the_command_line(error), error.exit_code)
     except InputError as error:

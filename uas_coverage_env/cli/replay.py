@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay import write_gif, write_replay, write_video
@@ -44,8 +43,7 @@ def replay(
         if path is not None:
             write(flights, path, fps=fps)
             out.print(f"film in {path} ({path.stat().st_size / 1e3:.0f} kB)", markup=False)
-    with compiling_for("replay pages"):
-        page = write_replay(flights, directory / _PAGE, sources=sources)
+    page = write_replay(flights, directory / _PAGE, sources=sources)
     out.print(f"page in {page} ({page.stat().st_size / 1e3:.0f} kB)", markup=False)
 
 
