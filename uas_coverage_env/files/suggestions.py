@@ -1,7 +1,7 @@
 """What a person probably meant by a name that there is not."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable
 
 from uas_coverage_env.files.errors import InputError
 
@@ -36,7 +36,7 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     return f"did you mean {closest}?" if closest else otherwise
 
 
-def check_choice(option: str, value: str, known: Sequence[str]) -> None:
+def check_choice(option: str, value: str, known: Collection[str]) -> None:
     """Refuse a value that is none of those which an option takes.
 
     Raises:
