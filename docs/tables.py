@@ -193,7 +193,7 @@ _NAMED = {"observation": "OBSERVATION", "reward": "REWARD"}
 
 
 def scenario_fields() -> str:
-    """One table per table of a scenario file."""
+    """One table per table of a scenario file, but for events."""
     schema = scenario_schema()
     tables = [("The file", schema)]
     for name, entry in schema["properties"].items():
@@ -209,7 +209,15 @@ def scenario_fields() -> str:
         "`[wind.random_gusts]`": "RandomGusts",
     }
     tables += [(title, schema["$defs"][model]) for title, model in nested.items()]
-    tables += _events(schema["$defs"])
+    return _keys(tables)
+
+
+def event_fields() -> str:
+    """One table per kind of event."""
+    return _keys(_events(scenario_schema()["$defs"]))
+
+
+def _keys(tables: list[tuple[str, dict[str, Any]]]) -> str:
     parts = []
     for title, part in tables:
         rows = [
@@ -308,6 +316,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "version_history": docstring_section("Version History"),
     "arguments": arguments,
     "scenario_fields": scenario_fields,
+    "event_fields": event_fields,
     "planners": planners,
 }
 

@@ -35,6 +35,8 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
         (["run", "village", "--planer", "tour"], "Did you mean '--planner'?"),
         (["vehicle", "check", "S500V2"], "did you mean s500_v2?"),
         (["scenarios", "chek", "village"], "Did you mean 'check'?"),
+        (["scenarios", "show", "village"], "No such command 'show'. Take list, check."),
+        (["fly", "village"], "No such command 'fly'. See `uas-coverage --help`."),
     ],
 )
 def test_a_misspelt_name_is_answered_with_the_one_that_was_meant(words, answer, capsys):

@@ -2,13 +2,17 @@
 
 import io
 
+import numpy as np
 import pytest
 from rich.console import Console
+from uas_coverage_baselines.hover import Hover
 
 from uas_coverage_env.cli import main
+from uas_coverage_env.cli import run as cli_run
 from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.compiled import progress
-from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for
 from uas_coverage_env.flight import load_planner, planner_names
 
 
@@ -18,9 +22,10 @@ def test_a_terminal_shows_a_bar_while_kernels_are_compiled():
     before = COMPILATIONS.listener
     with compilation_shown(screen):
         assert shown.getvalue() == ""
-        COMPILATIONS.listener(0.5)
+        with compiling_for("planner tour"):
+            COMPILATIONS.listener(0.5)
         COMPILATIONS.listener(None)
-    assert "compiling for this machine, once" in shown.getvalue()
+    assert "compiling for planner tour" in shown.getvalue()
     assert "50%" in shown.getvalue()
     assert COMPILATIONS.listener is before
 
@@ -39,7 +44,7 @@ def test_after_a_warm_up_a_run_compiles_nothing(tmp_path, monkeypatch, capsys):
     assert main(["run", "open_field", "--planner", "nearest-waypoint", "--steps", "2"]) == 0
     assert main(["warm-up", "--planner", "nearest-waypoint"]) == 0
     assert COMPILATIONS.n_compiled == n_compiled
-    assert "everything is compiled already" in capsys.readouterr().out
+    assert "everything is compiled already: nearest-waypoint\n" in capsys.readouterr().out
 
 
 def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatch, capsys):
@@ -53,6 +58,37 @@ def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatc
         env.reset(seed=0)
         env.step({agent: env.action_space(agent).sample() for agent in env.agents})
     assert COMPILATIONS.n_compiled == n_compiled
+
+
+@pytest.mark.slow
+def test_a_warm_up_without_options_serves_the_first_commands_and_says_what_it_did(capsys):
+    assert main(["warm-up"]) == 0
+    done, others = capsys.readouterr().out.splitlines()
+    assert done.endswith(": nearest-waypoint, trajectory, milp-mpc, environments")
+    assert "--planner NAME" in others
+    n_compiled = COMPILATIONS.n_compiled
+    assert main(["warm-up", "--planner", "trajectory", "--environments"]) == 0
+    assert COMPILATIONS.n_compiled == n_compiled
+
+
+class Compiles(Hover):
+    """A planner with a kernel that is on no disk yet."""
+
+    def warm_up(self, brief):
+        offset = float(np.random.default_rng().uniform())
+        kernel(lambda x: x + offset)(1.0)
+
+
+@pytest.mark.parametrize(("words", "lines"), [([], 1), (["--quiet"], 0), (["--json"], 0)])
+def test_a_run_says_once_for_what_it_compiles_and_a_quiet_one_nothing(
+    words, lines, elsewhere, monkeypatch, capfd
+):
+    monkeypatch.setattr(progress, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(COMPILATIONS, "listener", progress._say_it_once())
+    monkeypatch.setattr(cli_run, "load_planner", lambda name, options: Compiles())
+    assert main(["run", "open_field", "--planner", "hover", "--steps", "2", *words]) == 0
+    err = capfd.readouterr().err
+    assert err.count("compiling for planner ") == err.count("\n") == lines
 
 
 def test_a_planner_that_is_not_known_is_refused(capsys):

@@ -8,9 +8,15 @@ import pytest
 from uas_coverage_env.compiled import progress
 from uas_coverage_env.compiled.compiler import called_by
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.compiled.progress import NOTICE, Compilations, listening
+from uas_coverage_env.compiled.progress import (
+    COMPILATIONS,
+    NOTICE,
+    Compilations,
+    compiling_for,
+    listening,
+)
 
-LINE = f"uas_coverage_env: {NOTICE}\n"
+LINE = f"uas_coverage_env: {NOTICE}\n".format(purpose=COMPILATIONS.purpose)
 
 
 @kernel
@@ -54,6 +60,15 @@ def test_a_user_who_has_to_wait_is_told_why_on_stderr_and_once(capfd):
     assert err == LINE
 
 
+@pytest.mark.usefixtures("impatient")
+def test_what_is_compiled_for_is_said_once_for_each_purpose(capfd):
+    for purpose in ("planner tour", "planner hover", "planner tour"):
+        with compiling_for(purpose):
+            fresh()(1.0)
+    said = [NOTICE.format(purpose=purpose) for purpose in ("planner tour", "planner hover")]
+    assert capfd.readouterr().err == "".join(f"uas_coverage_env: {line}\n" for line in said)
+
+
 def test_a_user_who_does_not_have_to_wait_is_told_nothing(capfd, monkeypatch):
     monkeypatch.setattr(progress, "PATIENCE_S", 1e9)
     monkeypatch.setattr(progress.COMPILATIONS, "listener", progress._say_it_once())
@@ -83,7 +98,9 @@ def test_what_is_on_the_disk_is_not_announced(capfd):
 def test_whoever_has_set_up_logging_is_told_there(capfd, caplog):
     with caplog.at_level(logging.INFO, logger="uas_coverage_env"):
         fresh()(1.0)
-    assert [record.getMessage() for record in caplog.records] == [NOTICE]
+    assert [record.getMessage() for record in caplog.records] == [
+        NOTICE.format(purpose="this program")
+    ]
     assert capfd.readouterr().err == ""
 
 

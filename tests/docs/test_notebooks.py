@@ -108,7 +108,8 @@ def test_a_notebook_runs_from_top_to_bottom_without_a_warning(path, tmp_path, mo
     ).execute()
     outputs = [output for cell in code_cells(notebook) for output in cell.outputs]
     warned = "".join(output.text for output in outputs if output.get("name") == "stderr")
-    lines = [line for line in warned.splitlines() if NOTICE not in line]  # a fresh machine compiles
+    told = NOTICE.partition("{")[0]  # a fresh machine compiles
+    lines = [line for line in warned.splitlines() if told not in line]
     assert lines == []
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= 3
 

@@ -248,3 +248,13 @@ def test_where_a_moving_obstacle_has_been_is_drawn(village, swarm):
 def test_importing_the_room_does_not_import_pillow():
     code = "import sys, uas_coverage_env.draw; sys.exit('PIL' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_scale_and_north_stand_below_the_map_where_no_mark_covers_them(village, swarm):
+    before = picture(village, swarm)
+    south, west = village.fence.vertices_m[:, :2].min(axis=0)
+    row, column = pixel(village, (south, west, 0.0))
+    below = (slice(row + 11, row + 12), slice(column + 1, column + 20))
+    assert (before[below] < 60).all()  # the bar
+    swarm.x[:, :2] = [south + 5.0, west + 5.0]
+    assert (picture(village, swarm)[below] == before[below]).all()

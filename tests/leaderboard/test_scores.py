@@ -23,6 +23,7 @@ from uas_coverage_env.leaderboard.table import (
     NOTHING,
     effort_cells,
     markdown,
+    notes,
     outcome_cells,
     scenarios_cells,
 )
@@ -268,3 +269,13 @@ def test_a_comparison_of_a_version_without_returns_can_still_be_drawn(tmp_path):
     rows, reference = published(tmp_path)
     assert [one.episode_return for one in rows] == [None]
     assert leaderboard_figure(scores_of(rows, reference), rows, reference).axes
+
+
+def test_a_note_names_the_players_that_fly_alike_with_every_seed():
+    rows = [
+        row("a", player, seed, trajectory_sha256=f"{player}{seed if player == 'random' else ''}")
+        for player in ("same", "random")
+        for seed in range(2)
+    ]
+    assert notes(rows, "same")[-1].endswith("one suffices: same.")
+    assert not any("suffices" in line for line in notes(rows[:1], "same"))

@@ -291,6 +291,7 @@ def test_the_command_writes_one_file_per_uas_and_the_report(directory, tmp_path,
 
 MISTAKES = {
     "an unknown format": (("--format", "pdf", *HERE), "take qgc, ardupilot, kml, geojson, csv"),
+    "a misspelt format": (("--format", "qgcc", *HERE), "--format 'qgcc': did you mean qgc?"),
     "an unknown autopilot": (("--format", "qgc", "--autopilot", "cat", *HERE), "ardupilot, px4"),
     "no place": (("--format", "qgc"), "has no [place] on the Earth; give --place"),
     "no tolerance": (("--format", "qgc", "--tolerance", "0", *HERE), "--tolerance 0"),

@@ -12,6 +12,7 @@ from uas_coverage_env.cli.lazy import MARKUP, CommandEntry, LazyGroup, at
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.plugins import plugin_entries
 from uas_coverage_env.cli.termination import terminated_as_by_hand
+from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.files.errors import InputError, PlannerError
 
 PROGRAM = "uas-coverage"
@@ -19,6 +20,9 @@ PROGRAM = "uas-coverage"
 # what typer makes of Ctrl-C that no command has caught
 _CTRL_C = 130
 _NOTHING_TO_KEEP = "stopped by hand before there was anything to keep"
+
+_FEW = 6
+"""Commands of a group that a message names; of more, the help."""
 
 _CLI = "uas_coverage_env.cli"
 
@@ -159,10 +163,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    words = sys.argv[1:] if argv is None else argv
     try:
         command = command_group()
         _never_stop_at_a_letter()
-        code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
+        with compiling_for(" ".join([PROGRAM, *words[:1]])):
+            code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
         return _refuse(_of_the_command_line(error), error.exit_code)
     except InputError as error:
@@ -188,7 +194,14 @@ def _of_the_command_line(error: typer.TyperException) -> str:
     close = getattr(error, "possibilities", None)  # of an option that there is not, closest first
     if close:
         return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"
-    return error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
+    message = error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
+    if message.startswith("No such command") and "Did you mean" not in message:
+        context = getattr(error, "ctx", None)
+        known = list(getattr(context and context.command, "commands", ()))
+        if len(known) > _FEW:
+            return f"{message} See `{PROGRAM} --help`."
+        return f"{message} Take {', '.join(known)}."
+    return message
 
 
 def _of_a_file(error: OSError) -> str:

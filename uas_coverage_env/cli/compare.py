@@ -15,6 +15,7 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
+from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     FLOWN,
@@ -203,7 +204,7 @@ def fly_sweep(
     if todo and backend == "process":
         # here and once, not in every process that flies
         first = todo[0]
-        with compilation_shown():
+        with compilation_shown(), compiling_for("flights"):
             compile_flight(first.scenario, return_mode=True, safety_filter=first.safety_filter)
     try:
         with _shown(screen, len(entries), len(entries) - len(todo)) as told:

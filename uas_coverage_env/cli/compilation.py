@@ -1,16 +1,15 @@
 """Compilation as it shows at a terminal."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from uas_coverage_env.compiled.progress import listening
-from uas_coverage_env.flight import rollout
+from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for, listening
+from uas_coverage_env.flight import Planner, rollout
+from uas_coverage_env.flight.registry import name_of
 from uas_coverage_env.scenario import Scenario
-
-_DOING = "compiling for this machine, once"
 
 
 @contextmanager
@@ -26,7 +25,7 @@ def compilation_shown(screen: Console | None = None) -> Iterator[None]:
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     bar = Progress(*columns, TimeElapsedColumn(), console=screen, transient=True)
-    task = bar.add_task(_DOING, total=1.0)
+    task = bar.add_task("", total=1.0)
 
     def listener(share: float | None) -> None:
         if share is None:
@@ -34,13 +33,28 @@ def compilation_shown(screen: Console | None = None) -> Iterator[None]:
             return
         if not bar.live.is_started:
             bar.start()
-        bar.update(task, completed=share)
+        bar.update(task, completed=share, description=f"compiling for {COMPILATIONS.purpose}")
 
     try:
         with listening(listener):
             yield
     finally:
         bar.stop()
+
+
+@contextmanager
+def compiling_for_flight(planner: Planner, *, quiet: bool = False) -> Iterator[None]:
+    """Say that what is compiled, for the flight or for its map, is for a planner's flight.
+
+    Args:
+        planner: It flies.
+        quiet: Say nothing.
+    """
+    with (
+        compiling_for(f"planner {name_of(planner)}"),
+        listening(lambda share: None) if quiet else nullcontext(),
+    ):
+        yield
 
 
 def compile_flight(scenario: Scenario, *, return_mode: bool, safety_filter: bool) -> None:

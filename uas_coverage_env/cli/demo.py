@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from uas_coverage_env.cli.compilation import compiling_for_flight
 from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.cli.progress import shown
@@ -39,10 +40,12 @@ def demo(
     check_directory(directory, overwrite=overwrite)
     screen.print(f"{_PLANNER} flies the {_SCENARIO}", markup=False)
     mission = loaded(_SCENARIO)
-    with shown(screen, mission) as on_step:
-        flight = rollout(mission, load_planner(_PLANNER), 0, on_step=on_step)
-    keep_flight(flight, directory, overwrite=overwrite)
-    page = write_replay([flight], directory / "replay.html", sources=[str(directory)])
+    player = load_planner(_PLANNER)
+    with compiling_for_flight(player):
+        with shown(screen, mission) as on_step:
+            flight = rollout(mission, player, 0, on_step=on_step)
+        keep_flight(flight, directory, overwrite=overwrite)
+        page = write_replay([flight], directory / "replay.html", sources=[str(directory)])
     report_flight(screen, flight, directory)
     opened = not no_open and _open(page)
     screen.print(f"{'opened' if opened else 'to look at it, open'} {page}", markup=False)

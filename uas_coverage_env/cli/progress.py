@@ -80,7 +80,7 @@ def _window(out: Console, scenario: Scenario, planner: Planner) -> FlightWindow 
 
 @contextmanager
 def _lines(out: Console, ascii_map: AsciiMap | None) -> Iterator[Callable[[Progress], object]]:
-    if not out.is_terminal:
+    if out.quiet or not out.is_terminal:
         yield _PlainLines(out)
         return
     live = Live(console=out, refresh_per_second=8)

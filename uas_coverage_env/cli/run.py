@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.cli import completion
+from uas_coverage_env.cli.compilation import compiling_for_flight
 from uas_coverage_env.cli.figures_of_flight import data
 from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.options import options_of
@@ -151,14 +152,15 @@ def run(
             )
 
     try:
-        if sorties is not None:
-            chain = fly_sorties(mission, fly, sorties)
-            code = keep_sorties(screen, chain, directory, overwrite=overwrite)
-            if as_json:
-                typer.echo((directory / SUMMARY).read_text(), nl=False)
-            raise typer.Exit(code)
-        flight = fly(mission)
-        keep_flight(flight, directory, overwrite=overwrite)
+        with compiling_for_flight(player, quiet=screen.quiet):
+            if sorties is not None:
+                chain = fly_sorties(mission, fly, sorties)
+                code = keep_sorties(screen, chain, directory, overwrite=overwrite)
+                if as_json:
+                    typer.echo((directory / SUMMARY).read_text(), nl=False)
+                raise typer.Exit(code)
+            flight = fly(mission)
+            keep_flight(flight, directory, overwrite=overwrite)
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()

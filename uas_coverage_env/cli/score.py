@@ -8,7 +8,7 @@ import typer
 
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.files.suggestions import did_you_mean
+from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.tasks.levels import LEVELS
 from uas_coverage_env.tasks.scoring import RANDOM, MissionScore, Score, score
@@ -74,7 +74,5 @@ def _scored(store: ScoreStore, planner: str, level: str, missions: int, split: s
 def _named(option: str, text: str, allowed: tuple[str, ...]) -> list[str]:
     names = [name for name in text.split(",") if name]
     for name in names:
-        if name not in allowed:
-            end = did_you_mean(name, allowed, f"give some of {', '.join(allowed)}")
-            raise InputError(f"{option} {name[:80]!r}: {end}")
+        check_choice(option, name, allowed)
     return names

@@ -7,7 +7,7 @@ import typer
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for
 from uas_coverage_env.draw import picture
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv
@@ -17,7 +17,8 @@ from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import World
 
 _SCENARIO = "village"
-_PLANNER = "milp-mpc"
+_PLANNERS = ("nearest-waypoint", "trajectory", "milp-mpc")
+"""Those of the README's first commands."""
 _LANES = 2
 
 
@@ -25,34 +26,42 @@ def warm_up(
     planner: Annotated[
         list[str] | None,
         typer.Option(
-            help=f"Compile for this planner, see `planners`; may be repeated. Default: {_PLANNER}.",
+            help="Compile for this planner, see `planners`; may be repeated. Default: "
+            f"{', '.join(_PLANNERS)}, and the environments.",
             show_default=False,
         ),
     ] = None,
     environments: Annotated[
-        bool, typer.Option("--environments", help="Compile the learning environments, too.")
+        bool,
+        typer.Option("--environments", help="With --planner: the learning environments, too."),
     ] = False,
 ) -> None:
     """Compile the simulation for this machine, so that the first flight begins at once.
 
-    Otherwise the first flight does it, which takes up to half a minute. What is compiled stays on
-    disk until the package changes, and is not compiled again.
+    Otherwise the first flight of each planner does it, which takes up to a minute. What is compiled
+    stays on disk until the package changes, and is not compiled again.
     """
     scenario = load_scenario(_SCENARIO)
-    planners = [load_planner(name) for name in planner or [_PLANNER]]
+    names, learning = planner or list(_PLANNERS), environments or not planner
+    planners = {f"planner {name}": load_planner(name) for name in names}
     started, before = time.perf_counter(), COMPILATIONS.n_compiled
     with compilation_shown():
-        compile_flight(scenario, return_mode=True, safety_filter=True)
-        picture(scenario, World(scenario).swarm_state())  # of the flight directory
-        for each in planners:
-            _compile_planner(each, scenario)
-        if environments:
-            _compile_environments()
+        with compiling_for("flights and maps"):
+            compile_flight(scenario, return_mode=True, safety_filter=True)
+            picture(scenario, World(scenario).swarm_state())  # of the flight directory
+        for purpose, each in planners.items():
+            with compiling_for(purpose):
+                _compile_planner(each, scenario)
+        if learning:
+            with compiling_for("the environments"):
+                _compile_environments()
     n = COMPILATIONS.n_compiled - before
     took_s = time.perf_counter() - started
-    console().print(
-        f"compiled {n} kernels in {took_s:.0f} s" if n else "everything is compiled already"
-    )
+    done = f"compiled {n} kernels in {took_s:.0f} s" if n else "everything is compiled already"
+    what = ", ".join([*names, *(["environments"] if learning else [])])
+    console().print(f"{done}: {what}", markup=False)
+    if not planner:
+        console().print("other planners: `uas-coverage warm-up --planner NAME`", markup=False)
 
 
 def _compile_planner(planner: Planner, scenario: Scenario) -> None:

@@ -1,4 +1,4 @@
-"""Tells that kernels are being compiled, and how far that is: a user waits for it, once.
+"""Tells that kernels are being compiled, for what, and how far that is: a user waits for it.
 
 Where logging is set up, it is an INFO record of the logger `uas_coverage_env`, otherwise a
 line on stderr; a level above INFO on that logger silences both. `listening` takes their place.
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-NOTICE = "compiling the simulation kernels for this machine (once; up to half a minute) ..."
+NOTICE = "compiling for {purpose}: up to a minute, and kept on disk for later runs ..."
 
 PATIENCE_S = 1.0
 """A process that compiles no longer than this says nothing."""
@@ -26,17 +26,19 @@ _logger = logging.getLogger("uas_coverage_env")
 
 
 def _say_it_once() -> Listener:
-    said = False
+    """Says it once for each purpose."""
+    said: set[str] = set()
 
     def listener(share: float | None) -> None:
-        nonlocal said
-        if said or _logger.level > logging.INFO:
+        purpose = COMPILATIONS.purpose
+        if purpose in said or _logger.level > logging.INFO:
             return
-        said = True
+        said.add(purpose)
+        notice = NOTICE.format(purpose=purpose)
         if _logger.isEnabledFor(logging.INFO) and _logger.hasHandlers():
-            _logger.info(NOTICE)
+            _logger.info(notice)
         else:
-            sys.stderr.write(f"uas_coverage_env: {NOTICE}\n")
+            sys.stderr.write(f"uas_coverage_env: {notice}\n")
             sys.stderr.flush()
 
     return listener
@@ -47,11 +49,13 @@ class Compilations:
 
     Attributes:
         listener: Told once the process has spent more than PATIENCE_S.
+        purpose: What they are for, in words.
         n_compiled: Kernels compiled so far, each of its parts counted.
     """
 
     def __init__(self) -> None:
         self.listener = _say_it_once()
+        self.purpose = "this program"
         self.n_compiled = 0
         self._spent_s = 0.0
         self._since_s = 0.0
@@ -117,3 +121,13 @@ def listening(listener: Listener) -> Iterator[None]:
         yield
     finally:
         COMPILATIONS.listener = before
+
+
+@contextmanager
+def compiling_for(purpose: str) -> Iterator[None]:
+    """Say what is compiled for, for a while."""
+    before, COMPILATIONS.purpose = COMPILATIONS.purpose, purpose
+    try:
+        yield
+    finally:
+        COMPILATIONS.purpose = before

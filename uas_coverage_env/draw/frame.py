@@ -11,6 +11,8 @@ SMOOTHING = 2
 _DESIGN_PX = 512
 # In smaller pictures the writing shrinks less than the rest.
 _SMALL_PX, _LARGER = 384, 1.25
+# Of the row below the map with scale and north, where no mark covers them.
+_SCALE = 14
 
 
 @dataclass(frozen=True)
@@ -61,10 +63,10 @@ class Frame:
         unit = side / _DESIGN_PX
         header, footer, gauge = 30 * unit, side - 28 * unit, side - 44 * unit
         low, high = fence_vertices_m.min(axis=0), fence_vertices_m.max(axis=0)
-        room_x, room_y = gauge - 14 * unit, footer - header - 12 * unit
+        room_x, room_y = gauge - 14 * unit, footer - header - (12 + _SCALE) * unit
         scale = float(min(room_x / (high[1] - low[1]), room_y / (high[0] - low[0])))
         left = 8 * unit + (room_x - scale * (high[1] - low[1])) / 2
-        bottom = footer - 6 * unit - (room_y - scale * (high[0] - low[0])) / 2
+        bottom = footer - (6 + _SCALE) * unit - (room_y - scale * (high[0] - low[0])) / 2
         return cls(
             side=side,
             unit=unit,

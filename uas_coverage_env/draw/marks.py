@@ -62,7 +62,14 @@ def safe_distance(draw: "ImageDraw", frame: Frame, x: float, y: float, safe_radi
 
 
 def flying(
-    draw: "ImageDraw", frame: Frame, x: float, y: float, yaw: float, soc: float, colour: Colour
+    draw: "ImageDraw",
+    frame: Frame,
+    x: float,
+    y: float,
+    yaw: float,
+    soc: float,
+    colour: Colour,
+    size: float = 1.0,
 ) -> None:
     """A cross turned to the heading, in a ring that is as long and as green as the charge.
 
@@ -74,8 +81,9 @@ def flying(
         yaw: [rad] clockwise from north.
         soc: State of charge, 0..1.
         colour: Colour of the UAS.
+        size: Of the usual size.
     """
-    unit = frame.unit
+    unit = size * frame.unit
     radius = 11.5 * unit
     box = left, top, right, bottom = (x - radius, y - radius, x + radius, y + radius)
     draw.ellipse(box, outline=colours.WHITE, width=round(4.5 * unit))

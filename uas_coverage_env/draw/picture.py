@@ -25,6 +25,7 @@ _SMALLEST_PX, _LARGEST_PX = 128, 4096
 # More do not fit below the map; a larger swarm is summed up.
 _NAMED_UAS = 4
 _LABELLED_UAS = 12
+_SIZE_OF_MANY = 0.6
 _NAME_ROWS = (0, 1, -1, 2)
 
 
@@ -201,11 +202,12 @@ class Picture:
         frame, unit = self._frame, self._frame.unit
         centres = frame.pixels(swarm.x[:, :2]).tolist()
         spots: list[tuple[float, float, float, float]] = []
+        size = 1.0 if len(centres) <= _LABELLED_UAS else _SIZE_OF_MANY
         for i, (x, y) in enumerate(centres):
             colour = _colour(i)
             if swarm.status[i] == FLYING:
                 yaw, soc = float(swarm.heading_rad[i]), 1 - float(swarm.x[i, DOD])
-                marks.flying(draw, frame, x, y, yaw, soc, colour)
+                marks.flying(draw, frame, x, y, yaw, soc, colour, size)
                 beside, up = 13 * unit, 9 * unit
             elif swarm.status[i] == LANDED:
                 marks.landed(draw, frame, x, y, colour)

@@ -38,7 +38,7 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
     draw = ImageDraw.Draw(image)
     fence = _outline(scenario.fence.vertices_m)
     draw.polygon(_flat(frame.pixels(fence)), fill=colours.GROUND)
-    beside_scale = _grid(image, draw, frame, fence)
+    _grid(draw, frame, fence)
     for decoration in scenario.decorations:
         fill = colours.of_decoration(decoration.kind)
         corners = _flat(frame.pixels(np.array(decoration.polygon_m)))
@@ -53,7 +53,7 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
         _obstacle(image, draw, frame, obstacle.kind or "", hull, discs)
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
-    _north(image, draw, frame, beside_scale)
+    _scale_and_north(image, draw, frame, fence)
     _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
     _margins(image, draw, frame, scenario.name)
     return image
@@ -65,14 +65,8 @@ def scale_step_m(extent_m: float) -> float:
     return float(power * max(factor for factor in (1, 2, 5) if factor * power <= extent_m / 4))
 
 
-def _grid(
-    image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Lines every 1, 2 or 5 × 10^k metres, about five over the map, and how far apart they are.
-
-    Returns:
-        The place beside the scale bar.
-    """
+def _grid(draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]) -> None:
+    """Lines every 1, 2 or 5 × 10^k metres, about five over the map."""
     step_m = scale_step_m(np.ptp(fence, axis=0).max())
     low, high = fence.min(axis=0), fence.max(axis=0)
     for axis in (0, 1):
@@ -80,21 +74,23 @@ def _grid(
             ends = np.array([low, high])
             ends[:, axis] = at
             draw.line(_flat(frame.pixels(ends)), fill=colours.GRID, width=round(frame.unit))
-    start = frame.pixels(low) + np.array([8, -8]) * frame.unit
-    end = start + np.array([step_m * frame.scale, 0])
-    draw.line(_flat(np.array([start, end])), fill=colours.INK, width=round(2 * frame.unit))
-    place = (float(start[0]), float(start[1]) - 7 * frame.unit)
-    write(image, place, f"{step_m:g} m", 9 * frame.letter, colours.INK)
-    x, y = (end + np.array([14, 0]) * frame.unit).tolist()
-    return x, y
 
 
-def _north(image: "Image", draw: "ImageDraw", frame: Frame, place: tuple[float, float]) -> None:
-    """A letter with an arrow above it."""
-    (x, y), unit = place, frame.unit
-    arrow = (x, y - 14 * unit, x - 4 * unit, y - 5 * unit, x + 4 * unit, y - 5 * unit)
-    draw.polygon(arrow, fill=colours.INK, outline=colours.WHITE)
-    write(image, (x, y), "N", 9 * frame.letter, colours.INK, align=0.5, halo=1.5 * unit)
+def _scale_and_north(
+    image: "Image", draw: "ImageDraw", frame: Frame, fence: NDArray[np.float64]
+) -> None:
+    """Below the map: how far apart the lines of the grid are, and an arrow to the north."""
+    unit, size = frame.unit, 9 * frame.letter
+    step_m = scale_step_m(np.ptp(fence, axis=0).max())
+    x, y = (frame.pixels(fence.min(axis=0)) + np.array([0, 11 * unit])).tolist()
+    end = x + step_m * frame.scale
+    draw.line((x, y, end, y), fill=colours.INK, width=round(2 * unit))
+    words = f"{step_m:g} m"
+    write(image, (end + 5 * unit, y), words, size, colours.INK)
+    x = end + width_of(words, size) + 22 * unit
+    arrow = (x, y - 5 * unit, x - 4 * unit, y + 5 * unit, x + 4 * unit, y + 5 * unit)
+    draw.polygon(arrow, fill=colours.INK)
+    write(image, (x + 7 * unit, y), "N", size, colours.INK)
 
 
 def _shadows(image: "Image", frame: Frame, hulls: tuple[ConvexPolytope, ...]) -> None:

@@ -1,7 +1,9 @@
 """What a person probably meant by a name that there is not."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+
+from uas_coverage_env.files.errors import InputError
 
 _SHORT = 3
 """Of so few letters, two in common are chance."""
@@ -32,3 +34,14 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     """
     closest = meant(name, known)
     return f"did you mean {closest}?" if closest else otherwise
+
+
+def check_choice(option: str, value: str, known: Collection[str]) -> None:
+    """Refuse a value that is none of those which an option takes.
+
+    Raises:
+        InputError: It is none; the message says which one was meant, or names them all.
+    """
+    if value not in known:
+        end = did_you_mean(value, known, f"take {', '.join(known)}")
+        raise InputError(f"{option} {value[:80]!r}: {end}")

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.disturbances import Disturbance
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
@@ -113,16 +114,17 @@ def rollout(
         return_mode = uncertain or (assistants.return_mode and not comes_home)
     if safety_filter is None:
         safety_filter = assistants.safety_filter or uncertain or by_legs
-    world = World(
-        scenario,
-        dynamics=dynamics,
-        return_mode=return_mode,
-        safety_filter=safety_filter,
-        disturbances=disturbances,
-        seed=seed,
-    )
-    meter = RewardMeter(world, reward, reward_weights)
-    _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
+    with compiling_for(f"planner {name_of(planner)}"):
+        world = World(
+            scenario,
+            dynamics=dynamics,
+            return_mode=return_mode,
+            safety_filter=safety_filter,
+            disturbances=disturbances,
+            seed=seed,
+        )
+        meter = RewardMeter(world, reward, reward_weights)
+        _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
     log = FlightLog(world, scenario, meter)

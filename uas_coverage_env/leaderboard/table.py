@@ -106,7 +106,24 @@ def notes(rows: Sequence[Row], reference: str) -> list[str]:
         f"Against {reference}, intervals are over scenarios. Δ: mean paired difference where both "
         "accomplished the mission. P: probability of doing better; a flight that is not "
         "accomplished is worse than any that is.",
+        *_flown_alike(rows),
     ]
+
+
+def _flown_alike(rows: Sequence[Row]) -> list[str]:
+    """A line on the players whose flights are the same with every seed."""
+    flown: dict[str, dict[str, list[str | None]]] = {}
+    for row in rows:
+        flown.setdefault(row.player, {}).setdefault(row.scenario, []).append(row.trajectory_sha256)
+    alike = [
+        player
+        for player, of_scenario in flown.items()
+        if any(len(hashes) > 1 for hashes in of_scenario.values())
+        and all(None not in hashes and len(set(hashes)) == 1 for hashes in of_scenario.values())
+    ]
+    if not alike:
+        return []
+    return [f"The same flight with every seed, so that one suffices: {', '.join(alike)}."]
 
 
 def markdown(cells: Cells) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import MODES, Flight, SceneHistory, covered_at, sorties_summary
 from uas_coverage_env.flight.record import LANDED, LIMIT
 from uas_coverage_env.mission.leg_model import Followed
@@ -185,8 +186,7 @@ def _check(options: ExportOptions, settled: Settled) -> None:
         ("--format", options.kind, FORMATS),
         ("--autopilot", options.autopilot, FIRMWARE),
     ):
-        if value not in known:
-            raise InputError(f"{name} {value[:40]!r}: take {', '.join(known)}")
+        check_choice(name, value, known)
     for name, value in (
         ("--tolerance", settled.tolerances.path_m),
         ("--corner", settled.tolerances.corner_m),

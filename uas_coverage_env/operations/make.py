@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
+from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight.seen import SEARCH_AREA
 from uas_coverage_env.operations.cameras import named_camera
 from uas_coverage_env.operations.convex import polygons_of, without_holes
@@ -259,8 +260,8 @@ def _look_notes(
 
 
 def _check(options: ImportOptions) -> None:
-    if options.flown_by not in (None, *FLOWN_BY):
-        raise InputError(f"--flown-by {options.flown_by[:40]!r}: take {', '.join(FLOWN_BY)}")
+    if options.flown_by is not None:
+        check_choice("--flown-by", options.flown_by, FLOWN_BY)
     _within("--height", options.height_m, 1.0, 1_000.0)
     _within("--radius", options.radius_m, 0.5, 1_000.0)
     _within("--min-height", options.min_height_m, 0.0, 100.0)

@@ -21,6 +21,7 @@ body{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1
 table{border-collapse:collapse;margin:1rem 0}
 th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
 th:first-child,td:first-child{text-align:left}
+td{white-space:nowrap}
 svg{width:100%;max-width:48rem;max-height:80vh;background:#eaebe0}
 svg text{font-weight:600;paint-order:stroke;stroke:#fff}
 .wide{overflow-x:auto}

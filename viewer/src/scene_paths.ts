@@ -45,7 +45,8 @@ export class Paths {
         for (const at of [k, k + 1]) corners.push(...place(flight.position(at, i)).toArray());
       }
     }
-    const look = ghosts ? { transparent: true, opacity: 0.55 } : {};
+    // with what can be seen through, to be drawn after the discs of waypoints, which would hide them
+    const look = { transparent: true, opacity: ghosts ? 0.55 : 1 };
     const width = flight.uas > MANY ? null : ghosts ? 1.5 : WIDTH_PX;
     this.flown = new Segments(this.segments.length, width, look);
     this.flown.corners(corners);
@@ -117,6 +118,7 @@ class Segments {
     }
     // its extent changes with every moment
     this.lines.frustumCulled = false;
+    this.lines.renderOrder = 1;
   }
 
   corners(values: number[]): void {

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.export import check_flight
 from uas_coverage_env.operations.frame import LocalFrame
@@ -88,8 +89,7 @@ def _check(options: StreamOptions) -> None:
     ):
         if not low <= value <= high:
             raise InputError(f"{name} {value:g}: should be between {low:g} and {high:g}")
-    if options.reaction not in REACTIONS:
-        raise InputError(f"--on-abort {options.reaction[:40]!r}: take {', '.join(REACTIONS)}")
+    check_choice("--on-abort", options.reaction, REACTIONS)
 
 
 def _table(companion: Companion, frame: LocalFrame) -> str:

@@ -162,7 +162,7 @@ def _north(figure: Figure, axes: Axes) -> None:
         "N",
         xy=(1.0, 1.0),
         xycoords="axes fraction",
-        xytext=(9, -21),
+        xytext=(9, -25),
         textcoords="offset points",
         ha="center",
         fontsize=8,
