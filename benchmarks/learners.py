@@ -1,12 +1,13 @@
 """What the shipped policies cost and how they fly: trains, scores and draws what is published.
 
-    python benchmarks/learners.py                # everything in agents/README.md, an hour
+    python benchmarks/learners.py                # everything, an hour
     python benchmarks/learners.py ppo --seeds 3  # one learner
     python benchmarks/learners.py --publish      # and ship the policy of seed 0
 
 Trains each learner with each seed (a finished training is not repeated, a killed one of
 `uas-coverage train` goes on), flies 100 unseen towns with and without the safety filter, beside
-nearest-waypoint on the same towns, and fills what stands between the marks of agents/README.md.
+nearest-waypoint on the same towns, and fills what stands between the marks: of agents/README.md for
+the shipped policies, of docs/learners.md for the others.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from uas_coverage_env import Scenario, load_planner, rollout
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "agents" / "README.md"
+LEARNERS = ROOT / "docs" / "learners.md"
 PICTURES = ROOT / "docs" / "pictures"
 SHIPPED = ROOT / "agents" / "uas_coverage_agents" / "shipped"
 COVERAGE, HOME, VIOLATIONS, ENERGY, STEPS, FILTERED, _ = range(len(MEASURES))
@@ -49,7 +51,7 @@ class Study:
     """What is trained and published.
 
     Attributes:
-        config: Name of the configuration; with a module, of its place in the README.
+        config: Name of the configuration, and of its place on the page.
         shipped: Name of the planner that flies the policy of seed 0; empty: none.
         assisted: Whether filter and return mode fly along.
         module: That trains, where it is not `uas-coverage train`.
@@ -67,6 +69,11 @@ class Study:
         """What trains it, without the seed."""
         train = f"uas-coverage train {self.config}"
         return f"python -m {self.module} OUT" if self.module else train
+
+    @property
+    def page(self) -> Path:
+        """Where it is published."""
+        return README if self.shipped else LEARNERS
 
 
 STUDIES = (
@@ -101,7 +108,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         directories = [trained(study, seed, arguments.trainings) for seed in range(arguments.seeds)]
         text = report(study, directories, towns, reference)
         sys.stdout.write(f"{text}\n")
-        put(study.config, text)
+        put(study.config, text, study.page)
         if arguments.publish and study.shipped:
             shutil.copytree(directories[0] / "policy", SHIPPED / study.shipped, dirs_exist_ok=True)
     return 0
@@ -145,12 +152,13 @@ def report(
         fly(policy, towns, safety_filter=study.assisted, return_mode=study.assisted)
         for policy in (untrained(study), *policies)
     ]
+    folder = Path(os.path.relpath(PICTURES, study.page.parent)).as_posix()
     lines = [
         f"`{study.command} --seed 0` and the other seeds, "
         f"scored by `python benchmarks/learners.py {study.config} "
         f"--seeds {len(directories)} --missions {len(towns)}`; {machine()}.",
         "",
-        f"![Learning curves](../docs/pictures/learning-{study.config}.png)",
+        f"![Learning curves]({folder}/learning-{study.config}.png)",
         "",
         table_head(),
         table_row("`nearest-waypoint`", None, reference, None),
@@ -165,12 +173,12 @@ def report(
         for policy in policies:
             name = f"seed {policy.description.training.seed}, filter off"
             bare = fly(policy, towns, safety_filter=False, return_mode=True)
-            lines.append(table_row(name, policy, bare, None))
+            lines.append(table_row(name, None, bare, None))
     if study.alone:
         for policy in policies:
             name = f"seed {policy.description.training.seed}, filter and return mode off"
             bare = fly(policy, towns, safety_filter=False, return_mode=False)
-            lines.append(table_row(name, policy, bare, None))
+            lines.append(table_row(name, None, bare, None))
     runs = {f"seed {k}": curve_of(directory) for k, directory in enumerate(directories)}
     PICTURES.mkdir(parents=True, exist_ok=True)
     curve.draw(runs).savefig(PICTURES / f"learning-{study.config}.png", dpi=110)
@@ -189,7 +197,7 @@ def table_row(
     result: NDArray[np.float64],
     reference: NDArray[np.float64] | None,
 ) -> str:
-    """A policy, or a planner that was not trained."""
+    """A policy with what its training took, or whatever else has flown."""
     training = "" if policy is None else training_of(policy)
     return f"| {' | '.join([name, training, *measured_cells(result, reference)])} |"
 
@@ -243,18 +251,19 @@ def machine() -> str:
     return f"{platform.machine()} virtual machine with {os.cpu_count()} cores"
 
 
-def put(name: str, text: str) -> None:
-    """Fill what stands between the marks of a study in the README.
+def put(name: str, text: str, page: Path | None = None) -> None:
+    """Fill what stands between the marks of a study on a page, by default the README.
 
     Raises:
         ValueError: There are no such marks.
     """
+    page = page or README
     begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    before, found, rest = README.read_text(encoding="utf-8").partition(begin)
+    before, found, rest = page.read_text(encoding="utf-8").partition(begin)
     _, ended, after = rest.partition(end)
     if not found or not ended:
-        raise ValueError(f"{README} has no {begin} ... {end}")
-    README.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
+        raise ValueError(f"{page} has no {begin} ... {end}")
+    page.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -37,9 +37,9 @@ def test_a_report_takes_the_place_of_the_former_one(readme):
     assert readme.read_text() == text
 
 
-def test_every_study_has_its_place_in_the_readme():
-    text = learners.README.read_text(encoding="utf-8")
+def test_every_study_has_its_place_on_its_page():
     for study in learners.STUDIES:
+        text = study.page.read_text(encoding="utf-8")
         assert text.count(f"<!-- {study.config} -->") == 1
         assert text.count(f"<!-- end of {study.config} -->") == 1
 

@@ -106,7 +106,7 @@ def test_commands_do_not_depend_on_what_lies_behind_the_arrays_in_memory(town):
             x[:3] = *rng.uniform(10.0, 110.0, 2), -20.0
             x[VX], x[VY] = velocity_mps = rng.uniform(-8.0, 8.0, 2)
             targets = rng.permutation(AHEAD)
-            steer_along(arena, last, x, velocity_mps, targets, AHEAD, flight, command)
+            steer_along(arena, last, x, velocity_mps, targets, AHEAD, flight, 1, 0.0, command)
             yield command["values"].tolist()
 
     assert list(commands(0.0)) == list(commands(1e6))

@@ -5,7 +5,9 @@ import pytest
 from uas_coverage_agents.policy import Mlp, Towns, load_policy, save_policy
 from uas_coverage_agents.policy.planner import PolicyPlanner
 from uas_coverage_agents.policy.route_networks import RouteNetworks
-from uas_coverage_agents.route.leg_flight import AHEAD
+from uas_coverage_agents.route.layers import layers_of
+from uas_coverage_agents.route.leg_flight import AHEAD, MOST_HELD, spare_distance, steer_along
+from uas_coverage_agents.route.planner import SHIPPED as LEARNED_ROUTE
 from uas_coverage_agents.route.planner import LearnedRoute, LearnedRouteOptions
 from uas_coverage_agents.route.velocity_layout import (
     GROUPS,
@@ -13,6 +15,7 @@ from uas_coverage_agents.route.velocity_layout import (
     N_VELOCITY,
     OWN,
     PLACES,
+    SPARE,
     commanded,
     look_along,
     outputs_of,
@@ -28,8 +31,9 @@ from uas_coverage_agents.velocity.planner import SHIPPED
 from uas_coverage_env import generate_scenario, rollout
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z
-from uas_coverage_env.world import build_arena
+from uas_coverage_env.world import COMMAND_DTYPE, Velocity, build_arena
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +91,71 @@ def test_the_first_place_is_straight_ahead_and_the_second_on_the_positive_side()
     assert sum(group.size for group in GROUPS) == N_VELOCITY
 
 
+def _towards_the_fence(left_m, speed_mps=11.0):
+    """An arena, and a UAS that flies north, so far from the fence; its waypoints lie there."""
+    scenario = generate_scenario(seed=5, n_uas=1, n_waypoints=AHEAD, n_obstacles=0)
+    arena = build_arena(scenario)
+    vertices_m = scenario.fence.vertices_m
+    waypoints, x = arena.waypoints.copy(), np.zeros(14)
+    x[X], x[Y], x[Z] = vertices_m[:, 0].max() - left_m, vertices_m[:, 1].mean(), -14.0
+    x[VX] = speed_mps
+    for w in range(AHEAD):
+        waypoints[w]["position_m"] = vertices_m[:, 0].max() - 2.0, x[Y] + 5.0 * w, -14.0
+    return arena._replace(waypoints=waypoints), x
+
+
+def test_it_sees_how_much_distance_is_left_to_brake_in():
+    spare = []
+    for left_m in (90.0, 45.0, 25.0, 10.0):
+        arena, x = _towards_the_fence(left_m)
+        row, _ = _seen(arena, x, x[[VX, VY]], np.arange(AHEAD))
+        spare.append(row[SPARE])
+    far, near, nearer, too_near = np.array(spare)
+    assert (far == 1.0).all()
+    # it can still brake now, but not after flying on for long
+    assert near[0] == 1.0
+    assert near[3] < 0.0
+    assert too_near[0] < 0.0
+    assert (np.diff([far, near, nearer, too_near], axis=0) <= 0.0).all()
+    # the longer it flies on before, the less is left
+    assert (np.diff(spare, axis=1)[:, [0, 1, 2, 4]] <= 0.0).all()
+
+
+@pytest.mark.parametrize("least_m", [0.0, 1.0])
+def test_a_velocity_along_the_route_leaves_the_distance_that_is_asked_for(least_m):
+    teacher = load_policy(LEARNED_ROUTE)
+    network = teacher.description.network
+    assert isinstance(network, RouteNetworks)
+    flight = layers_of(network.flight, teacher.tensors, "flight.")
+    command, found = np.zeros(1, COMMAND_DTYPE)[0], 0
+    for left_m in range(20, 60, 4):
+        arena, x = _towards_the_fence(left_m)
+        reference, path_m = x[[VX, VY]], np.empty((arena.rules[0].lookahead_steps + MOST_HELD, 3))
+        if steer_along(
+            arena, 0, x, reference, np.arange(AHEAD), AHEAD, flight, 2, least_m, command
+        ):
+            found += 1
+            left = spare_distance(arena, 0, x, reference, command, 2, -np.inf, path_m)
+            assert left >= least_m
+    assert 0 < found < 10
+
+
+def test_where_it_is_too_late_to_brake_the_teacher_turns_back():
+    town = generate_scenario(seed=5, n_uas=1, n_waypoints=8, n_obstacles=0)
+    training = VelocityTraining(seed=0)
+    runner = TaughtRunner(
+        training.policy(), training.teacher, 1.0, training.settings, np.random.default_rng(0)
+    )
+    brief = MissionBrief.of(town)
+    runner.reset(brief, 0)
+    sight, fence_m = first_sight(brief), town.fence.vertices_m
+    sight.x[0, :3] = fence_m[:, 0].max() - 4.0, fence_m[:, 1].mean(), -14.0
+    sight.x[0, VX] = sight.reference_mps[0, 0] = 11.0
+    command = runner.act(sight)["uas_1"]
+    assert isinstance(command, Velocity)
+    assert command.north_mps < 0.0
+
+
 def test_outputs_are_what_they_command_and_back():
     rng = np.random.default_rng(0)
     angle = rng.uniform(0.0, 6.0, 5)
@@ -110,7 +179,8 @@ def test_it_looks_straight_on_at_full_speed_before_training():
 
 def test_where_the_teacher_leads_its_own_flight_is_flown_and_noted(town):
     training = VelocityTraining(seed=0)
-    rng, settings = np.random.default_rng(0), DaggerSettings(samples=8)
+    rng = np.random.default_rng(0)
+    settings = DaggerSettings(samples=8, held=1, spare_m=0.0)
     runner = TaughtRunner(training.policy(), training.teacher, 1.0, settings, rng)
     led = rollout(town, runner, return_mode=False, safety_filter=True)
     own = rollout(town, LearnedRoute(LearnedRouteOptions(samples=8)), safety_filter=True)

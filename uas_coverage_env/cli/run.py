@@ -152,7 +152,7 @@ def run(
             )
 
     try:
-        with compiling_for_flight(player, quiet=screen.quiet):
+        with compiling_for_flight(flies, quiet=screen.quiet):
             if sorties is not None:
                 chain = fly_sorties(mission, fly, sorties)
                 code = keep_sorties(screen, chain, directory, overwrite=overwrite)

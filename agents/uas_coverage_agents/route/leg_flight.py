@@ -54,7 +54,8 @@ _LENGTH_M, _SPEED_MPS, _TILT_RAD, _CLIMB_MPS, _RADIUS_M, _RISE_M = 50.0, 12.0, 0
 _CORNER_M = 4.0
 _WITHIN_M = 0.15
 _TRIED = 16
-_HELD = 4
+MOST_HELD = 4
+"""Steps for which a command is held at most before braking is simulated."""
 
 
 @allocating_kernel
@@ -230,12 +231,33 @@ def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
 
 
 @allocating_kernel
-def _is_safe(arena, i, x, reference, command, n_held, path_m):
-    """Whether a command held for some steps, and braking after it, is clear of what is fixed."""
+def spare_distance(arena, i, x, reference, command, n_held, enough_m, path_m):
+    """Distance to spare from what is fixed: a command held for some steps, then braking.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x: (14,) its state.
+        reference: (2,) [m/s] of its inner loop.
+        command: A record of COMMAND_DTYPE.
+        n_held: Steps for which it is held, at most `MOST_HELD`.
+        enough_m: Stop looking when it is below this [m].
+        path_m: (lookahead_steps + MOST_HELD, 3) written.
+
+    Returns:
+        See `fixed_slack`.
+    """
     n_flown, slack_m = fly_hold_and_brake(
-        arena, i, x, reference, command, n_held, False, path_m[: path_m.shape[0] - _HELD + n_held]
-    )
-    return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
+        arena, i, x, reference, command, n_held, False,
+        path_m[: path_m.shape[0] - MOST_HELD + n_held],
+    )  # fmt: skip
+    return fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
+
+
+@allocating_kernel
+def _is_safe(arena, i, x, reference, command, n_held, least_m, path_m):
+    """Whether a command held for some steps, and braking after it, leave distance to spare."""
+    return spare_distance(arena, i, x, reference, command, n_held, least_m, path_m) >= least_m
 
 
 @allocating_kernel
@@ -297,7 +319,9 @@ def places_ahead(arena, i, x, targets, n_targets, ahead):
 
 
 @allocating_kernel
-def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
+def steer_along(
+    arena, i, x, reference, targets, n_targets, layers, least_held, least_spare_m, command
+):
     """Write the velocity that flies UAS i along its route.
 
     Args:
@@ -308,6 +332,8 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
         targets: (AHEAD,) the next waypoints of its route.
         n_targets: How many of them; after them comes home.
         layers: `Layers`.
+        least_held: Steps for which the velocity can be flown before braking.
+        least_spare_m: Distance to spare then, beyond what has to be kept [m].
         command: A record of COMMAND_DTYPE; written.
 
     Returns:
@@ -319,14 +345,14 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
     leg, needed_m, speed_mps = places_ahead(arena, i, x, targets, n_targets, ahead)
     if leg == NO_WAY:
         return False
-    path_m = np.empty((rules.lookahead_steps + _HELD, 3))
+    path_m = np.empty((rules.lookahead_steps + MOST_HELD, 3))
     if ahead[0, IS_HOME] > 0.0:
         values = np.empty(3)
         towards_home(arena.vehicles[i], uas, rules, x, reference, values, command)
         altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
         share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
         write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)
-        return _is_safe(arena, i, x, reference, command, 1, path_m)
+        return _is_safe(arena, i, x, reference, command, least_held, least_spare_m, path_m)
     aims_m = np.empty((AHEAD, 3))
     commands, costs = np.empty((N_VELOCITIES, 3)), np.empty(N_VELOCITIES)
     weigh(
@@ -335,7 +361,7 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
     )  # fmt: skip
     floor_m = max(lowest_altitude(arena, i, x[X], x[Y]), needed_m)
     share = min(1.0, speed_mps / uas.speed_mps)
-    for n_held in (_HELD, 1):
+    for n_held in (MOST_HELD, least_held):
         left = costs.copy()
         for _ in range(_TRIED):
             best = left.argmin()
@@ -344,7 +370,7 @@ def steer_along(arena, i, x, reference, targets, n_targets, layers, command):
             write_command(
                 command, VELOCITY, share * commands[best, 0], share * commands[best, 1], altitude_m
             )
-            if _is_safe(arena, i, x, reference, command, n_held, path_m):
+            if _is_safe(arena, i, x, reference, command, n_held, least_spare_m, path_m):
                 return True
             left[best] = np.inf
     return False

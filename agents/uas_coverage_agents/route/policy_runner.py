@@ -73,7 +73,7 @@ class RouteRunner:
         self._ahead[: len(targets)] = targets
         if not steer_along(
             routes.view.arena, u, state.x[u], state.reference[u], self._ahead, len(targets),
-            self._flight, self._command,
+            self._flight, 1, 0.0, self._command,
         ):  # fmt: skip
             return routes.onwards(u)
         north_mps, east_mps, altitude_m, _ = self._command["values"].tolist()

@@ -16,18 +16,23 @@ from uas_coverage_agents.route.leg_flight import (
     AHEAD,
     EAST,
     IS_HOME,
+    MOST_HELD,
     NORTH,
     RADIUS,
     aim_ahead,
     places_ahead,
+    spare_distance,
 )
+from uas_coverage_env.autopilot.control import write_command
+from uas_coverage_env.autopilot.lookahead import PLENTY_M
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.env.observation import Feature, Group
 from uas_coverage_env.env.observation.surroundings import free_way
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.world.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 
-LAYOUT = "route_velocity_v1"
+LAYOUT = "route_velocity_v2"
 ALONG_NORTH, ALONG_EAST, ACROSS_NORTH, ACROSS_EAST, AIMED_M = range(5)
 """Columns of a frame: unit vectors along and across the way, and the altitude aimed at [m]."""
 
@@ -40,6 +45,8 @@ _LENGTH_M, _SPEED_MPS, _TILT_RAD, _CLIMB_MPS, _RADIUS_M, _RISE_M = 50.0, 12.0, 0
 _NEAR_M, _RAY_M, _MOST = 10.0, 60.0, 3.0
 _AHEAD_RAD = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0])
 _FLIGHT_RAD = np.radians([-40.0, -20.0, -10.0, 0.0, 10.0, 20.0, 40.0])
+_BRAKED_AFTER = np.array([0, 1, 2, MOST_HELD])
+_AHEAD_AFTER = np.array([1, 2])
 _STILL_MPS = 0.5
 _PLACES = AHEAD - 1
 
@@ -77,12 +84,21 @@ SURROUNDINGS = Group(
         Feature("flight", len(_FLIGHT_RAD), 0.0, 1.0, "likewise, -40° to 40° off the velocity"),
         _scaled("rise", 1, "how far above is the least altitude on the way / 10 m"),
         Feature("pace", 1, 0.0, 1.0, "speed that leaves time to climb there / top speed"),
+        Feature(
+            "spare", len(_BRAKED_AFTER), -_MOST, 1.0,
+            "distance to spare from fixed obstacles and fence / 2 m if it brakes now, or flies on "
+            "for 1, 2 or 4 steps and brakes then",
+        ),
+        Feature(
+            "spare_ahead", len(_AHEAD_AFTER), -_MOST, 1.0,
+            "likewise if it flies along at top speed for 1 or 2 steps and brakes then",
+        ),
     ),
-)
+)  # fmt: skip
 GROUPS = (OWN, PLACES, SURROUNDINGS)
 N_VELOCITY = sum(group.size for group in GROUPS)
-RAYS = slice(N_VELOCITY - SURROUNDINGS.size, N_VELOCITY - 2)
-"""Columns that say how near fixed obstacles and the fence are."""
+SPARE = slice(N_VELOCITY - len(_BRAKED_AFTER) - len(_AHEAD_AFTER), N_VELOCITY)
+"""Columns that say whether it is still time to brake."""
 
 _OWN, _PLACE, _AROUND = OWN.columns, PLACES.columns, SURROUNDINGS.columns
 _WIDTH, _FIRST_PLACE, _FIRST_AROUND = PLACES.width, OWN.size, OWN.size + PLACES.size
@@ -135,6 +151,17 @@ def _look_around(arena, x, north, east, side, angles_rad, row):
         along, across = math.cos(angles_rad[k]), side * math.sin(angles_rad[k])
         dx, dy = along * north - across * east, along * east + across * north
         row[k] = 1.0 - free_way(arena, x[X], x[Y], x[Z], dx, dy, 0.0, _RAY_M) / _RAY_M
+
+
+@allocating_kernel
+def _look_at_braking(arena, i, x, reference, north_mps, east_mps, altitude_m, after, row):
+    """Write how much distance is to spare if it brakes after so many steps at a velocity."""
+    path_m = np.empty((arena.rules[0].lookahead_steps + MOST_HELD, 3))
+    command = np.zeros(1, COMMAND_DTYPE)[0]
+    write_command(command, VELOCITY, north_mps, east_mps, altitude_m)
+    for k in range(after.shape[0]):
+        spare_m = spare_distance(arena, i, x, reference, command, after[k], -math.inf, path_m)
+        row[k] = spare_m / PLENTY_M
 
 
 @allocating_kernel
@@ -200,6 +227,15 @@ def look_along(arena, i, x, reference, targets, n_targets, row, frame):
     _look_around(arena, x, ex, ey, side, _FLIGHT_RAD, row[at + _AROUND.flight :])
     row[at + _AROUND.rise] = (floor_m + x[Z]) / _RISE_M
     row[at + _AROUND.pace] = min(1.0, speed_mps / arena.uas[i].speed_mps)
+    _look_at_braking(
+        arena, i, x, reference, reference[0], reference[1], aimed_m, _BRAKED_AFTER,
+        row[at + _AROUND.spare :],
+    )  # fmt: skip
+    top_mps = arena.uas[i].speed_mps
+    _look_at_braking(
+        arena, i, x, reference, top_mps * frame[0], top_mps * frame[1], aimed_m, _AHEAD_AFTER,
+        row[at + _AROUND.spare_ahead :],
+    )  # fmt: skip
     for f in range(N_VELOCITY):
         row[f] = min(max(row[f], -_MOST), _MOST)
     return leg
