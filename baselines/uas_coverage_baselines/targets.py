@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.flight import Planner
 from uas_coverage_env.mission import (
     Approach,
@@ -16,15 +17,15 @@ from uas_coverage_env.mission import (
 )
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
-_READY: set[type] = set()
-
 
 def warm_up_once(planner: Planner, brief: MissionBrief) -> None:
     """Let a planner decide before anything counts: its first decision in a process compiles."""
-    if type(planner) not in _READY:
+
+    def rehearse() -> None:
         planner.reset(brief, 0)
         planner.act(first_sight(brief))
-        _READY.add(type(planner))
+
+    rehearse_once(type(planner), rehearse)
 
 
 class Targets:

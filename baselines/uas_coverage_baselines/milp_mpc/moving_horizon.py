@@ -25,6 +25,7 @@ from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.steering import Steering
 from uas_coverage_baselines.milp_mpc.unheard import Unheard
+from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import (
     Attempts,
@@ -77,10 +78,16 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def rehearsal(self) -> Self:
         """The same planner with time enough to compile everything."""
-        return type(self)(self.options.model_copy(update={"time_limit_s": 10.0}), self._given)
+        return type(self)(self.options.model_copy(update={"time_limit_s": 10.0, "horizon": 8}), self._given)
 
     def warm_up(self, brief: MissionBrief) -> None:
-        """Compile what a decision compiles, on the mission's first one."""
+        """Compile what a decision compiles, on the first one of the first mission of its kind."""
+        choices = {k: v for k, v in self.options if isinstance(v, str | tuple)}
+        has = (brief.conditions, brief.obstacles, brief.moving_obstacles, brief.uas[1:])
+        kinds = (type(self), *map(type, self.blocks), *choices.items(), *map(bool, has))
+        rehearse_once(kinds, lambda: self._rehearse(brief))
+
+    def _rehearse(self, brief: MissionBrief) -> None:
         rehearsal = self.rehearsal()
         rehearsal.reset(brief, 0)
         swarm = first_sight(brief)
