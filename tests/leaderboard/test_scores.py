@@ -271,10 +271,10 @@ def test_a_comparison_of_a_version_without_returns_can_still_be_drawn(tmp_path):
     assert leaderboard_figure(scores_of(rows, reference), rows, reference).axes
 
 
-def test_a_note_names_the_players_that_fly_alike_with_every_seed():
+def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
     rows = [
-        row("a", player, seed, trajectory_sha256=f"{player}{seed if player == 'random' else ''}")
-        for player in ("same", "random")
+        row("a", label, seed, trajectory_sha256=f"{label}{seed if label == 'random' else ''}")
+        for label in ("same", "random")
         for seed in range(2)
     ]
     assert notes(rows, "same")[-1].endswith("one suffices: same.")

@@ -14,16 +14,8 @@ def degrade(arena, state, outcome, i, parameters, memory, random):
     """Fly with what is left; parameters: number of the event, share of the thrust, power factor.
 
     The autopilot makes up for the motor as far as the thrust goes, and pays with power.
-
-    Raises:
-        ValueError: The mission has no such event.
     """
     e = int(parameters[_EVENT])
-    if e >= state.event_step.shape[0]:
-        raise ValueError(
-            "motor_degraded is of an event that the mission does not have; take the disturbances "
-            "of the scenario that is flown"
-        )
     if concerns(state, e, i) and state.step[0] >= state.event_step[e]:
         event, vehicle = outcome[i], arena.vehicles[i]
         thrust_N = parameters[_THRUST_SHARE] * (vehicle.weight_N + vehicle.lift_max_N)

@@ -111,13 +111,13 @@ def notes(rows: Sequence[Row], reference: str) -> list[str]:
 
 
 def _flown_alike(rows: Sequence[Row]) -> list[str]:
-    """A line on the players whose flights are the same with every seed."""
+    """A line on the planners whose flights are the same with every seed."""
     flown: dict[str, dict[str, list[str | None]]] = {}
     for row in rows:
-        flown.setdefault(row.player, {}).setdefault(row.scenario, []).append(row.trajectory_sha256)
+        flown.setdefault(row.label, {}).setdefault(row.scenario, []).append(row.trajectory_sha256)
     alike = [
-        player
-        for player, of_scenario in flown.items()
+        label
+        for label, of_scenario in flown.items()
         if any(len(hashes) > 1 for hashes in of_scenario.values())
         and all(None not in hashes and len(set(hashes)) == 1 for hashes in of_scenario.values())
     ]

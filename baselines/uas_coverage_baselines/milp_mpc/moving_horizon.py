@@ -77,8 +77,9 @@ class MovingHorizon(ABC, Generic[Chosen]):
         return frozenset()
 
     def rehearsal(self) -> Self:
-        """The same planner with time enough to compile everything."""
-        return type(self)(self.options.model_copy(update={"time_limit_s": 10.0, "horizon": 8}), self._given)
+        """The same planner with a short horizon, and time enough to compile everything."""
+        quick = self.options.model_copy(update={"time_limit_s": 10.0, "horizon": 8})
+        return type(self)(quick, self._given)
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what a decision compiles, on the first one of the first mission of its kind."""
