@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Iterator
 from email import message_from_bytes
 from email.message import Message
 from graphlib import TopologicalSorter
@@ -69,12 +70,18 @@ def _package(module: str) -> str:
     return ".".join(module.split(".")[:2])
 
 
+def _nodes() -> Iterator[tuple[Path, ast.AST]]:
+    """All syntax nodes of the packages, with their files."""
+    for folder in PACKAGES.values():
+        for path in folder.rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                yield path, node
+
+
 def test_no_function_takes_more_than_12_parameters():
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}: {n}"
-        for folder in PACKAGES.values()
-        for path in folder.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for path, node in _nodes()
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
         if (n := _n_parameters(node.args)) > MOST_PARAMETERS and not _is_command(node)
     ]
@@ -97,9 +104,7 @@ def test_no_column_with_a_meaning_is_addressed_by_its_number():
     # up to 2 they are coordinates, ends and pairs mostly; beyond, a number says nothing to a reader
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}"
-        for folder in PACKAGES.values()
-        for path in folder.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for path, node in _nodes()
         if isinstance(node, ast.Subscript) and _is_numbered(node)
     ]
     assert not found, "name these columns where their array is declared"
