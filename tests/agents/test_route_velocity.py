@@ -10,6 +10,9 @@ from uas_coverage_agents.route.leg_flight import AHEAD, MOST_HELD, spare_distanc
 from uas_coverage_agents.route.planner import SHIPPED as LEARNED_ROUTE
 from uas_coverage_agents.route.planner import LearnedRoute, LearnedRouteOptions
 from uas_coverage_agents.route.velocity_layout import (
+    AIMED_M,
+    ALONG_EAST,
+    ALONG_NORTH,
     GROUPS,
     N_FRAME,
     N_VELOCITY,
@@ -29,11 +32,14 @@ from uas_coverage_agents.training.velocity_learning import (
 from uas_coverage_agents.velocity.planner import SHIPPED
 
 from uas_coverage_env import generate_scenario, rollout
+from uas_coverage_env.autopilot.control import write_command
+from uas_coverage_env.autopilot.lookahead import PLENTY_M
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z
 from uas_coverage_env.world import COMMAND_DTYPE, Velocity, build_arena
+from uas_coverage_env.world.commands import VELOCITY
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +125,21 @@ def test_it_sees_how_much_distance_is_left_to_brake_in():
     assert (np.diff([far, near, nearer, too_near], axis=0) <= 0.0).all()
     # the longer it flies on before, the less is left
     assert (np.diff(spare, axis=1)[:, [0, 1, 2, 4]] <= 0.0).all()
+
+
+def test_it_sees_what_flying_along_its_way_would_leave_whatever_way_it_flies_now():
+    arena, x = _towards_the_fence(25.0)
+    x[[VX, VY]] = -x[VX], 4.0
+    row, frame = _seen(arena, x, x[[VX, VY]], np.arange(AHEAD))
+    north_mps, east_mps = arena.uas[0].speed_mps * frame[[ALONG_NORTH, ALONG_EAST]]
+    command = np.zeros(1, COMMAND_DTYPE)[0]
+    write_command(command, VELOCITY, north_mps, east_mps, frame[AIMED_M])
+    path_m = np.empty((arena.rules[0].lookahead_steps + MOST_HELD, 3))
+    left = [
+        spare_distance(arena, 0, x, x[[VX, VY]], command, held, -np.inf, path_m) for held in (1, 2)
+    ]
+    assert abs(north_mps * x[VY] - east_mps * x[VX]) > 1.0
+    np.testing.assert_allclose(row[SPARE][-2:], np.array(left) / PLENTY_M, atol=1e-9)
 
 
 @pytest.mark.parametrize("least_m", [0.0, 1.0])

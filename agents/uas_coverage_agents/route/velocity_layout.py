@@ -233,8 +233,8 @@ def look_along(arena, i, x, reference, targets, n_targets, row, frame):
     )  # fmt: skip
     top_mps = arena.uas[i].speed_mps
     _look_at_braking(
-        arena, i, x, reference, top_mps * frame[0], top_mps * frame[1], aimed_m, _AHEAD_AFTER,
-        row[at + _AROUND.spare_ahead :],
+        arena, i, x, reference, top_mps * frame[ALONG_NORTH], top_mps * frame[ALONG_EAST],
+        aimed_m, _AHEAD_AFTER, row[at + _AROUND.spare_ahead :],
     )  # fmt: skip
     for f in range(N_VELOCITY):
         row[f] = min(max(row[f], -_MOST), _MOST)

@@ -42,6 +42,7 @@ from uas_coverage_agents.route.leg_flight import (
 )
 from uas_coverage_agents.route.planner import SHIPPED as TEACHER
 from uas_coverage_agents.route.velocity_layout import (
+    AIMED_M,
     N_VELOCITY,
     OUTPUTS,
     SPARE,
@@ -179,7 +180,7 @@ class TaughtRunner(RouteVelocityRunner):
         """Where it is too late to brake: what leaves the most distance to spare."""
         view, command = self.routes.view, self._command
         path_m = np.empty((view.arena.rules[0]["lookahead_steps"] + MOST_HELD, 3))
-        speed_mps, altitude_m = view.arena.uas[u]["speed_mps"], self.frames[u, -1]
+        speed_mps, altitude_m = view.arena.uas[u]["speed_mps"], self.frames[u, AIMED_M]
         found_m, found = -math.inf, [0.0, 0.0, altitude_m]
         for share, angle_rad in _RETREATS:
             north_mps = share * speed_mps * math.cos(angle_rad)
