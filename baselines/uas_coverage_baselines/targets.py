@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.flight import Planner
 from uas_coverage_env.mission import (
-    Approach,
-    Attempts,
+    GuidedFlight,
     Handover,
     MissionBrief,
     WorldView,
@@ -32,14 +31,13 @@ class Targets:
     """One target per UAS, kept until it is covered, blocked by a moving obstacle, or given up.
 
     A target to which a UAS comes no nearer is flown to with care, then left for later, and given up
-    in the end: see `Attempts`.
+    in the end: see `GuidedFlight`.
     """
 
     def __init__(self, brief: MissionBrief) -> None:
         self._waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         self._view = WorldView(brief)
-        self._attempts, self._approach = Attempts(brief), Approach(brief)
-        self._handover = Handover(brief)
+        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
         self._can_cover = brief.can_cover
         self._target: dict[str, int] = {}
 
@@ -53,12 +51,12 @@ class Targets:
             choose: (swarm, index of the UAS, (W,) candidates, which it can cover) -> one of them.
         """
         works = self._handover.workers(swarm)
-        if not self._attempts.wanted(swarm.uncovered).any():
+        if not self._guided.wanted(swarm.uncovered).any():
             return {name: GoTo(None) for name in swarm.active}
         self._view.update(swarm)
         blocked = self._view.blocked()
         wanted = {
-            swarm.names[u]: self._attempts.wanted_of(swarm.uncovered, self._can_cover[u])
+            swarm.names[u]: self._guided.wanted_of(swarm.uncovered, self._can_cover[u])
             for u in np.flatnonzero(works)
         }
         self._target = {
@@ -70,20 +68,13 @@ class Targets:
             if name not in self._target and mine.any():
                 candidates = self._candidates(mine, mine & ~blocked)
                 self._target[name] = choose(swarm, swarm.names.index(name), candidates)
-        self._attempts.update(swarm, self._target, blocked)
-        commands = {name: GoTo(None) for name in swarm.active}
-        return commands | {name: self._command(swarm, name) for name in self._target}
+        home: dict[str, Command] = {name: GoTo(None) for name in swarm.active}
+        return home | self._guided.commands(swarm, self._target, blocked)
 
     def nearest(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         """The candidate nearest to a UAS."""
         distances_m = np.linalg.norm(self._waypoints_m - swarm.x[uas, :3], axis=1)
         return int(np.where(candidates, distances_m, np.inf).argmin())
-
-    def _command(self, swarm: SwarmState, name: str) -> Command:
-        target, uas = self._target[name], swarm.names.index(name)
-        if self._attempts.is_hard(uas, target):
-            return self._approach.command(swarm, uas, target)
-        return GoTo(target, mode="covering")
 
     def _candidates(self, wanted: NDArray[np.bool_], free: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(W,) open waypoints that are free and no UAS's target, else the next best.

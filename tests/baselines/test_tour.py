@@ -8,7 +8,7 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.flight import Assistants, accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, generate_scenario
+from uas_coverage_env.scenario import Scenario, generate_scenario, sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import LOST, build_arena
@@ -174,6 +174,15 @@ def test_it_flies_with_the_filter_and_brings_every_uas_home_itself():
 
 
 @pytest.mark.slow
+def test_a_strong_wind_keeps_it_from_no_waypoint_that_guidance_reaches():
+    # plans of still air, improved long enough, keep turning away just before a waypoint upwind
+    windy = sample_scenario(3016, (1, 2), (8, 12), (3, 8), disturbances="strong")
+    flight = rollout(windy, Tour(TourOptions(moves=20_000)), seed=3016)
+    assert coverage(flight) == 1.0
+    assert home(flight).all()
+    assert flight.violations == ()
+
+
 def test_the_village_is_covered_in_little_more_than_the_best_plan_known(village):
     flight = rollout(village, Tour())
     assert flight.covered[-1] == 49

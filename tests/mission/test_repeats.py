@@ -45,7 +45,7 @@ class Told:
 
     def cover(self, place):
         while self.told.uncovered[place]:
-            self.step(GoTo(self.repeats.waypoint(place)))
+            self.step(self.repeats.addressed({"uas_1": GoTo(place)})["uas_1"])
 
 
 def test_a_mission_without_repeats_has_none():
@@ -73,7 +73,8 @@ def test_a_place_stays_the_same_however_often_it_is_asked_for():
         assert not told.told.uncovered[0]
         for _ in range(12):
             told.step(HOVERS)
-    assert told.repeats.waypoint(0) == 3
+    commands = {"uas_1": GoTo(0), "uas_2": GoTo(1), "uas_3": GoTo(None), "uas_4": HOVERS}
+    assert told.repeats.addressed(commands) == {**commands, "uas_1": GoTo(3)}
     assert told.world.state.uncovered.tolist() == [False, True, False, False]
 
 

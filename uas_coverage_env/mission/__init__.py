@@ -4,6 +4,7 @@ from uas_coverage_env.mission.approach import Approach, carefully, with_free_aim
 from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
@@ -17,6 +18,7 @@ from uas_coverage_env.mission.ways import Way, Ways
 __all__ = [
     "Approach",
     "Attempts",
+    "GuidedFlight",
     "Handover",
     "Legs",
     "MissionBrief",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.scenario import Waypoint
-from uas_coverage_env.world import SwarmState
+from uas_coverage_env.world import Command, GoTo, SwarmState
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -108,13 +109,19 @@ class Repeats:
         """
         return replace(swarm, uncovered=swarm.uncovered & self._open)
 
-    def waypoint(self, place: int) -> int:
-        """The waypoint that a place is now: the last that it was asked for as.
+    def addressed(self, commands: Mapping[str, Command]) -> dict[str, Command]:
+        """Commands to fly to the waypoints that places are now: the last they were asked for as.
 
         Args:
-            place: Its number.
+            commands: Those that send UAS to places.
         """
-        return int(np.flatnonzero(self._rows == place)[-1])
+        return {name: self._addressed(command) for name, command in commands.items()}
+
+    def _addressed(self, command: Command) -> Command:
+        if not isinstance(command, GoTo) or command.waypoint is None:
+            return command
+        rows = np.flatnonzero(self._rows == command.waypoint)
+        return replace(command, waypoint=int(rows[-1]))
 
 
 def _with_places(brief: MissionBrief) -> tuple[NDArray[np.int64], MissionBrief]:

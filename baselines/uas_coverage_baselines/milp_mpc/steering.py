@@ -15,7 +15,7 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
-from uas_coverage_env.mission import Approach, Attempts, MissionBrief, first_sight
+from uas_coverage_env.mission import GuidedFlight, MissionBrief, first_sight
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 
@@ -33,23 +33,15 @@ class Steering:
         builder = ProblemBuilder(brief, options)
         self._guide = RouteGuide(brief, builder, TourShape(), decision_s)
         self._guide.begin(first_sight(brief), seed)
-        self._attempts, self._approach = Attempts(brief), Approach(brief)
+        self._guided = GuidedFlight(brief)
 
     def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
         """A command for each UAS that flies and takes commands."""
-        wanted = self._attempts.wanted(swarm.uncovered)
+        wanted = self._guided.wanted(swarm.uncovered)
         self._guide.update(replace(swarm, uncovered=wanted))
         ahead = dict(zip(swarm.active, self._guide.tours(swarm.active), strict=True))
         flown_to = {name: int(route[0]) for name, route in ahead.items() if len(route)}
         blocked = np.zeros(len(swarm.uncovered), np.bool_)
         blocked[list(self._guide.blocked)] = True
-        self._attempts.update(swarm, flown_to, blocked)
-        return {name: self._command(swarm, name, flown_to.get(name)) for name in swarm.active}
-
-    def _command(self, swarm: SwarmState, name: str, target: int | None) -> Command:
-        if target is None:
-            return GoTo(None, "return")
-        uas = swarm.names.index(name)
-        if self._attempts.is_hard(uas, target):
-            return self._approach.command(swarm, uas, target)
-        return GoTo(target, mode="covering")
+        home: dict[str, Command] = {name: GoTo(None, "return") for name in swarm.active}
+        return home | self._guided.commands(swarm, flown_to, blocked)

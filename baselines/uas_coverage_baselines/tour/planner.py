@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
+    GuidedFlight,
     Handover,
     MissionBrief,
     Recall,
@@ -39,6 +41,8 @@ _PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putt
 _MOVING_MARGIN_M = 6.0
 _LEG_SEARCHES = 3
 _SURPRISE_MPS = 0.3  # a larger deviation means that another flew: the filter, return mode
+_OFF_MPS = 0.6  # a mean deviation with which no plan comes true
+_OFF_SHARE = 0.1  # of the last step in that mean
 
 
 class TourOptions(AssistedOptions):
@@ -61,8 +65,9 @@ class Tour:
 
     Before take-off simulated annealing gives every UAS a route (`schedule`); on events the order
     is searched again. At every step each UAS's commands for the coming seconds are improved in
-    simulation (`flight_plan`), and the first is flown. There is no clock in any of it: the same
-    seed flies the same mission.
+    simulation (`flight_plan`), and the first is flown. In a wind in which the plans of a UAS do not
+    come true, it flies along its route under the world's guidance. There is no clock in any of it:
+    the same seed flies the same mission.
     """
 
     Options = TourOptions
@@ -108,6 +113,7 @@ class Tour:
             plan.path_m[:] = uas.start_m
         self._trial = empty_plan(self._n_steps)
         self._is_flown = np.zeros(n_uas, np.bool_)
+        self._guided, self._off_mps = GuidedFlight(brief), np.zeros(n_uas)
         self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
         self._reference_mps = np.zeros((n_uas, 2))
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
@@ -129,7 +135,7 @@ class Tour:
         if self._by_legs is not None:
             self.last_decision = None
             return self._by_legs.commands(swarm)
-        view = self._view(swarm)
+        view = self._view(replace(swarm, uncovered=self._guided.wanted(swarm.uncovered)))
         if not self._has_order:
             self._go_on(view, swarm.step)
         self._schedule.update(view)
@@ -141,12 +147,24 @@ class Tour:
             commands[name] = self._fly(i, view, others_m)
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
-        return commands
+        commands |= self._guided.commands(swarm, self._guided_to(swarm), _closed(view))
+        return commands if self._repeats is None else self._repeats.addressed(commands)
 
     def _is_idle(self, swarm: SwarmState) -> bool:
         """Whether a UAS flies home, with no visit left."""
         routes = self._schedule.order.routes
         return any(not len(routes[i]) for i in np.flatnonzero(swarm.status == FLYING))
+
+    def _guided_to(self, swarm: SwarmState) -> dict[str, int]:
+        """The waypoints that UAS fly to whose plans do not come true."""
+        routes = self._schedule.order.routes
+        flying = np.flatnonzero(self._is_guided & (swarm.status == FLYING) & ~self._returns)
+        return {swarm.names[i]: int(routes[i][0]) for i in flying if len(routes[i])}
+
+    @property
+    def _is_guided(self) -> NDArray[np.bool_]:
+        """(U,) whose plans do not come true, where that has to be expected."""
+        return self._off_mps > (_OFF_MPS if self._brief.conditions is not None else np.inf)
 
     def _find_order(self, view: View, seed: int) -> None:
         self._schedule.begin(view, seed)
@@ -163,18 +181,17 @@ class Tour:
         task = self._task(i, view)
         plan, x = self._plans[i], view.x[i]
         n_kept = self._catch_up(i, x, task.route)
+        is_guided = self._is_guided[i]
+        changes = 0 if is_guided else self.options.changes
         seconds = improve(
             self._arena, i, task, x, self._reference_mps[i], others_m, plan, self._trial,
-            n_kept, self.options.changes, self._rng, self._command,
+            n_kept, changes, self._rng, self._command,
         )  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
-        self._is_flown[i] = seconds < SAFE_BELOW_S
+        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided
         if not self._is_flown[i]:
-            target = int(task.route[0]) if len(task.route) else None
-            if target is not None and self._repeats is not None:
-                target = self._repeats.waypoint(target)
-            return GoTo(target, mode)
+            return GoTo(int(task.route[0]) if len(task.route) else None, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
         return Velocity(north_mps, east_mps, altitude_m, mode)
 
@@ -185,10 +202,9 @@ class Tour:
             route = route[:0]
         radius_m, blocked = self._radius_m[route], view.blocked[route]
         within_m = radius_m - np.minimum(_COVERED_WITHIN_M, radius_m / 50.0)
-        closed = blocked if view.asked_in_s is None else blocked | (view.asked_in_s[route] > 0.0)
         return PursuitTask(
             np.ascontiguousarray(route),
-            np.where(closed, -1.0, within_m),
+            np.where(_closed(view)[route], -1.0, within_m),
             np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),
             schedule.rest_s(i, SLOWER, _PER_WAYPOINT_S) if len(route) else np.zeros(1),
             schedule.legs.acceleration_mps2[i],
@@ -199,8 +215,10 @@ class Tour:
     def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64]) -> int:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
-        expected = plan.x[1]
-        as_planned = self._is_flown[i] and np.abs((expected - x)[VX : VZ + 1]).max() < _SURPRISE_MPS
+        off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
+        if self._is_flown[i]:
+            self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
+        as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
         self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
         plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
         plan.push[-1], plan.share[-1] = 0.0, 1.0
@@ -251,3 +269,8 @@ class Tour:
             swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
             asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
         )
+
+
+def _closed(view: View) -> NDArray[np.bool_]:
+    """(W,) waypoints that cannot be covered yet."""
+    return view.blocked if view.asked_in_s is None else view.blocked | (view.asked_in_s > 0.0)

@@ -168,7 +168,8 @@ class Trajectory:
             if self._repeats is not None:
                 swarm = self._repeats.open_now(swarm)
             self.last_decision = Decision({})
-            return {**self.steering.commands(swarm, self._world), **home}
+            commands = {**self.steering.commands(swarm, self._world), **home}
+            return commands if self._repeats is None else self._repeats.addressed(commands)
         flying = swarm.status == FLYING
         self._planned = {u: planned for u, planned in self._planned.items() if flying[u]}
         self._follow(swarm, movers)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import Routes, SearchEffort, improve_routes
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
-from uas_coverage_env.mission import Approach, Attempts, MissionBrief, Recall, WorldView
+from uas_coverage_env.mission import GuidedFlight, MissionBrief, Recall, WorldView
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]
@@ -82,7 +82,7 @@ class Steering:
         self._fleet, self._order, self._seed = fleet, order, seed
         self._effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
         self._again = max(round(_AGAIN_S / brief.dt_s), 1)
-        self._attempts, self._approach = Attempts(brief), Approach(brief)
+        self._guided = GuidedFlight(brief)
         self._recall, self._called = Recall(len(brief.uas)), np.zeros(len(brief.uas), np.bool_)
         self._worked = np.zeros(len(brief.uas), np.bool_)
 
@@ -94,7 +94,7 @@ class Steering:
             world: The same, updated.
         """
         blocked = world.blocked()
-        wanted = self._attempts.wanted(swarm.uncovered)
+        wanted = self._guided.wanted(swarm.uncovered)
         free = wanted & ~blocked
         target = free if free.any() else wanted
         if swarm.uncovered.any():
@@ -106,16 +106,8 @@ class Steering:
             for u, route in enumerate(self._order.routes)
             if works[u] and len(route)
         }
-        self._attempts.update(swarm, flown_to, blocked)
-        return {name: self._command(swarm, name, flown_to.get(name)) for name in swarm.active}
-
-    def _command(self, swarm: SwarmState, name: str, target: int | None) -> Command:
-        if target is None:
-            return GoTo(None)
-        uas = swarm.names.index(name)
-        if self._attempts.is_hard(uas, target):
-            return self._approach.command(swarm, uas, target)
-        return GoTo(target, mode="covering")
+        home: dict[str, Command] = {name: GoTo(None) for name in swarm.active}
+        return home | self._guided.commands(swarm, flown_to, blocked)
 
     def _search(self, swarm: SwarmState, works: BoolArray, wanted: BoolArray) -> None:
         moment = Moment(swarm.x, works, wanted, np.zeros(len(wanted), np.int64), swarm.time_s)
