@@ -27,6 +27,7 @@ from uas_coverage_agents.training.velocity_learning import (
     DaggerSettings,
     TaughtRunner,
     VelocityTraining,
+    mission_of,
     train,
 )
 from uas_coverage_agents.velocity.planner import SHIPPED
@@ -209,6 +210,17 @@ def test_where_the_teacher_leads_its_own_flight_is_flown_and_noted(town):
     rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
     assert len(rows) == len(outputs) > led.steps
     assert np.abs(outputs[:, :2]).max() <= 1.0 + 1e-9
+
+
+def test_missions_of_a_training_are_flown_at_each_level_in_turn_and_in_still_air():
+    towns = Towns(first_seed=70, n_uas=(1, 2), n_waypoints=(8, 9), n_obstacles=(3, 4))
+    settings = DaggerSettings(towns=towns, levels=("light", "strong"))
+    winds = [mission_of(settings, number).wind for number in range(6)]
+    assert [wind is None for wind in winds] == [True, False, False] * 2
+    for light, strong in (winds[1:3], winds[4:6]):
+        assert light.mean_mps <= 4.0
+        assert strong.mean_mps >= 7.0
+    assert winds[1] != winds[4]
 
 
 def test_a_training_leaves_a_policy_that_flies_and_the_same_seed_the_same(town, tmp_path):

@@ -58,7 +58,7 @@ from uas_coverage_env.autopilot import velocity_of
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import LEVELS, Scenario, with_disturbances
 from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.commands import VELOCITY
 
@@ -75,6 +75,7 @@ class DaggerSettings(StrictModel):
 
     Attributes:
         towns: In which is flown; each round and each training flies others.
+        levels: Of wind and wrong models that are flown in turn with still air.
         rounds: Of flying, and of learning from all that was flown so far.
         towns_per_round: How many.
         led: Share of the steps that the teacher flies, in the first rounds; later ones: none.
@@ -94,6 +95,7 @@ class DaggerSettings(StrictModel):
     towns: Towns = Towns(
         first_seed=1_000_000, n_uas=(1, 6), n_waypoints=(20, 60), n_obstacles=(5, 20)
     )
+    levels: tuple[str, ...] = ()
     rounds: int = 6
     towns_per_round: int = 45
     led: tuple[float, ...] = (1.0, 0.5)
@@ -226,9 +228,10 @@ class VelocityTraining:
         runner = TaughtRunner(self.policy(), self.teacher, led, settings, self._rng)
         first = (self.seed * settings.rounds + number) * settings.towns_per_round
         for k in range(first, first + settings.towns_per_round):
-            scenario = town(settings.towns, k)
             # without the filter, states come up in which it would have had to help
-            rollout(scenario, runner, return_mode=False, safety_filter=k % 3 == 0, seed=k)
+            rollout(
+                mission_of(settings, k), runner, return_mode=False, safety_filter=k % 3 == 0, seed=k
+            )
         rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
         self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
         self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
@@ -277,6 +280,12 @@ class VelocityTraining:
             versions={name: version(name) for name in ("numpy", "torch")},
         )
         return Policy(description, tensors)
+
+
+def mission_of(settings: DaggerSettings, number: int) -> Scenario:
+    """A town to fly in, in still air or at one of the levels, which take turns."""
+    level = (None, *settings.levels)[number % (1 + len(settings.levels))]
+    return with_disturbances(town(settings.towns, number), level, number)
 
 
 def fresh_network(hidden: tuple[int, ...]) -> nn.Sequential:
@@ -337,8 +346,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
+    parser.add_argument(
+        "--levels", nargs="*", default=[], choices=list(LEVELS), help="of wind, beside still air"
+    )
     asked = parser.parse_args(argv)
-    train(VelocityTraining(asked.seed), asked.out, asked.missions)
+    settings = DaggerSettings(levels=tuple(asked.levels))
+    train(VelocityTraining(asked.seed, settings), asked.out, asked.missions)
 
 
 if __name__ == "__main__":
