@@ -2,10 +2,11 @@
 
     python benchmarks/put_table.py sweep         the leaderboard
     python benchmarks/put_table.py sweep test    the same planners on the `test` set
+    python benchmarks/put_table.py sweep light   in light wind; likewise moderate, strong
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (all of
-`table.md`) and of `README.md` (a short table), and copies the picture to `docs/pictures`; or the
-short table between the marks `<!-- test -->` of `baselines/README.md`.
+`table.md`) and of `README.md` (a short table), and copies the picture to `docs/pictures`; or a
+short table between the marks of another name (`<!-- test -->`) of `baselines/README.md`.
 Exits 2 where a file or a mark is missing, or a file was damaged.
 """
 
@@ -14,11 +15,13 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-MARKS = ("leaderboard", "test")
+WIND = ("light", "moderate", "strong")
+MARKS = ("leaderboard", "test", *WIND)
 PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
 
 
@@ -41,31 +44,54 @@ def filled(text: str, content: str, mark: str) -> str:
     return f"{before}{begin}\n{content.strip()}\n\n{end}{after}"
 
 
-def short_table(data: dict[str, Any]) -> str:
-    """Who, how often it worked, what it took, against whom."""
+def short_table(data: dict[str, Any], mark: str = "leaderboard") -> str:
+    """Who, how often it worked, what it took, against whom; in wind how much was covered, too."""
     reference = data["reference"]
-    headings = ["planner", "accomplished", "violations", "decision p50, ms"]
-    headings += [f"Δ energy to {reference}, %", "Δ steps, %", "above the bound, %"]
-    lines = ["| " + " | ".join(headings) + " |", "|---|" + "---:|" * (len(headings) - 1)]
+    columns = dict(_WIND if mark in WIND else _STILL)
+    columns[f"Δ energy to {reference}, %"] = lambda one: _difference(one, reference, "energy")
+    columns["Δ steps, %"] = lambda one: _difference(one, reference, "steps")
+    if mark not in WIND:
+        columns["above the bound, %"] = lambda one: _plain(_estimate(one["above_bound_percent"]))
+    lines = [
+        "| " + " | ".join(["planner", *columns]) + " |",
+        "|---|" + "---:|" * len(columns),
+    ]
     for one in data["scores"]:
-        label = one["label"] if "label" in one else one["player"]  # of version 0.2
-        is_reference = label == reference
-        cells = [
-            f"`{label}`",
-            f"{one['accomplished']}/{one['flights']}",
-            str(one["violations"]),
-            "–" if one["decision_p50_ms"] is None else f"{one['decision_p50_ms']:.3g}",
-            *(
-                "" if is_reference else _estimate(one[f"{name}_difference_percent"])
-                for name in ("energy", "steps")
-            ),
-            _estimate(one["above_bound_percent"])
-            .lstrip("+")
-            .replace("[+", "[")
-            .replace(", +", ", "),
-        ]
+        cells = [f"`{_label(one)}`", *(cell(one) for cell in columns.values())]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join([f"`{data['command']}`", "", *lines])
+
+
+_Columns = dict[str, Callable[[dict[str, Any]], str]]
+
+_STILL: _Columns = {
+    "accomplished": lambda one: f"{one['accomplished']}/{one['flights']}",
+    "violations": lambda one: str(one["violations"]),
+    "decision p50, ms": lambda one: (
+        "–" if one["decision_p50_ms"] is None else f"{one['decision_p50_ms']:.3g}"
+    ),
+}
+
+_WIND: _Columns = {
+    "accomplished": _STILL["accomplished"],
+    "all home": lambda one: f"{one['all_home']}/{one['flights']}",
+    "violations": _STILL["violations"],
+    "breaches": lambda one: str(one["breaches"]),
+    "covered, %": lambda one: _plain(_estimate(one["mean_coverage_percent"])),
+}
+
+
+def _label(one: dict[str, Any]) -> str:
+    return one["label"] if "label" in one else one["player"]  # of version 0.2
+
+
+def _difference(one: dict[str, Any], reference: str, name: str) -> str:
+    return "" if _label(one) == reference else _estimate(one[f"{name}_difference_percent"])
+
+
+def _plain(estimate: str) -> str:
+    """Without signs, which only differences need."""
+    return estimate.replace("+", "")
 
 
 def _estimate(found: dict[str, float | None]) -> str:
@@ -80,7 +106,7 @@ def main(folder: str, mark: str = "leaderboard") -> int:
     """Fill the files; the exit code."""
     sweep = Path(folder)
     try:
-        short = _short(sweep)
+        short = _short(sweep, mark)
         contents = {ROOT / "baselines" / "README.md": short}
         if mark == "leaderboard":
             long = (sweep / "table.md").read_text(encoding="utf-8")
@@ -101,10 +127,10 @@ def main(folder: str, mark: str = "leaderboard") -> int:
     return 0
 
 
-def _short(sweep: Path) -> str:
+def _short(sweep: Path, mark: str) -> str:
     path = sweep / "table.json"
     try:
-        return short_table(json.loads(path.read_text(encoding="utf-8")))
+        return short_table(json.loads(path.read_text(encoding="utf-8")), mark)
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ValueError(f"{path}: was damaged ({error}); compare again") from error
 

@@ -35,7 +35,7 @@ def test_tables_and_picture_go_between_the_marks_as_often_as_one_likes(put_table
     short = (tmp_path / "README.md").read_text()
     assert short.startswith("before\n")
     assert short.endswith("after\n")
-    assert short.count("old") == 1  # between the other marks
+    assert short.count("old") == len(put_table.MARKS) - 1  # between the other marks
     assert short.count("`a command`") == 1
     assert "| `p` | 2/2 | 0 | 1 | +0.0 [+0.0, +0.0] | -10.0 [-10.0, -10.0] |" in short
     assert "| `q` | 0/1 | 0 | – | – | – |" in short
@@ -67,9 +67,24 @@ def test_the_test_set_has_marks_of_its_own(put_table, tmp_path):
     begin, end = put_table.marks_of("test")
     inside = readme.read_text().split(begin)[1].split(end)[0]
     assert "| `p` | 2/2 | 0 | 1 |" in inside
-    assert readme.read_text().count("old") == 1
+    assert readme.read_text().count("old") == len(put_table.MARKS) - 1
     assert other.read_text() == untouched
     assert not (tmp_path / "picture.png").exists()
+
+
+def test_tables_of_flights_in_wind_say_how_much_was_covered_and_who_came_home(put_table, tmp_path):
+    rows = [row(s, "base") for s in "ab"] + [row(s, "p", steps=90) for s in "ab"]
+    sweep = tmp_path / "sweep"
+    sweep.mkdir()
+    write(Comparison.of([*rows, failed_row("a", "q")], 5, "base", "a command", "1"), sweep)
+    assert put_table.main(str(sweep), "strong") == 0
+    begin, end = put_table.marks_of("strong")
+    inside = (tmp_path / "baselines/README.md").read_text().split(begin)[1].split(end)[0]
+    headings = inside.splitlines()[3]
+    assert "| all home | violations | breaches | covered, % |" in headings
+    assert "bound" not in headings
+    assert "| `base` | 2/2 | 2/2 | 0 | 0 | 100.0 [100.0, 100.0] |  |  |" in inside
+    assert "| `q` | 0/1 | 0/1 | 0 | 0 | 0.0 |" in inside
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"reference": "p", "scores": [{}]}'])
