@@ -21,7 +21,7 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
 from uas_coverage_env.operations.drawing import MOST_CORNERS
-from uas_coverage_env.operations.town import GUESSED_OTHER_M, STOREY_M, height_m
+from uas_coverage_env.operations.tags import GUESSED_OTHER_M, STOREY_M, height_m, standing_of
 from uas_coverage_env.scenario import warnings
 
 EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
@@ -159,7 +159,8 @@ def test_a_fleet_is_mixed_and_may_hold_own_vehicles(tmp_path):
     ],
 )
 def test_heights_come_from_tags_levels_or_a_guess(tags, height, known):
-    assert height_m(tags) == (pytest.approx(height), known)
+    what = standing_of({"building": "yes"} | tags)
+    assert height_m(tags, what.guessed_m) == (pytest.approx(height), known)
 
 
 def test_a_tag_that_cannot_be_read_is_said(capsys):

@@ -18,7 +18,7 @@ from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.scenario import Place, warnings
 
 _HEIGHT_M = 40.0
-_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink", "rasterio"}
+_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink", "rasterio", "osmium"}
 
 
 @contextmanager
@@ -46,7 +46,11 @@ def import_area(
     ],
     out: Annotated[Path, typer.Option(help="Scenario file to write.")],
     town: Annotated[
-        Path | None, typer.Option(help="Buildings of OpenStreetMap as .geojson; or `karhula`.")
+        Path | None,
+        typer.Option(
+            help="OpenStreetMap's buildings, trees, power lines and streets: .osm, .osm.pbf or "
+            ".geojson; or `karhula`."
+        ),
     ] = None,
     terrain: Annotated[
         Path | None,
