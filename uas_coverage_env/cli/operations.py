@@ -207,6 +207,14 @@ def export(
             help="Of the origin, for a scenario without [place].",
         ),
     ] = None,
+    wind: Annotated[
+        float | None,
+        typer.Option(
+            help="Wind that the report counts with, from ahead on every leg, m/s; default: the "
+            "worst of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Write into a directory that is not empty.")
     ] = False,
@@ -223,6 +231,7 @@ def export(
         corner_m=corner,
         autopilot=autopilot,
         place=asked_place(place),
+        wind_mps=wind,
     )
     made = make_export(load_flights(directory), options)
     left = {name for name in prepare_folder(out) if Path(name).suffix in ENDINGS} - set(made.files)
@@ -233,6 +242,8 @@ def export(
     table = Table(
         "UAS", "starts, s", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None
     )
+    if any(uas["in_wind"] for uas in made.data["uas"]):
+        table.add_column("in wind")
     for uas in made.data["uas"]:
         table.add_row(
             uas["name"],
@@ -241,7 +252,10 @@ def export(
             f"{uas['duration_s']:.0f}",
             f"{uas['planned_s']:.0f}",
             f"{uas['soc_landed']:.1%}",
-            f"{uas['least_spare']['spare']:.1%}",
+            f"{uas['least_spare']['spare']:.1%}"
+            + (
+                f" ({uas['in_wind']['least_spare']['spare']:.1%} in wind)" if uas["in_wind"] else ""
+            ),
         )
     screen.print(table)
     for name in made.grounded:
