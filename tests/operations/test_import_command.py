@@ -15,14 +15,14 @@ import pytest
 pytest.importorskip("shapely")
 pytest.importorskip("shapefile")
 import shapefile
-from drawings import HOME, SQUARE, collection, feature, imported, refused
+from drawings import HIGH, HOME, SQUARE, collection, feature, imported, refused
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
 from uas_coverage_env.operations.drawing import MOST_CORNERS
 from uas_coverage_env.operations.tags import GUESSED_OTHER_M, STOREY_M, height_m, standing_of
-from uas_coverage_env.scenario import warnings
+from uas_coverage_env.scenario import load_scenario, warnings
 
 EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
 
@@ -64,6 +64,15 @@ def test_the_buildings_of_the_town_become_obstacles_with_credit_and_can_be_flown
     assert 50 < len(buildings) < 100
     assert "OpenStreetMap contributors" in Path("out.toml").read_text("utf-8").splitlines()[0]
     assert warnings(scenario) == []
+
+
+def test_the_shipped_town_is_what_import_makes_of_it():
+    assert main(["import", "karhula", "--town", "karhula", *HIGH, "--out", "karhula.toml"]) == 0
+    assert load_scenario("karhula.toml") == load_scenario("karhula")
+    shipped = (
+        resources.files("uas_coverage_env.scenario").joinpath("karhula.toml").read_text("utf-8")
+    )
+    assert shipped.endswith(Path("karhula.toml").read_text("utf-8"))
 
 
 def test_the_check_of_a_scenario_says_where_it_is(capsys):

@@ -155,7 +155,7 @@ def import_area(
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
     made = make_scenario(read_drawings(areas), name, options)
-    text = f"# Buildings: {made.credit}\n" if made.credit else ""
+    text = f"# Map data: {made.credit}\n" if made.credit else ""
     write_atomically(out, (text + made.scenario.file_text()).encode())
     screen = console()
     for line in (*made.notes, f"scenario in {out}"):
