@@ -170,8 +170,7 @@ def _flown(what: str, missions: Sequence[Scenario], planners: Sequence[str]) -> 
 def _row(what: str, planner: str, flown: Sequence[sorties.Flown]) -> Row:
     """What is not covered is out of reach of the charge: for some planners there is not enough."""
     covered, time_s, spent_wh, packs, harm = sorties.row(flown)
-    packs = "" if packs in ("1", "2") else f", {packs} packs"
-    found = f"{covered} covered, {time_s} s, {spent_wh} Wh{packs}"
+    found = f"{covered} covered, {time_s} s, {spent_wh} Wh, {packs} packs"
     return Row(f"{what}: `{planner}`", found, "without harm", harm == "0")
 
 

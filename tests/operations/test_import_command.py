@@ -345,7 +345,10 @@ MISTAKES = {
     "no height": ((*HOME, "--height", "nan"), "--height nan"),
     "no town": ((*HOME, "--town", "town.geojson"), "no such file"),
     "the town of another place": ((*HOME, "--town", "karhula"), "km from the area"),
-    "a take-off place in a no-fly zone": (("--home", "50.001,10.001"), "no_fly_1"),
+    "a take-off place in a no-fly zone": (
+        ("--home", "50.001,10.001"),
+        "inside an obstacle (no-fly zone)",
+    ),
 }
 
 

@@ -124,6 +124,22 @@ def test_a_building_of_which_the_file_lacks_corners_is_told(capsys):
     assert "2 buildings or woods in the area lack corners in the file" in capsys.readouterr().out
 
 
+def test_a_building_without_an_area_does_not_spoil_the_others(capsys):
+    dot = '<way id="9"><nd ref="14"/><nd ref="14"/><nd ref="14"/><nd ref="14"/>{}</way><relation'
+    dot = dot.format('<tag k="building" v="yes"/>')
+    assert tops_m(town(osm().replace("<relation", dot))) == tops_m(town(osm()))
+    assert "1 buildings or woods in the area lack corners" in capsys.readouterr().out
+
+
+def test_who_takes_off_in_a_wood_is_told_where(capsys):
+    wood = '<way id="9">{}<tag k="natural" v="wood"/></way><relation'
+    corners = (f'<nd ref="{n}"/>' for n in (1, 11, 12, 1))
+    Path("town.osm").write_text(osm().replace("<relation", wood.format("".join(corners))))
+    home = ("--home", "50.00035,10.0005")
+    line = refused(capsys, collection(feature(SQUARE)), *home, "--town", "town.osm")
+    assert "uas_1 would take off at 50.000350,10.000500, inside an obstacle (forest)" in line
+
+
 BROKEN = {
     "nothing": (b"", "is no OpenStreetMap file"),
     "something else": (b"<html><body>429 Too Many Requests</body></html>", "top-level element"),
@@ -133,6 +149,8 @@ BROKEN = {
         b'<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa">]>' + osm().encode(),
         "XML entities are not supported",
     ),
+    "a latitude of words": (osm().replace('"50.001"', '"north"').encode(), "no OpenStreetMap"),
+    "a latitude beyond all": (osm().replace('"50.001"', '"1e9"').encode(), "no OpenStreetMap"),
     "no building": (b'<osm version="0.6"></osm>', "holds no building"),
 }
 

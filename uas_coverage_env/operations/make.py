@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 
+from uas_coverage_env.draw.legend import in_words
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.files.suggestions import check_choice
@@ -24,6 +25,7 @@ from uas_coverage_env.operations.site import (
     FENCE_MARGIN_M,
     Area,
     Site,
+    Wall,
     make_site,
     town_walls,
 )
@@ -138,6 +140,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     standing = [_raised(thing, relief) for thing in town.standing]
     higher = [thing for thing in standing if thing.height_m >= _LOWEST_ROOF_M]
     walls = [*site.no_fly, *relief.walls, *town_walls(higher, site.fence)]
+    _check_starts(uas, walls, site)
     seen = [(area, _look(looks, area, options)) for area in site.areas]
     asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
     speed_mps, again_after_s = options.max_speed_mps, options.again_after_s
@@ -250,6 +253,20 @@ def _fleet_tables(
         name = named_camera(member.camera)[0] if member.camera else None
         table["sensors"] = [look_at(looks, name, "--fleet").sensor()]
     return tables
+
+
+def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: Site) -> None:
+    for table in uas:
+        north_m, east_m, _ = table["start_m"]
+        place = Point(east_m, north_m)
+        for wall in walls:
+            if wall.footprint.distance(place) < table["radius_m"]:
+                latitude, longitude, _ = site.frame.to_geodetic(table["start_m"])
+                raise InputError(
+                    f"{table['name']} would take off at {latitude:.6f},{longitude:.6f}, inside an "
+                    f"obstacle ({in_words(wall.kind)}); draw its take-off place elsewhere, or give "
+                    f"another --home"
+                )
 
 
 def _look_notes(

@@ -39,7 +39,7 @@ def read_osm(path: Path) -> list[dict[str, Any]]:
         if not _in_order(path, FileBuffer(data, kind)):
             data, kind = _sorted(data, kind), "pbf"
         return list(_features(FileBuffer(data, kind)))
-    except RuntimeError as error:  # all that libosmium raises
+    except (RuntimeError, osmium.InvalidLocationError) as error:  # all that libosmium raises
         reason = " ".join(str(error).split())[:80]
         raise InputError(
             f"{path}: is no OpenStreetMap file ({reason}); export the buildings again"
@@ -78,7 +78,8 @@ def _features(data: Any) -> Iterator[dict[str, Any]]:
     outlines: dict[tuple[bool, int], dict[str, Any]] = {}  # by whether it is a way, and number
     for thing in osmium.FileProcessor(data).with_areas(KeyFilter(*_AREAS)):
         tags = thing.tags
-        if isinstance(thing, Area) and _has(tags, _AREAS):
+        is_whole = isinstance(thing, Area) and thing.num_rings()[0] > 0
+        if isinstance(thing, Area) and is_whole and _has(tags, _AREAS):
             outlines.pop((thing.from_way(), thing.orig_id()), None)
             yield _feature(tags, json.loads(shapes.create_multipolygon(thing)))
         elif isinstance(thing, Way):

@@ -170,7 +170,11 @@ def _homes_m(
         thing for thing in things if isinstance(thing, TakeOff)
     ]
     if not places:
-        raise InputError("no take-off place: draw a point, or give --home LAT,LON")
+        middle = f"{frame.place.latitude_deg:.5f},{frame.place.longitude_deg:.5f}"
+        raise InputError(
+            f"no take-off place: draw a point, or give --home LAT,LON near the areas, whose middle "
+            f"is {middle}"
+        )
     return tuple(local_place(frame, place) for place in places)
 
 
