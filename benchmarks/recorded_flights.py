@@ -21,7 +21,7 @@ _CHANGE_SPEED = "178"
 def modelled(name: str) -> tuple[Followed, NDArray[np.float64]]:
     """How the model flies the file of a recorded flight, and its (N, 3) corners [m]."""
     corners, speeds, now = [], [], 10.0
-    for command, speed, *place in _rows(f"{name}_items.csv"):
+    for command, speed, *place in rows_of(f"{name}_items.csv"):
         if command == _CHANGE_SPEED:
             now = float(speed)
         else:
@@ -33,10 +33,11 @@ def modelled(name: str) -> tuple[Followed, NDArray[np.float64]]:
 
 def recorded(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(N,) seconds since the command to take off and (N, 3) where the vehicle was [m]."""
-    rows = np.array(_rows(f"{name}_flown.csv"), float)
+    rows = np.array(rows_of(f"{name}_flown.csv"), float)
     return rows[:, 0], ORIGIN.to_ned(*rows[:, 1:].T)
 
 
-def _rows(name: str) -> list[list[str]]:
+def rows_of(name: str) -> list[list[str]]:
+    """The rows of one of the recorded tables, without its head."""
     with (FOLDER / name).open(newline="") as file:
         return list(csv.reader(file))[1:]
