@@ -1,7 +1,7 @@
 """The figures of docs/from_area_to_flight.md, area_methods.md and sorties.md, in one table.
 
-    python benchmarks/area_to_flight.py            # about half an hour of processor time
-    python benchmarks/area_to_flight.py --quick    # a few minutes, fewer of everything
+    python benchmarks/area_to_flight.py
+    python benchmarks/area_to_flight.py --quick    # a minute of processor time, fewer of everything
     python benchmarks/area_to_flight.py --parts frame,recorded
 
 | part | what is measured |
