@@ -81,16 +81,17 @@ def alone(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown
     """One flight in which each swaps while the others fly on."""
     packs = Sorties(packs=20, swap_s=scenario.sorties.swap_s if scenario.sorties else 0.0,
                     together=False)  # fmt: skip
-    return _in_one(scenario.model_copy(update={"sorties": packs}), planner, options)
+    return in_one(scenario.model_copy(update={"sorties": packs}), planner, options)
 
 
 def relaunch(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
     """One flight in which UAS take off again on the charge that is left."""
     changes = {"sorties": None, "relaunch": True}
-    return _in_one(scenario.model_copy(update=changes), planner, options)
+    return in_one(scenario.model_copy(update=changes), planner, options)
 
 
-def _in_one(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
+def in_one(scenario: Scenario, planner: str, options: Mapping[str, str]) -> Flown:
+    """One flight of a mission as it is."""
     flight = rollout(scenario, load_planner(planner, options))
     covered = int(flight.covered[-1])
     harm = len(flight.violations) + flight.breaches

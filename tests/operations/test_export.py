@@ -27,6 +27,7 @@ from uas_coverage_env.operations.exported import return_height_m
 from uas_coverage_env.operations.formats import ENDINGS, FORMATS
 from uas_coverage_env.operations.tracks import make_tracks
 from uas_coverage_env.scenario import Place, load_scenario
+from uas_coverage_env.scenario.air import Wind
 
 TOLERANCES = Tolerances(2.0, 2.0)
 WITH_PLACE = (16, 21, 22)
@@ -248,6 +249,39 @@ def test_flying_home_at_the_return_height_is_clear_from_everywhere(flight):
             assert all(hull.signed_distance(way).min() > 0.0 for hull in scenario.hulls)
 
 
+def north_and_back(**changes):
+    scenario = meadow(waypoints=[waypoint((190.0, 100.0, -20.0))]).model_copy(update=changes)
+    return rollout(scenario, load_planner("nearest-waypoint"), 0)
+
+
+ANYWHERE = Place(latitude_deg=1.0, longitude_deg=2.0)
+
+
+def test_against_a_wind_less_is_left_and_no_less_than_a_flight_against_it_takes():
+    flight = north_and_back()
+    still, windy = (
+        exported(flight, ANYWHERE, "csv", wind_mps=w).data["uas"][0] for w in (None, 6.0)
+    )
+    assert still["in_wind"] is None
+    assert windy["in_wind"]["headwind_mps"] == 6.0
+    assert windy["in_wind"]["soc_landed"] < windy["soc_landed"] == still["soc_landed"]
+    for leg, before in zip(windy["legs"], still["legs"], strict=True):
+        assert leg["spare_in_wind"] < leg["spare"] == before["spare"]
+    flown = north_and_back(wind=Wind(mean_mps=6.0, from_deg=0.0))
+    assert windy["in_wind"]["soc_landed"] < flown.soc[-1, 0]
+    # and what the scenario says counts, unless an option does
+    there = dataclasses.replace(flight, scenario=flown.scenario)
+    assert exported(there, ANYWHERE, "csv").data["uas"] == [windy]
+
+
+def test_who_makes_no_headway_against_the_wind_has_no_return():
+    made = exported(north_and_back(), ANYWHERE, "csv", wind_mps=30.0)
+    assert made.data["uas"][0]["point_of_no_return"] is None
+    assert made.data["uas"][0]["in_wind"]["point_of_no_return"]["leg"] == 1
+    assert any("in a headwind of 30.0 m/s" in note for note in made.notes)
+    assert "point of no return at" in made.files["report.html"]
+
+
 def test_the_page_shows_every_uas_and_needs_no_network(flight, place):
     page = exported(flight, place, "csv").files["report.html"]
     assert page.count("<polyline") == len(tracks_of(flight))
@@ -296,6 +330,7 @@ MISTAKES = {
     "no place": (("--format", "qgc"), "has no [place] on the Earth; give --place"),
     "no tolerance": (("--format", "qgc", "--tolerance", "0", *HERE), "--tolerance 0"),
     "no corner": (("--format", "qgc", "--corner", "nan", *HERE), "--corner nan"),
+    "a storm": (("--format", "qgc", *HERE, "--wind", "61"), "--wind 61: should be between 0 and"),
     "no slack": (("--format", "qgc", *HERE, "--min-slack", "-1"), "--min-slack -1"),
 }
 

@@ -15,14 +15,14 @@ import pytest
 pytest.importorskip("shapely")
 pytest.importorskip("shapefile")
 import shapefile
-from drawings import HOME, SQUARE, collection, feature, imported, refused
+from drawings import HIGH, HOME, SQUARE, collection, feature, imported, refused
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
 from uas_coverage_env.operations.drawing import MOST_CORNERS
-from uas_coverage_env.operations.town import GUESSED_OTHER_M, STOREY_M, height_m
-from uas_coverage_env.scenario import warnings
+from uas_coverage_env.operations.tags import GUESSED_OTHER_M, STOREY_M, height_m, standing_of
+from uas_coverage_env.scenario import load_scenario, warnings
 
 EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
 
@@ -64,6 +64,15 @@ def test_the_buildings_of_the_town_become_obstacles_with_credit_and_can_be_flown
     assert 50 < len(buildings) < 100
     assert "OpenStreetMap contributors" in Path("out.toml").read_text("utf-8").splitlines()[0]
     assert warnings(scenario) == []
+
+
+def test_the_shipped_town_is_what_import_makes_of_it():
+    assert main(["import", "karhula", "--town", "karhula", *HIGH, "--out", "karhula.toml"]) == 0
+    assert load_scenario("karhula.toml") == load_scenario("karhula")
+    shipped = (
+        resources.files("uas_coverage_env.scenario").joinpath("karhula.toml").read_text("utf-8")
+    )
+    assert shipped.endswith(Path("karhula.toml").read_text("utf-8"))
 
 
 def test_the_check_of_a_scenario_says_where_it_is(capsys):
@@ -159,7 +168,8 @@ def test_a_fleet_is_mixed_and_may_hold_own_vehicles(tmp_path):
     ],
 )
 def test_heights_come_from_tags_levels_or_a_guess(tags, height, known):
-    assert height_m(tags) == (pytest.approx(height), known)
+    what = standing_of({"building": "yes"} | tags)
+    assert height_m(tags, what.guessed_m) == (pytest.approx(height), known)
 
 
 def test_a_tag_that_cannot_be_read_is_said(capsys):
@@ -335,7 +345,10 @@ MISTAKES = {
     "no height": ((*HOME, "--height", "nan"), "--height nan"),
     "no town": ((*HOME, "--town", "town.geojson"), "no such file"),
     "the town of another place": ((*HOME, "--town", "karhula"), "km from the area"),
-    "a take-off place in a no-fly zone": (("--home", "50.001,10.001"), "no_fly_1"),
+    "a take-off place in a no-fly zone": (
+        ("--home", "50.001,10.001"),
+        "inside an obstacle (no-fly zone)",
+    ),
 }
 
 

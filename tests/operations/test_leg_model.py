@@ -1,7 +1,7 @@
 """The model of how an autopilot flies a file is held against flights of a real one."""
 
-import csv
 import math
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,38 +12,15 @@ from hypothesis import strategies as st
 
 pytest.importorskip("pyproj")
 
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from recorded_flights import NAMES as FLIGHTS
+from recorded_flights import modelled, recorded
+
 from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.operations.corners import cut_path, distances_m
-from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.scenario import Place
 
-RECORDED = Path(__file__).parent / "recorded"
-FLIGHTS = sorted(path.name.removesuffix("_items.csv") for path in RECORDED.glob("*_items.csv"))
-CHANGE_SPEED = "178"
-ORIGIN = LocalFrame(Place(latitude_deg=60.525, longitude_deg=26.947))
 EXAMPLES = settings(max_examples=40, deadline=None, derandomize=True)
-
-
-def rows_of(name):
-    with (RECORDED / name).open(newline="") as file:
-        return list(csv.reader(file))[1:]
-
-
-def modelled(name):
-    corners, speeds, now = [], [], 10.0
-    for command, speed, *place in rows_of(f"{name}_items.csv"):
-        if command == CHANGE_SPEED:
-            now = float(speed)
-        else:
-            corners.append(ORIGIN.to_ned(*map(float, place)))
-            speeds.append(now)
-    holds = [0.0] * (len(corners) - 1)
-    return follow(corners, speeds[1:], holds, Autopilot(up_mps=3.0)), np.array(corners)
-
-
-def recorded(name):
-    rows = np.array(rows_of(f"{name}_flown.csv"), float)
-    return rows[:, 0], ORIGIN.to_ned(*rows[:, 1:].T)
 
 
 @pytest.mark.parametrize("name", FLIGHTS)

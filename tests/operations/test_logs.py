@@ -2,15 +2,20 @@
 
 import dataclasses
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("pyproj")
 pytest.importorskip("pymavlink")
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
 from autopilot_logs import bin_log, tlog
+from recorded_flights import FOLDER, ORIGIN, recorded, rows_of
 from test_export import random_flight
-from test_leg_model import ORIGIN, RECORDED, recorded, rows_of
 
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
@@ -255,7 +260,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
     plan.save(tmp_path / "plan")
     logs = []
     for k in (1, 2):
-        text = (RECORDED / f"tolerance_2m_uas_{k}_flown.csv").read_text()
+        text = (FOLDER / f"tolerance_2m_uas_{k}_flown.csv").read_text()
         path = tmp_path / f"uas_{k}_flown.csv"
         path.write_text(text)
         logs.append(str(path))

@@ -142,8 +142,8 @@ def test_an_export_puts_in_what_its_report_says(flight):
         said = [note for note in made.notes if "after the start of its mission" in note]
         assert any(note.startswith(uas["name"]) for note in said) == delayed
     assert waited == 1
-    assert "To keep apart:" in made.files["report.html"]
-    assert "To keep apart:" not in close.files["report.html"]
+    assert "To keep apart," in made.files["report.html"]
+    assert "To keep apart," not in close.files["report.html"]
 
 
 def test_files_that_need_no_waits_hold_none(flight):

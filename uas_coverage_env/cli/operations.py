@@ -18,7 +18,7 @@ from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.scenario import Place, warnings
 
 _HEIGHT_M = 40.0
-_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink", "rasterio"}
+_LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink", "rasterio", "osmium"}
 
 
 @contextmanager
@@ -46,7 +46,11 @@ def import_area(
     ],
     out: Annotated[Path, typer.Option(help="Scenario file to write.")],
     town: Annotated[
-        Path | None, typer.Option(help="Buildings of OpenStreetMap as .geojson; or `karhula`.")
+        Path | None,
+        typer.Option(
+            help="OpenStreetMap's buildings, trees, power lines and streets: .osm, .osm.pbf or "
+            ".geojson; or `karhula`."
+        ),
     ] = None,
     terrain: Annotated[
         Path | None,
@@ -151,7 +155,7 @@ def import_area(
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"
     made = make_scenario(read_drawings(areas), name, options)
-    text = f"# Buildings: {made.credit}\n" if made.credit else ""
+    text = f"# Map data: {made.credit}\n" if made.credit else ""
     write_atomically(out, (text + made.scenario.file_text()).encode())
     screen = console()
     for line in (*made.notes, f"scenario in {out}"):
@@ -203,6 +207,14 @@ def export(
             help="Of the origin, for a scenario without [place].",
         ),
     ] = None,
+    wind: Annotated[
+        float | None,
+        typer.Option(
+            help="Wind that the report counts with, from ahead on every leg, m/s; default: the "
+            "worst of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Write into a directory that is not empty.")
     ] = False,
@@ -219,6 +231,7 @@ def export(
         corner_m=corner,
         autopilot=autopilot,
         place=asked_place(place),
+        wind_mps=wind,
     )
     made = make_export(load_flights(directory), options)
     left = {name for name in prepare_folder(out) if Path(name).suffix in ENDINGS} - set(made.files)
@@ -229,6 +242,8 @@ def export(
     table = Table(
         "UAS", "starts, s", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None
     )
+    if any(uas["in_wind"] for uas in made.data["uas"]):
+        table.add_column("in wind")
     for uas in made.data["uas"]:
         table.add_row(
             uas["name"],
@@ -237,7 +252,10 @@ def export(
             f"{uas['duration_s']:.0f}",
             f"{uas['planned_s']:.0f}",
             f"{uas['soc_landed']:.1%}",
-            f"{uas['least_spare']['spare']:.1%}",
+            f"{uas['least_spare']['spare']:.1%}"
+            + (
+                f" ({uas['in_wind']['least_spare']['spare']:.1%} in wind)" if uas["in_wind"] else ""
+            ),
         )
     screen.print(table)
     for name in made.grounded:

@@ -39,7 +39,11 @@ OBSTACLES: dict[str, Colour] = {
 }
 OTHER_OBSTACLE: Colour = (168, 168, 164)
 
-DECORATIONS: dict[str, Colour] = {"water": (166, 206, 232), "pad": (208, 208, 204)}
+DECORATIONS: dict[str, Colour] = {
+    "water": (166, 206, 232),
+    "pad": (208, 208, 204),
+    "street": (208, 208, 204),
+}
 OTHER_DECORATION: Colour = (222, 216, 200)
 
 SEEN: tuple[Colour, ...] = (SKY, ORANGE, PURPLE, YELLOW)

@@ -56,10 +56,12 @@ class Settled(NamedTuple):
     Attributes:
         tolerances: How far an autopilot may be from the flight.
         min_slack_s: How late any UAS has to be able to be [s].
+        wind_mps: The worst wind that charges are counted in; None: that of the scenario [m/s].
     """
 
     tolerances: Tolerances
     min_slack_s: float
+    wind_mps: float | None = None
 
 
 class Begins(NamedTuple):
@@ -93,7 +95,7 @@ def kept_apart(
     scenario, tolerances = flight.scenario, settled.tolerances
 
     def laid(tracks: Sequence[Track], waits: Sequence[Waits]) -> Part:
-        exports = _exports(flight, tracks, frame, tolerances, waits, begins.at_s)
+        exports = _exports(flight, tracks, frame, settled, waits, begins.at_s)
         return Part(flight, exports, pairs_of(scenario, timed(exports)), begins.flown_s)
 
     part = laid(tracks, [Waits()] * len(tracks))
@@ -166,22 +168,25 @@ def _exports(
     flight: Flight,
     tracks: Sequence[Track],
     frame: LocalFrame,
-    tolerances: Tolerances,
+    settled: Settled,
     waits: Sequence[Waits],
     begins_s: float,
 ) -> list[Exported]:
+    tolerances = settled.tolerances
     flown = _flown(flight, tracks, tolerances, waits)
     starts = _starts(tracks, flown, waits, begins_s)
     last: dict[int, Exported] = {}
     result = []
     for track, (at_s, inside), wait in zip(tracks, starts, waits, strict=True):
         before = last.get(track.uas)
-        soc = flight.scenario.uas[track.uas].soc_0
+        soc = soc_in_wind = flight.scenario.uas[track.uas].soc_0
         if before is not None and not track.sortie.fresh:
             on_ground = flight.soc[before.track.sortie.landed : track.sortie.first + 1, track.uas]
-            soc = before.soc_landed - float(on_ground[0] - on_ground[-1])
-        start = Start(at_s, float(wait.start_s - inside.start_s), soc)
-        one = exported(flight, track, frame, tolerances, inside, start)
+            used = float(on_ground[0] - on_ground[-1])
+            soc = before.still.soc_landed - used
+            soc_in_wind = (before.in_wind or before.still).soc_landed - used
+        start = Start(at_s, float(wait.start_s - inside.start_s), soc, soc_in_wind)
+        one = exported(flight, track, frame, tolerances, inside, start, settled.wind_mps)
         last[track.uas] = one
         result.append(one)
     return result

@@ -47,6 +47,7 @@ class ExportOptions:
         corner_m: How far from a corner an autopilot may pass; None: likewise, else 2 [m].
         autopilot: Whose plans `qgc` writes, key of `FIRMWARE`.
         place: Where on the Earth it is, for a scenario that does not say.
+        wind_mps: The worst wind that the report counts charges in; None: that of the scenario.
     """
 
     kind: str
@@ -55,6 +56,7 @@ class ExportOptions:
     corner_m: float | None = None
     autopilot: str = "ardupilot"
     place: Place | None = None
+    wind_mps: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +110,11 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
     data = report(parts, frame, settled.tolerances)
     files = _files(parts, options, settled.tolerances)
     files["report.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
-    files["report.html"] = report_page(parts, data)
     flying = {uas["uas"] for uas in data["uas"]}
     grounded = tuple(name for name in flights[0].names if name not in flying)
-    notes = dict.fromkeys(note for part in parts for note in _notes(part))
-    return Export(files, data, grounded, tuple(notes))
+    notes = tuple(dict.fromkeys(note for part in parts for note in _notes(part)))
+    files["report.html"] = report_page(parts, data, notes)
+    return Export(files, data, grounded, notes)
 
 
 def _as_events_left_it(flight: Flight) -> tuple[Flight, NDArray[np.int64]]:
@@ -178,7 +180,7 @@ def _settled(flight: Flight, options: ExportOptions) -> Settled:
     path_m, corner_m, slack_s = (
         value if one is None else one for one, value in zip(given, usual, strict=True)
     )
-    return Settled(Tolerances(path_m, corner_m), slack_s)
+    return Settled(Tolerances(path_m, corner_m), slack_s, options.wind_mps)
 
 
 def _check(options: ExportOptions, settled: Settled) -> None:
@@ -195,6 +197,8 @@ def _check(options: ExportOptions, settled: Settled) -> None:
             raise InputError(f"{name} {value:g}: should be between 0.1 and {MOST_TOLERANCE_M:g}")
     if not 0.0 <= settled.min_slack_s <= 3_600.0:
         raise InputError(f"--min-slack {settled.min_slack_s:g}: should be between 0 and 3600")
+    if settled.wind_mps is not None and not 0.0 <= settled.wind_mps <= 60.0:
+        raise InputError(f"--wind {settled.wind_mps:g}: should be between 0 and 60")
 
 
 def _as_asked(flight: Flight, track: Track, tolerances: Tolerances) -> Track:
@@ -267,7 +271,10 @@ def _notes(part: Part) -> list[str]:
     if scenario.moving_obstacles:
         notes.append("files of legs carry no time: moving obstacles are not avoided")
     if scenario.wind is not None or scenario.uncertainty is not None or scenario.disturbances:
-        notes.append("the report holds for still air, and for the vehicles as their files say")
+        notes.append(
+            "times and paths of the report hold for still air, and for the vehicles as "
+            "their files say"
+        )
     if scenario.execution is not None:
         notes += [line for one in exports for line in _unkept(flight, one)]
     for one in exports:
@@ -278,13 +285,7 @@ def _notes(part: Part) -> list[str]:
                 f"was closed; there is its rally point, which only --format qgc holds"
             )
         notes += [f"{one.track.name} {line}" for line in waiting(one)]
-        lost = one.point_of_no_return
-        if lost is not None:
-            notes.append(
-                f"{one.track.name}: as an autopilot flies it, the charge does not suffice to come "
-                f"home for sure after leg {lost + 1}, {one.charges[lost].time_s:.0f} s after "
-                f"take-off"
-            )
+        notes += _no_return(one)
         at_risk = (
             one.track.passed_m > [scenario.waypoints[w].radius_m for w in one.track.waypoints]
         ).sum()
@@ -296,3 +297,17 @@ def _notes(part: Part) -> list[str]:
                 f"radius, speed and heights that they ask for"
             )
     return notes
+
+
+def _no_return(one: Exported) -> list[str]:
+    """From where a UAS does not come home for sure."""
+    for charged in filter(None, (one.still, one.in_wind)):
+        lost, wind_mps = charged.point_of_no_return, charged.headwind_mps
+        if lost is not None:
+            air = f"in a headwind of {wind_mps:.1f} m/s, " if wind_mps else ""
+            return [
+                f"{one.track.name}: {air}as an autopilot flies it, the charge does not suffice to "
+                f"come home for sure after leg {lost + 1}, {charged.legs[lost].time_s:.0f} s after "
+                f"take-off"
+            ]
+    return []

@@ -3,53 +3,28 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.mission.separation import Waits
 from uas_coverage_env.operations.asked import most_mps, not_as_asked, triggers_m
+from uas_coverage_env.operations.charge import Charged, charged, worst_wind_mps
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.room import Surroundings
 from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, VehicleParams
-from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.vehicle import VehicleParams
 
 _SLOWEST_MPS = 0.5
 _SAME_SPEED_MPS, _SAME_SHARE = 0.5, 0.1
 _LEAST_RETURN_M = 15.0
 _ABOVE_ROOFS_M = 1.0
 _EVERY = 5
-_IDLE_SHARE = 0.1
-"""Of what level flight takes, what motors take that idle while a UAS waits to take off."""
-
-
-@dataclass(frozen=True)
-class LegCharge:
-    """What the battery holds at the end of a leg, as an autopilot flies it.
-
-    Attributes:
-        time_s: Since the command to start [s].
-        planned_s: The same in the sortie that was planned [s].
-        soc: State of charge [-].
-        planned_soc: The same in the planned flight [-].
-        home: What flying home from there and landing takes, with margin (`mission.Range`) [-].
-        spare: What is left beyond that and the reserve that `dod_max` leaves [-].
-        spare_s: How long it can fly on before it has to turn home [s].
-    """
-
-    time_s: float
-    planned_s: float
-    soc: float
-    planned_soc: float
-    home: float
-    spare: float
-    spare_s: float
 
 
 class Start(NamedTuple):
@@ -59,11 +34,13 @@ class Start(NamedTuple):
         at_s: When it is started, on the clock of the mission [s].
         delay_s: How much later that is than the UAS could be started [s].
         soc: State of charge [-].
+        soc_in_wind: The same, where all before was flown in the worst wind [-].
     """
 
     at_s: float
     delay_s: float
     soc: float
+    soc_in_wind: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +56,8 @@ class Exported:
         holds_s: (legs,) how long it stops at the end of each; 0: it flies on [s].
         waits: Where it waits for others.
         followed: How an autopilot flies them.
-        charges: One entry per leg.
-        soc_landed: State of charge after landing [-].
+        still: What that takes of the battery, in still air.
+        in_wind: The same in the worst wind; None: there is none.
         return_m: Height at which flying straight home is clear from everywhere on the path [m];
             None where there is none below the fence's top.
         vehicle: Its vehicle.
@@ -98,8 +75,8 @@ class Exported:
     holds_s: tuple[float, ...]
     waits: Waits
     followed: Followed
-    charges: tuple[LegCharge, ...]
-    soc_landed: float
+    still: Charged
+    in_wind: Charged | None
     return_m: float | None
     vehicle: VehicleParams
     frame: LocalFrame
@@ -111,11 +88,6 @@ class Exported:
     def lands_s(self) -> float:
         """When it has landed, on the clock of the mission [s]."""
         return self.begins_s + self.followed.duration_s
-
-    @property
-    def point_of_no_return(self) -> int | None:
-        """The first leg after which the charge does not suffice to come home for sure."""
-        return next((n for n, c in enumerate(self.charges) if c.spare < 0.0), None)
 
     def geodetic(self, places_m: Any) -> NDArray[np.float64]:
         """(..., 3) latitude, longitude [degrees], altitude above the ground of home [m]."""
@@ -147,6 +119,7 @@ def exported(
     tolerances: Tolerances,
     waits: Waits = Waits(),  # noqa: B008 (immutable)
     start: Start | None = None,
+    wind_mps: float | None = None,
 ) -> Exported:
     """What there is to say about a track.
 
@@ -157,22 +130,25 @@ def exported(
         tolerances: Those of the export.
         waits: Where it waits for others.
         start: When it is started, and how much is in its battery; None: first of all, as planned.
+        wind_mps: The worst wind; None: that of the scenario [m/s].
     """
     scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
-    begins = start or Start(0.0, 0.0, scenario.uas[track.uas].soc_0)
-    flown = followed(track, scenario, tolerances, waits)
-    charges, soc_landed = _charges(flight, track, flown, waits, begins.soc)
+    soc_0 = scenario.uas[track.uas].soc_0
+    begins = start or Start(0.0, 0.0, soc_0, soc_0)
+    flown, speeds_mps = followed(track, scenario, tolerances, waits), file_speeds(track, scenario)
+    wind_mps = worst_wind_mps(scenario, track) if wind_mps is None else wind_mps
+    take = partial(charged, flight, track, flown, speeds_mps, waits.start_s)
     return Exported(
         track=track,
         begins_s=begins.at_s,
         delay_s=begins.delay_s,
         soc_0=begins.soc,
-        speeds_mps=file_speeds(track, scenario),
+        speeds_mps=speeds_mps,
         holds_s=file_holds(track, waits),
         waits=waits,
         followed=flown,
-        charges=charges,
-        soc_landed=soc_landed,
+        still=take(begins.soc),
+        in_wind=take(begins.soc_in_wind, wind_mps) if wind_mps else None,
         return_m=return_height_m(scenario, track),
         vehicle=vehicle,
         frame=frame,
@@ -235,40 +211,6 @@ def _returns(
     above = np.array([*landing_m[:2], up[2]])
     ways = ((place, up), (up, above), (above, landing_m - (0.0, 0.0, LIFT_M)))
     return all(around.room(a, b, 1.0).contact_m > 0.0 for a, b in ways)
-
-
-def _charges(
-    flight: Flight, track: Track, followed: Followed, waits: Waits, soc_0: float
-) -> tuple[tuple[LegCharge, ...], float]:
-    """Charge after each leg, of level flight at full speed all the time: a careful estimate."""
-    scenario, i = flight.scenario, track.uas
-    uas, vehicle = scenario.uas[i], scenario.vehicles[i]
-    ways_home = Range(MissionBrief.of(scenario))
-    ends = followed.corner_s
-    began_s = ends[0] - (1.0 - _IDLE_SHARE) * waits.start_s
-    dod, charges = 1.0 - soc_0 + dod_per_s(vehicle, 1.0 - soc_0) * began_s, []
-    for leg, start_s, end_s in zip(track.legs, ends, ends[1:], strict=False):
-        # a hold at the end of a leg is counted with the next one
-        dod += dod_per_s(vehicle, min(dod, 1.0)) * (end_s - start_s)
-        x = flight.x[leg.sample, i].copy()
-        x[:] = 0.0
-        x[:3], x[DOD] = leg.end_m, min(dod, 1.0)
-        home = ways_home.home(i, x)
-        needed = home.dod + home.dod_margin
-        spare = uas.dod_max - dod - needed
-        charges.append(
-            LegCharge(
-                time_s=float(end_s),
-                planned_s=(leg.sample - track.sortie.first) * scenario.dt_s,
-                soc=1.0 - dod,
-                planned_soc=float(flight.soc[leg.sample, i]),
-                home=needed,
-                spare=spare,
-                spare_s=spare / dod_per_s(vehicle, min(dod, 1.0)),
-            )
-        )
-    landing_s = followed.duration_s - float(ends[-1])
-    return tuple(charges), 1.0 - dod - dod_per_s(vehicle, min(dod, 1.0)) * landing_s
 
 
 def waiting(one: Exported) -> list[str]:

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 
+from uas_coverage_env.draw.legend import in_words
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.files.suggestions import check_choice
@@ -18,15 +19,18 @@ from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon
 from uas_coverage_env.operations.fleet import SPARE_M, Member, fleet_tables, parse_fleet
 from uas_coverage_env.operations.looks import Look, look_as_wished, look_at, look_of
+from uas_coverage_env.operations.prisms import Standing
 from uas_coverage_env.operations.relief import Relief, relief_of
 from uas_coverage_env.operations.site import (
     FENCE_MARGIN_M,
     Area,
     Site,
-    building_walls,
+    Wall,
     make_site,
+    town_walls,
 )
-from uas_coverage_env.operations.town import Building, Town, read_town
+from uas_coverage_env.operations.tags import BUILDING, FOREST, MAST, POWER_LINE
+from uas_coverage_env.operations.town import Town, read_town
 from uas_coverage_env.operations.waypoints import Asked, make_waypoints
 from uas_coverage_env.operations.wishes import NOTHING
 from uas_coverage_env.scenario import Scenario
@@ -43,6 +47,12 @@ _ABOVE_WAYPOINTS_M = 30.0
 _LOWEST_ROOF_M = 0.5
 """Above the take-off places: in a valley, roofs may be below."""
 
+_STANDING = {
+    BUILDING: "buildings",
+    FOREST: "woods and trees",
+    POWER_LINE: "power lines",
+    MAST: "masts and towers",
+}
 _MOST_STEPS = 100_000
 _OUTLINE_DETAIL_M = 0.5
 
@@ -63,7 +73,7 @@ class ImportOptions:
             camera, too; None: at any [m/s].
         ceiling_m: Top of the fence above the ground; None: 30 m above the waypoints [m].
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
-        town: GeoJSON of buildings.
+        town: What stands there, from OpenStreetMap (.osm, .osm.pbf, .geojson).
         terrain: Grid of heights; None: the ground is flat.
         min_height_m: Least height of UAS above ground and roofs, but for take-off and landing [m].
         flown_by: What flies it in the end, `autopilot`; None: the world alone.
@@ -127,9 +137,10 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         ceiling_m = _ceiling_m(highest_m + rise_m, options)
         site = make_site(things, options.homes, ceiling_m, relief.start_m)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
-    buildings = [_raised(building, relief) for building in town.buildings]
-    higher = [building for building in buildings if building.height_m >= _LOWEST_ROOF_M]
-    walls = [*site.no_fly, *relief.walls, *building_walls(higher, site.fence)]
+    standing = [_raised(thing, relief) for thing in town.standing]
+    higher = [thing for thing in standing if thing.height_m >= _LOWEST_ROOF_M]
+    walls = [*site.no_fly, *relief.walls, *town_walls(higher, site.fence)]
+    _check_starts(uas, walls, site)
     seen = [(area, _look(looks, area, options)) for area in site.areas]
     asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
     speed_mps, again_after_s = options.max_speed_mps, options.again_after_s
@@ -158,7 +169,10 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         ],
         "uas": uas,
         "waypoints": waypoints.all(),
-        "decorations": _decorations(seen, several=len(looks) > 1),
+        "decorations": [
+            *_decorations(seen, several=len(looks) > 1),
+            *_streets(town),
+        ],
         "place": site.frame.place.model_dump(),
         **({"min_height_m": options.min_height_m} if options.min_height_m else {}),
         **({"execution": {"flown_by": options.flown_by}} if options.flown_by else {}),
@@ -187,7 +201,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     if waypoints.left_out_m2 >= 0.5:
         out_m2 = waypoints.left_out_m2
         notes.append(f"left out: {out_m2:.0f} m² that are seen from no place a UAS may take")
-    return Imported(scenario, tuple(notes), town.credit if town.buildings else "")
+    return Imported(scenario, tuple(notes), town.credit if town.standing or town.streets else "")
 
 
 def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
@@ -198,10 +212,10 @@ def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
     return tuple(look_of(name, *how) for name in names)
 
 
-def _raised(building: Building, relief: Relief) -> Building:
-    """A building on the highest ground under it."""
-    ground_m = relief.range_m(*building.footprint.bounds)[1]
-    return replace(building, height_m=building.height_m + ground_m) if ground_m else building
+def _raised(thing: Standing, relief: Relief) -> Standing:
+    """Something on the highest ground under it."""
+    ground_m = relief.range_m(*thing.footprint.bounds)[1]
+    return replace(thing, height_m=thing.height_m + ground_m) if ground_m else thing
 
 
 def _look(looks: Sequence[Look], drawn: DrawnPolygon | Area, options: ImportOptions) -> Look:
@@ -239,6 +253,20 @@ def _fleet_tables(
         name = named_camera(member.camera)[0] if member.camera else None
         table["sensors"] = [look_at(looks, name, "--fleet").sensor()]
     return tables
+
+
+def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: Site) -> None:
+    for table in uas:
+        north_m, east_m, _ = table["start_m"]
+        place = Point(east_m, north_m)
+        for wall in walls:
+            if wall.footprint.distance(place) < table["radius_m"]:
+                latitude, longitude, _ = site.frame.to_geodetic(table["start_m"])
+                raise InputError(
+                    f"{table['name']} would take off at {latitude:.6f},{longitude:.6f}, inside an "
+                    f"obstacle ({in_words(wall.kind)}); draw its take-off place elsewhere, or give "
+                    f"another --home"
+                )
 
 
 def _look_notes(
@@ -299,25 +327,32 @@ def _decorations(seen: Sequence[tuple[Area, Look]], *, several: bool) -> list[di
         for whole in polygons_of(part.simplify(_OUTLINE_DETAIL_M))
         for outline in without_holes(whole)
     ]
-    return [
-        {
-            "name": f"area_{n + 1}",
-            "kind": kind,
-            "polygon_m": [
-                [round(north, 2), round(east, 2)] for east, north in part.exterior.coords[:-1]
-            ],
-        }
-        for n, (kind, part) in enumerate(parts)
-    ]
+    return [_decoration(f"area_{n + 1}", kind, part) for n, (kind, part) in enumerate(parts)]
+
+
+def _streets(town: Town) -> list[dict[str, Any]]:
+    return [_decoration(f"street_{n + 1}", "street", part) for n, part in enumerate(town.streets)]
+
+
+def _decoration(name: str, kind: str, shape: Polygon) -> dict[str, Any]:
+    corners = [[round(north, 2), round(east, 2)] for east, north in shape.exterior.coords[:-1]]
+    return {"name": name, "kind": kind, "polygon_m": corners}
 
 
 def _town_notes(town: Town) -> list[str]:
-    if not town.buildings:
-        return []
-    notes = [
-        f"{len(town.buildings)} buildings, the heights of {town.guessed} of them guessed from "
-        f"their kind"
-    ]
+    notes = []
+    for kind, words in _STANDING.items():
+        guessed = [not thing.known for thing in town.standing if thing.kind == kind]
+        if guessed:
+            notes.append(
+                f"{len(guessed)} {words}, the heights of {sum(guessed)} of them guessed from "
+                f"their kind"
+            )
+    if town.incomplete:
+        notes.append(
+            f"{town.incomplete} buildings or woods in the area lack corners in the file and are "
+            "left out: cut out more of the surroundings"
+        )
     if town.unread:
         tag, _ = town.unread.most_common(1)[0]
         notes.append(f"{town.unread.total()} tags of heights cannot be read, such as {tag!r}")

@@ -7,6 +7,7 @@ from typing import Any
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission.lateness import Pair
 from uas_coverage_env.operations.apart import Part
+from uas_coverage_env.operations.charge import Charged
 from uas_coverage_env.operations.exported import Exported, waiting, waypoint_margins
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.tracks import Tolerances
@@ -55,7 +56,7 @@ def _turnarounds(parts: Sequence[Part]) -> list[dict[str, Any]]:
                     "uas": name,
                     "landed": one.track.name,
                     "lands_s": round(one.lands_s, 1),
-                    "soc_landed": round(one.soc_landed, 4),
+                    "soc_landed": round(one.still.soc_landed, 4),
                     "fresh_pack": fresh,
                     "next": after.track.name,
                     "soc_next": round(after.soc_0, 4),
@@ -70,8 +71,6 @@ def _file(part: Part, one: Exported) -> dict[str, Any]:
     flight: Flight = part.flight
     track, room = one.track, one.track.room
     sortie, dt_s = track.sortie, flight.scenario.dt_s
-    lost = one.point_of_no_return
-    tightest = min(range(len(one.charges)), key=lambda n: one.charges[n].spare)
     margins = waypoint_margins(flight.scenario, one)
     return {
         "name": track.name,
@@ -83,7 +82,7 @@ def _file(part: Part, one: Exported) -> dict[str, Any]:
         "duration_s": round(one.followed.duration_s, 1),
         "planned_s": (sortie.landed - sortie.first) * dt_s,
         "soc_start": round(one.soc_0, 4),
-        "soc_landed": round(one.soc_landed, 4),
+        "soc_landed": round(one.still.soc_landed, 4),
         "planned_soc_landed": round(float(flight.soc[sortie.landed, track.uas]), 4),
         "soc_reserve": round(1.0 - flight.scenario.uas[track.uas].dod_max, 4),
         "off_path_m": round(track.off_m, 3),
@@ -97,14 +96,30 @@ def _file(part: Part, one: Exported) -> dict[str, Any]:
         "picture_each_m": min(filter(None, one.triggers_m), default=None),
         "waypoint_margin_m": round(min(margins), 3) if margins else None,
         "return_height_m": one.return_m,
-        "point_of_no_return": None if lost is None else _moment(one, lost),
-        "least_spare": _moment(one, tightest),
+        **_charge(one, one.still),
+        "in_wind": None if one.in_wind is None else _in_wind(one, one.in_wind),
         "legs": [_leg(one, n) for n in range(len(track.legs))],
     }
 
 
-def _moment(one: Exported, n: int) -> dict[str, Any]:
-    charge = one.charges[n]
+def _charge(one: Exported, charged: Charged) -> dict[str, Any]:
+    lost = charged.point_of_no_return
+    return {
+        "point_of_no_return": None if lost is None else _moment(one, charged, lost),
+        "least_spare": _moment(one, charged, charged.tightest),
+    }
+
+
+def _in_wind(one: Exported, charged: Charged) -> dict[str, Any]:
+    return {
+        "headwind_mps": round(charged.headwind_mps, 2),
+        "soc_landed": round(charged.soc_landed, 4),
+        **_charge(one, charged),
+    }
+
+
+def _moment(one: Exported, charged: Charged, n: int) -> dict[str, Any]:
+    charge = charged.legs[n]
     return {
         "leg": n + 1,
         "time_s": round(charge.time_s, 1),
@@ -115,7 +130,8 @@ def _moment(one: Exported, n: int) -> dict[str, Any]:
 
 
 def _leg(one: Exported, n: int) -> dict[str, Any]:
-    leg, charge = one.track.legs[n], one.charges[n]
+    leg, charge = one.track.legs[n], one.still.legs[n]
+    in_wind = None if one.in_wind is None else one.in_wind.legs[n]
     return {
         **_place(one.frame, leg.end_m),
         "speed_mps": one.speeds_mps[n],
@@ -128,6 +144,7 @@ def _leg(one: Exported, n: int) -> dict[str, Any]:
         "home": round(charge.home, 4),
         "spare": round(charge.spare, 4),
         "spare_s": round(charge.spare_s, 1),
+        "spare_in_wind": None if in_wind is None else round(in_wind.spare, 4),
         "spare_room_m": round(leg.room.spare_m, 2),
     }
 

@@ -4,20 +4,11 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-import shapely
-
-from uas_coverage_env.draw.labels import short_name
-from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.operations.apart import Part
-from uas_coverage_env.operations.convex import hull_of
-from uas_coverage_env.operations.formats.qgc import ZONES
-from uas_coverage_env.scenario import Obstacle
+from uas_coverage_env.operations.report_map import key_of, map_of
 
-_COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
-_OBSTACLE, _NO_FLY = "#bbb8b0", "#d9a29c"
-_FILLS = {_OBSTACLE: "obstacle", _NO_FLY: "no-fly zone"}
 _STYLE = """
-body{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#26282c}
+body{font:15px system-ui,sans-serif;max-width:80rem;margin:2rem auto;padding:0 1rem;color:#26282c}
 table{border-collapse:collapse;margin:1rem 0}
 th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
 th:first-child,td:first-child{text-align:left}
@@ -32,33 +23,104 @@ summary{cursor:pointer}
 """
 _NOTE = (
     "Times, charges and delays are those of a model of how ArduCopter flies the files, in still "
-    "air; they differ from the planned flight. Charge is counted as in level flight at full speed."
+    "air unless the page says otherwise; they differ from the planned flight. Charge is counted as "
+    "in level flight at full speed."
+)
+_COLUMNS = (
+    "Spare: charge, and time to fly, beyond the way home with a margin and the reserve; the least "
+    "of all legs. Room: least distance from obstacles and fence beyond the safe distances, of "
+    "which legs may use up 1 m. Return: the height at which a UAS can climb and fly straight home "
+    "from anywhere on its path; where there is none, only the way that it came is known to be "
+    "clear."
 )
 
 
-def report_page(parts: Sequence[Part], data: dict[str, Any]) -> str:
+def report_page(parts: Sequence[Part], data: dict[str, Any], notes: Sequence[str]) -> str:
     """The page.
 
     Args:
         parts: The flights of the mission, with their files.
         data: What `report` says of them.
+        notes: What the files cannot keep.
     """
     title = f"{escape(data['scenario'])}, flown by {escape(data['planner'])}"
     blocks = [
         f"<h1>{title}</h1>",
-        f"<p>{data['waypoints_passed']} of {data['waypoints']} waypoints are passed; files are "
-        f"within {data['path_tolerance_m']:g} m of the flight. {_NOTE}</p>",
-        _map(parts),
-        _key(parts),
+        _summary(data, notes),
+        map_of(parts),
+        key_of(parts),
         _order(data),
         _fleet(data["uas"]),
-        _waits(data["uas"]),
         _pairs(data),
+        "<h2>Legs</h2>",
         *(_legs(uas) for uas in data["uas"]),
+        f"<p>Files are within {data['path_tolerance_m']:g} m of the flight. {_NOTE}</p>",
     ]
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
     head += '<meta name="viewport" content="width=device-width,initial-scale=1">'
     return f"{head}<style>{_STYLE}</style><body>{''.join(blocks)}</body></html>\n"
+
+
+def _summary(data: dict[str, Any], notes: Sequence[str]) -> str:
+    """What one has to know before the first take-off, in a few lines."""
+    fleet, pairs = data["uas"], data["pairs"]
+    flying = len({uas["uas"] for uas in fleet})
+    first = fleet[0]["legs"][-1]
+    passed, all_of_them = data["waypoints_passed"], data["waypoints"]
+    lines = [
+        f"{_count(flying, 'UAS', 'UAS')} with {_count(len(fleet), 'file', 'files')}, "
+        f"{_clock(data['duration_s'])} min from the first start to the last landing, near "
+        f"{_degrees(first)}.",
+        _marked(f"{passed} of {all_of_them} waypoints are passed.", passed < all_of_them),
+        *_spare(fleet, "still air", fleet),
+    ]
+    in_wind = [uas["in_wind"] for uas in fleet if uas["in_wind"]]
+    if in_wind:
+        worst_mps = max(one["headwind_mps"] for one in in_wind)
+        lines += _spare(fleet, f"a headwind of {worst_mps:.1f} m/s on all legs", in_wind)
+    if pairs:
+        slack_s = min((p["slack_s"] for p in pairs if p["slack_s"] is not None), default=None)
+        late = "any delay" if slack_s is None else f"{slack_s:.0f} s"
+        how = "as the order below says" if data["turnarounds"] else "at the same time"
+        lines.append(f"Start the files {how}. Any UAS may be late by {late}.")
+    waits = [f"{uas['name']} {line}" for uas in fleet for line in uas["waits"]]
+    lines += [f"To keep apart, {escape(line)}." for line in waits]
+    lines += [f"Note: {escape(note)}." for note in notes if note not in waits]
+    return f"<ul>{''.join(f'<li>{line}</li>' for line in lines)}</ul>"
+
+
+def _spare(
+    fleet: Sequence[dict[str, Any]], air: str, charges: Sequence[dict[str, Any]]
+) -> list[str]:
+    """The lowest charge at a landing, and whether all can always come home."""
+    named = list(zip(fleet, charges, strict=True))
+    lands, lowest = min(named, key=lambda pair: pair[1]["soc_landed"] - pair[0]["soc_reserve"])
+    who, tightest = min(named, key=lambda pair: pair[1]["least_spare"]["spare"])
+    least = tightest["least_spare"]
+    lost = tightest["point_of_no_return"]
+    home = (
+        f"the way home can begin at any time: the least is {least['spare']:.0%} to spare "
+        f"({escape(who['name'])} at {_clock(least['time_s'])})."
+        if lost is None
+        else f"{escape(who['name'])} has a point of no return at {_clock(lost['time_s'])}."
+    )
+    landing = (
+        f"In {air}, the lowest charge at a landing is {_share(lowest['soc_landed'])} "
+        f"({escape(lands['name'])}; reserve {lands['soc_reserve']:.0%})"
+    )
+    return [_marked(f"{landing}; {home}", lost is not None)]
+
+
+def _marked(text: str, bad: bool) -> str:
+    return f'<span class="bad">{text}</span>' if bad else text
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+def _share(soc: float) -> str:
+    return "none" if soc <= 0.0 else f"{soc:.1%}"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -107,41 +169,39 @@ def _clock(seconds: float) -> str:
 
 
 def _fleet(fleet: Sequence[dict[str, Any]]) -> str:
+    windy = any(uas["in_wind"] for uas in fleet)
     rows = []
     for uas in fleet:
-        lost, least = uas["point_of_no_return"], uas["least_spare"]
-        comes_home = (
-            f"{least['spare']:.1%} at {least['time_s']:.0f} s, {least['spare_s']:.0f} s of flight"
-            if lost is None
-            else f'<span class="bad">point of no return before leg {lost["leg"]} ends, at '
-            f"{lost['time_s']:.0f} s</span>"
-        )
         height = uas["return_height_m"]
+        in_wind = uas["in_wind"]
         rows.append(
             [
                 escape(uas["name"]),
                 f"{uas['duration_s']:.0f} ({uas['planned_s']:.0f})",
                 f"{uas['soc_landed']:.1%} ({uas['planned_soc_landed']:.1%})",
                 f"{uas['soc_reserve']:.0%}",
-                comes_home,
+                _comes_home(uas),
+                *([_share(in_wind["soc_landed"]), _comes_home(in_wind)] if in_wind else []),
                 f"{uas['off_path_m']:.1f}",
                 f"{uas['spare_room_m']:.1f}",
-                "none is clear" if height is None else f"{height:g}",
+                "the way it came" if height is None else f"at {height:g} m",
             ]
         )
     head = [
-        *("UAS", "flight (planned), s", "charge landed (planned)", "reserve"),
-        *("least spare on the way", "off the path, m", "spare room, m", "return height, m"),
+        *("UAS", "flight (planned), s", "charge landed (planned)", "reserve", "spare"),
+        *(("charge landed in wind", "spare in wind") if windy else ()),
+        *("off the path, m", "room, m", "return"),
     ]
-    return "<h2>Fleet</h2>" + _table(head, rows)
+    return f"<h2>Fleet</h2>{_table(head, rows)}<p>{_COLUMNS}</p>"
 
 
-def _waits(fleet: Sequence[dict[str, Any]]) -> str:
-    """What was put in for the UAS to keep apart."""
-    lines = [
-        f"<li>{escape(uas['name'])} {escape(line)}</li>" for uas in fleet for line in uas["waits"]
-    ]
-    return f"<p>To keep apart:</p><ul>{''.join(lines)}</ul>" if lines else ""
+def _comes_home(charge: dict[str, Any]) -> str:
+    lost, least = charge["point_of_no_return"], charge["least_spare"]
+    if lost is None:
+        return (
+            f"{least['spare']:.1%} at {least['time_s']:.0f} s, {least['spare_s']:.0f} s of flight"
+        )
+    return _marked(f"no return before leg {lost['leg']} ends, at {lost['time_s']:.0f} s", True)
 
 
 def _pairs(data: dict[str, Any]) -> str:
@@ -175,116 +235,21 @@ def _legs(uas: dict[str, Any]) -> str:
             f"{leg['time_s']:.0f}",
             f"{leg['soc']:.1%}",
             f"{leg['home']:.1%}",
-            f'<span class="bad">{leg["spare"]:.1%}</span>'
-            if leg["spare"] < 0.0
-            else f"{leg['spare']:.1%}",
+            *(_marked(f"{spare:.1%}", spare < 0.0) for spare in _spares(leg)),
         ]
         for n, leg in enumerate(uas["legs"], 1)
     ]
     head = [
         *("leg", "to", "height, m", "m/s", "at, s"),
-        *("charge", "way home takes", "spare"),
+        *("charge", "way home takes", "spare", "spare in wind")[: 3 + bool(uas["in_wind"])],
     ]
     summary = f"<summary>{escape(uas['name'])}, {len(rows)} legs</summary>"
     return f"<details>{summary}{_table(head, rows)}</details>"
 
 
+def _spares(leg: dict[str, Any]) -> list[float]:
+    return [spare for spare in (leg["spare"], leg["spare_in_wind"]) if spare is not None]
+
+
 def _degrees(place: dict[str, float]) -> str:
     return f"{place['latitude_deg']:.6f}, {place['longitude_deg']:.6f}"
-
-
-def _map(parts: Sequence[Part]) -> str:
-    """The mission from above, north up: x is east, y is minus north."""
-    scenario = parts[0].flight.scenario
-    corners_m = scenario.fence.vertices_m[:, :2]
-    low, high = corners_m.min(axis=0), corners_m.max(axis=0)
-    span_m = float((high - low).max())
-    pen = span_m / 400.0
-    shapes = [
-        _outline(scenario.fence.vertices_m, f'fill="#fff" stroke="#888" stroke-width="{pen}"')
-    ]
-    shapes += [
-        _outline(hull.vertices_m, f'fill="{_fill_of(obstacle)}"', obstacle.name)
-        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
-    ]
-    shapes += [
-        f'<circle cx="{w.position_m[1]:.1f}" cy="{-w.position_m[0]:.1f}" r="{w.radius_m:g}" '
-        f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
-        for w in scenario.waypoints
-    ]
-    homes: dict[str, tuple[float, float]] = {}
-    names = parts[0].flight.names
-    files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
-    for n, one in files:
-        colour = _COLOURS[n % len(_COLOURS)]
-        line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
-        shapes.append(
-            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="{1.5 * pen}">'
-            f"<title>{escape(one.track.name)}</title></polyline>"
-        )
-        x, y, _ = one.track.home_m
-        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
-        homes[names[n]] = (y, -x)
-        if one.track.lands_elsewhere:
-            x, y, _ = one.track.landing_m
-            shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="none" stroke="{colour}" '
-                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: landing</title>'
-                "</circle>"
-            )
-        lost = one.point_of_no_return
-        if lost is not None:
-            x, y, _ = one.track.legs[lost].end_m
-            shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" fill="none" stroke="#c81e2d" '
-                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: point of no return'
-                f"</title></circle>"
-            )
-    around = 0.02 * span_m
-    for name, (x, y) in homes.items():
-        shapes.append(_words(short_name(name), x, y - 6 * pen, pen, anchor="middle"))
-    shapes.append(_scale(low[1], -low[0], span_m, pen))
-    height, width = high - low + 2.0 * around
-    box = f"{low[1] - around:.1f} {-high[0] - around:.1f} {width:.1f} {height:.1f}"
-    told = escape(f"Map, north up: fence, obstacles, waypoints, legs of {', '.join(homes)}")
-    return f'<svg viewBox="{box}" role="img" aria-label="{told}">{"".join(shapes)}</svg>'
-
-
-def _words(text: str, x: float, y: float, pen: float, anchor: str = "start") -> str:
-    size = f'font-size="{11 * pen:.1f}" stroke-width="{3 * pen:.1f}" text-anchor="{anchor}"'
-    return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(text)}</text>'
-
-
-def _scale(west: float, south: float, span_m: float, pen: float) -> str:
-    """A bar of a round length at the south-west, and where north is."""
-    long_m = scale_step_m(span_m)
-    bar = f"M{west + 4 * pen:.1f} {south - 4 * pen:.1f}h{long_m:g}"
-    words = _words(f"{long_m:g} m, N \N{UPWARDS ARROW}", west + 4 * pen, south - 8 * pen, pen)
-    return f'<path d="{bar}" stroke="#26282c" stroke-width="{2 * pen:.1f}"/>{words}'
-
-
-def _key(parts: Sequence[Part]) -> str:
-    """What is what on the map."""
-    flight = parts[0].flight
-    entries = [
-        (_COLOURS[n % len(_COLOURS)], "50%", name)
-        for n, name in enumerate(flight.names)
-        if any(part.of(name) for part in parts)
-    ]
-    fills = {_fill_of(obstacle) for obstacle in flight.scenario.obstacles}
-    entries += [(fill, "0", name) for fill, name in _FILLS.items() if fill in fills]
-    marks = "".join(
-        f'<span><i style="background:{colour};border-radius:{corner}"></i>{escape(name)}</span>'
-        for colour, corner, name in entries
-    )
-    return f'<p class="key">{marks}<span>green circles: waypoints</span></p>'
-
-
-def _fill_of(obstacle: Obstacle) -> str:
-    return _NO_FLY if obstacle.kind in ZONES else _OBSTACLE
-
-
-def _outline(vertices_m: Any, style: str, name: str = "") -> str:
-    ring = hull_of(shapely.MultiPoint(vertices_m[:, :2])).exterior.coords[:-1]
-    points = " ".join(f"{east:.1f},{-north:.1f}" for north, east in ring)
-    return f'<polygon points="{points}" {style}><title>{escape(name)}</title></polygon>'

@@ -13,7 +13,8 @@ from uas_coverage_env.operations.convex import convex_pieces, hull_of
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.local import frame_around, local_place, local_polygon
-from uas_coverage_env.operations.town import Building, prisms
+from uas_coverage_env.operations.prisms import Standing, prisms
+from uas_coverage_env.operations.tags import BUILDING, FOREST
 from uas_coverage_env.operations.wishes import NOTHING, Wishes
 
 SAFE_DISTANCE_M = 3.0
@@ -135,12 +136,18 @@ def make_site(
     )
 
 
-def building_walls(buildings: Sequence[Building], fence: Polygon) -> list[Wall]:
-    """Walls that hold all buildings within a fence."""
+def town_walls(standing: Sequence[Standing], fence: Polygon) -> list[Wall]:
+    """Walls that hold all that stands within a fence; what may be many and close is merged."""
+    merged = [
+        prism
+        for kind in (BUILDING, FOREST)
+        for prism in prisms([thing for thing in standing if thing.kind == kind], _BUILDING_GAP_M)
+    ]
+    single = [thing for thing in standing if thing.kind not in (BUILDING, FOREST)]
     return [
-        Wall("building", prism.footprint, prism.height_m, SAFE_DISTANCE_M)
-        for prism in prisms(buildings, _BUILDING_GAP_M)
-        if prism.footprint.intersects(fence)
+        Wall(thing.kind, hull_of(thing.footprint), thing.height_m, SAFE_DISTANCE_M)
+        for thing in (*merged, *single)
+        if thing.footprint.intersects(fence)
     ]
 
 
@@ -163,7 +170,11 @@ def _homes_m(
         thing for thing in things if isinstance(thing, TakeOff)
     ]
     if not places:
-        raise InputError("no take-off place: draw a point, or give --home LAT,LON")
+        middle = f"{frame.place.latitude_deg:.5f},{frame.place.longitude_deg:.5f}"
+        raise InputError(
+            f"no take-off place: draw a point, or give --home LAT,LON near the areas, whose middle "
+            f"is {middle}"
+        )
     return tuple(local_place(frame, place) for place in places)
 
 

@@ -1,84 +1,68 @@
-"""Buildings of a town as convex prisms: footprints and tags of OpenStreetMap, as GeoJSON.
+"""What stands in a town and where its streets are, from OpenStreetMap: GeoJSON, .osm, .osm.pbf."""
 
-Buildings between which no UAS can pass are merged where they are of like height, and what is not
-convex is cut into convex pieces.
-"""
-
-import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, MultiPoint, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.convex import convex_pieces, polygons_of
+from uas_coverage_env.operations.convex import hull_of, polygons_of, without_holes
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.geojson import features, read_json
+from uas_coverage_env.operations.prisms import Standing
 from uas_coverage_env.operations.reading import or_example
+from uas_coverage_env.operations.tags import (
+    FOREST,
+    STREETS_M,
+    Tagged,
+    height_m,
+    standing_of,
+)
 
-STOREY_M = 3.2
-ROOF_M = 2.0
-"""Added to the levels where none are tagged for the roof: levels do not count it."""
-
-GUESSED_M: Mapping[str, float] = {
-    **dict.fromkeys(("garage", "garages", "shed", "carport", "hut"), 4.0),
-    "greenhouse": 5.0,
-    **dict.fromkeys(("house", "detached", "semidetached_house", "residential"), 9.0),
-    **dict.fromkeys(("terrace", "retail"), 10.0),
-    **dict.fromkeys(("school", "public"), 13.0),
-    "industrial": 14.0,
-    "apartments": 20.0,
-    "church": 35.0,
-}
-"""Height of a building without height and levels, by its kind: a guess on the high side."""
-
-GUESSED_OTHER_M = 10.0
-
-_HIGHEST_M = 1_000.0
+_OSM = (".osm", ".pbf")
+_OSM_CREDIT = (
+    "© OpenStreetMap contributors, https://www.openstreetmap.org/copyright; Open Database License "
+    "(ODbL) 1.0"
+)
 _SMALLEST_M2 = 4.0
-_LIKE_HEIGHT_M = 4.0
-_SLACK = 1.25
-_HEIGHT = re.compile(r"\s*(\d{1,4}(?:[.,]\d+)?)\s*(m|ft|')?\s*")
-_LEVELS = re.compile(r"\s*(\d{1,3}(?:\.\d+)?)\s*")
+_DETAIL_M = 1.0
+"""So far corners of woods and streets may be off; what a wood becomes holds more ground anyway."""
 
-
-@dataclass(frozen=True, eq=False)
-class Building:
-    """A footprint (x east, y north) and the height of its roof above the ground."""
-
-    footprint: Polygon
-    height_m: float
+_AROUND_M = 10.0
 
 
 @dataclass
 class Town:
-    """The buildings of an area and what is said of them.
+    """What is known of the surroundings of an area.
 
     Attributes:
-        buildings: Those that meet the area.
-        guessed: How many of them have neither height nor levels.
+        standing: What stands in the area, as buildings and power lines.
+        streets: Where streets are (x east, y north) [m].
+        incomplete: Outlines in the area of which the file lacks corners.
         unread: Tags of height or levels that cannot be read, and how often.
-        credit: Attribution and licence that the file names.
+        credit: Attribution and licence of the data.
     """
 
-    buildings: list[Building] = field(default_factory=list)
-    guessed: int = 0
+    standing: list[Standing] = field(default_factory=list)
+    streets: list[Polygon] = field(default_factory=list)
+    incomplete: int = 0
     unread: Counter[str] = field(default_factory=Counter)
     credit: str = ""
 
 
 def read_town(path: Path, frame: LocalFrame, area: Polygon) -> Town:
-    """The buildings whose footprint meets an area.
+    """What stands in an area, and its streets.
 
     Args:
-        path: GeoJSON with OpenStreetMap's tags as properties (or in a property `tags`), or the
-            name of a shipped example (`karhula`).
+        path: A file of OpenStreetMap (.osm, .osm.pbf), GeoJSON with its tags as properties (or in
+            a property `tags`), or the name of a shipped example (`karhula`).
         frame: The local metres.
         area: In these, x east, y north.
 
@@ -86,22 +70,31 @@ def read_town(path: Path, frame: LocalFrame, area: Polygon) -> Town:
         InputError: The file cannot be used, or no building is anywhere near.
     """
     path = or_example(path, "_buildings.geojson")
-    if path.suffix.lower() not in (".geojson", ".json"):
-        raise InputError(f"{path}: unknown kind of file; export the buildings as .geojson")
-    data = read_json(path)
-    town, nearest_m, seen = Town(credit=_credit(data)), np.inf, 0
-    for number, (rings, tags) in enumerate(_footprints(features(path, data))):
-        footprint = _local(path, number, frame, rings)
-        if footprint is None:
+    found, credit = _read(path)
+    town, nearest_m = Town(credit=credit), np.inf
+    for number, (kind, corners, tags) in enumerate(_shapes(found)):
+        street_m = STREETS_M.get(str(tags.get("highway")))
+        what = standing_of(tags)
+        if what is None and (street_m is None or kind != "LineString"):
             continue
-        seen += 1
-        nearest_m = min(nearest_m, shapely.distance(footprint, area))
-        parts = [p for p in polygons_of(footprint) if p.area > _SMALLEST_M2 and p.intersects(area)]
+        places = _local(path, number, frame, corners)
+        if places is None:
+            continue
+        if what is None:
+            town.streets += _street(places, street_m or 0.0, area)
+            continue
+        if kind == "LineString" and not what.half_width_m:
+            town.incomplete += MultiPoint(places).intersects(area)
+            continue
+        ground = _ground(kind, places, what)
+        nearest_m = min(nearest_m, shapely.distance(ground, area))
+        parts = [p for p in polygons_of(ground) if p.area > _SMALLEST_M2 and p.intersects(area)]
         if parts:
-            height, known = height_m(tags, town.unread)
-            town.guessed += not known
-            town.buildings += [Building(part, height) for part in parts]
-    if not seen:
+            top_m, known = height_m(tags, what.guessed_m, town.unread)
+            for part in parts:
+                near = _near(part, area) if what.kind == FOREST else [part]
+                town.standing += [Standing(what.kind, one, top_m, known) for one in near]
+    if nearest_m == np.inf:
         raise InputError(f"{path}: holds no building; export polygons with the tag `building`")
     if nearest_m > 10_000.0:
         raise InputError(
@@ -111,122 +104,80 @@ def read_town(path: Path, frame: LocalFrame, area: Polygon) -> Town:
     return town
 
 
-def height_m(tags: Mapping[str, Any], unread: Counter[str] | None = None) -> tuple[float, bool]:
-    """Height of a building above the ground, and whether its tags say it.
+def _read(path: Path) -> tuple[list[dict[str, Any]], str]:
+    """Features with tags, and the attribution of the data."""
+    if path.suffix.lower() in _OSM:
+        # a library that nothing else needs
+        from uas_coverage_env.operations.osm import read_osm
 
-    `height` counts before `building:levels`; 12, 12.5 m, 40 ft and 40' are read.
-
-    Args:
-        tags: Of OpenStreetMap.
-        unread: Counts the tags that cannot be read.
-    """
-    for key in ("height", "building:height", "est_height"):
-        found = _match(_HEIGHT, key, tags, unread)
-        if found:
-            value = float(found[1].replace(",", "."))
-            value *= 0.3048 if found[2] in ("ft", "'") else 1.0
-            if 0.0 < value <= _HIGHEST_M:
-                return value, True
-    levels = _match(_LEVELS, "building:levels", tags, unread)
-    if levels and float(levels[1]) > 0.0:
-        roof = _match(_LEVELS, "roof:levels", tags, unread)
-        return float(levels[1]) * STOREY_M + (float(roof[1]) * STOREY_M if roof else ROOF_M), True
-    kind = str(tags.get("building") or tags.get("building:part") or "")
-    return GUESSED_M.get(kind, GUESSED_OTHER_M), False
+        return read_osm(path), _OSM_CREDIT
+    if path.suffix.lower() not in (".geojson", ".json"):
+        raise InputError(
+            f"{path}: unknown kind of file; export the buildings as .osm, .osm.pbf or .geojson"
+        )
+    data = read_json(path)
+    said = (data.get(key) for key in ("attribution", "copyright", "licence", "license"))
+    credit = "; ".join(" ".join(text.split())[:200] for text in said if isinstance(text, str))
+    return features(path, data), credit
 
 
-def prisms(buildings: Sequence[Building], gap_m: float) -> list[Building]:
-    """Convex footprints that hold all buildings.
-
-    Args:
-        buildings: In local metres.
-        gap_m: Buildings closer to each other than this are one block where they are of like
-            height: a shed does not raise a house.
-    """
-    if not buildings:
-        return []
-    grown = [b.footprint.buffer(gap_m / 2.0, join_style="mitre") for b in buildings]
-    group = list(range(len(buildings)))
-
-    def root(i: int) -> int:
-        while group[i] != i:
-            i = group[i]
-        return i
-
-    near = shapely.STRtree(grown).query(grown, predicate="intersects").T.tolist()
-    for i, j in near:
-        if i < j and abs(buildings[i].height_m - buildings[j].height_m) <= _LIKE_HEIGHT_M:
-            group[root(j)] = root(i)
-    blocks: dict[int, list[int]] = {}
-    for i in range(len(buildings)):
-        blocks.setdefault(root(i), []).append(i)
-    found = [
-        prism
-        for members in blocks.values()
-        for prism in _block([buildings[i] for i in members], gap_m)
-    ]
-    return _without_hidden(found)
-
-
-def _block(members: list[Building], gap_m: float) -> Iterator[Building]:
-    merged = shapely.union_all([b.footprint for b in members])
-    if len(members) > 1:  # close the gaps that no UAS passes
-        closed = merged.buffer(gap_m / 2.0, join_style="mitre")
-        merged = merged.union(closed.buffer(-gap_m / 2.0, join_style="mitre"))
-    for part in polygons_of(merged):
-        for piece in convex_pieces(part, _SLACK):
-            inside = [b for b in members if b.footprint.intersects(piece)] or members
-            yield Building(piece, max(b.height_m for b in inside))
-
-
-def _without_hidden(found: list[Building]) -> list[Building]:
-    """Leave out what lies inside something higher."""
-    kept: list[Building] = []
-    for prism in sorted(found, key=lambda b: (-b.height_m, -b.footprint.area)):
-        if not any(k.footprint.covers(prism.footprint) for k in kept):
-            kept.append(prism)
-    return kept
-
-
-def _match(
-    pattern: re.Pattern[str], key: str, tags: Mapping[str, Any], unread: Counter[str] | None
-) -> re.Match[str] | None:
-    text = str(tags.get(key) or "")
-    found = pattern.fullmatch(text)
-    if text and found is None and unread is not None:
-        unread[f"{key}={text[:40]}"] += 1
-    return found
-
-
-def _footprints(found: list[dict[str, Any]]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
-    """Outer rings in longitude and latitude, and tags, of all buildings."""
+def _shapes(found: list[dict[str, Any]]) -> Iterator[tuple[str, Any, Mapping[str, Any]]]:
+    """Polygon, LineString or Point, its corners in longitude and latitude, and tags."""
     for feature in found:
         properties, geometry = feature["properties"], feature["geometry"]
         nested = properties.get("tags")
         tags = nested if isinstance(nested, dict) else properties
-        if not (tags.get("building") or tags.get("building:part")):
+        kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+        if not isinstance(coordinates, list):
             continue
-        coordinates = geometry.get("coordinates")
-        if geometry.get("type") in ("Polygon", "MultiPolygon") and isinstance(coordinates, list):
-            for rings in [coordinates] if geometry["type"] == "Polygon" else coordinates:
-                yield (rings[0] if isinstance(rings, list) and rings else []), tags
+        if kind in ("Polygon", "MultiPolygon"):
+            for rings in [coordinates] if kind == "Polygon" else coordinates:
+                yield "Polygon", (rings[0] if isinstance(rings, list) and rings else []), tags
+        elif kind in ("LineString", "MultiLineString"):
+            for line in [coordinates] if kind == "LineString" else coordinates:
+                yield "LineString", line, tags
+        elif kind == "Point":
+            yield "Point", [coordinates], tags
 
 
-def _local(path: Path, number: int, frame: LocalFrame, ring: Any) -> BaseGeometry | None:
+def _local(path: Path, number: int, frame: LocalFrame, corners: Any) -> np.ndarray | None:
+    """(N, 2) east and north [m]; None where that is none."""
     try:
-        places = np.array([position[:2] for position in ring], dtype=np.float64)
+        places = np.array([position[:2] for position in corners], dtype=np.float64)
         if not np.isfinite(places).all() or np.abs(places).max(initial=0.0) > 180.0:
             raise ValueError
     except (TypeError, ValueError, KeyError, OverflowError):
         raise InputError(
             f"{path}: building {number + 1} has a broken coordinate; export it again in WGS 84"
         ) from None
-    if len(places) < 4 or places.shape[1:] != (2,) or np.abs(places[:, 1]).max() > 90.0:
+    if not len(places) or places.shape[1:] != (2,) or np.abs(places[:, 1]).max() > 90.0:
         return None
-    ned = frame.to_ned(places[:, 1], places[:, 0])
-    return shapely.make_valid(Polygon(ned[:, 1::-1]))
+    return frame.to_ned(places[:, 1], places[:, 0])[:, 1::-1]
 
 
-def _credit(data: Mapping[str, Any]) -> str:
-    said = (data.get(key) for key in ("attribution", "copyright", "licence", "license"))
-    return "; ".join(" ".join(text.split())[:200] for text in said if isinstance(text, str))
+def _ground(kind: str, places: np.ndarray, what: Tagged) -> BaseGeometry:
+    """What something stands on; of a line, a rectangle for each of its straight parts."""
+    if kind == "Polygon":
+        return shapely.make_valid(Polygon(places)) if len(places) > 3 else Polygon()
+    wide_m = what.half_width_m
+    if kind == "Point":
+        return shapely.box(*(places[0] - wide_m), *(places[0] + wide_m))
+    parts = (
+        hull_of(LineString(ends).buffer(wide_m, cap_style="square"))
+        for ends in pairwise(places)
+        if wide_m and (ends[0] != ends[1]).any()
+    )
+    return shapely.GeometryCollection(list(parts))
+
+
+def _near(wood: Polygon, area: Polygon) -> list[Polygon]:
+    """The part of a wood that UAS may meet: woods are large and have many corners."""
+    return polygons_of(wood.intersection(area.buffer(_AROUND_M)).simplify(_DETAIL_M))
+
+
+def _street(places: np.ndarray, half_width_m: float, area: Polygon) -> list[Polygon]:
+    if len(places) < 2:
+        return []
+    shape = LineString(places).buffer(half_width_m, cap_style="flat", quad_segs=2)
+    parts = polygons_of(shape.intersection(area).simplify(0.3 * _DETAIL_M))
+    return [piece for part in parts if part.area > _SMALLEST_M2 for piece in without_holes(part)]

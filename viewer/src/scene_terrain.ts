@@ -27,6 +27,8 @@ import { roundStep } from "./round_step";
 
 const TREE_AREA_M2 = 130;
 const MOST_TREES = 420;
+/** Kind of a decoration -> its layer on the ground; all others lie in the second. */
+const LAYERS: Record<string, number> = { water: 1, street: 3 };
 
 export interface Extent {
   centre: Vector3;
@@ -60,7 +62,7 @@ export interface Terrain {
 export function terrain(scene: Scene, extent: Extent): Terrain {
   const group = new Group();
   const { centre, half, ground } = extent;
-  // layers on the ground, so far apart that no depth buffer mixes them up
+  // layers on the ground (`LAYERS`), so far apart that no depth buffer mixes them up
   const layer = half * 6e-4;
   const outside = new Mesh(
     new PlaneGeometry(24 * half, 24 * half),
@@ -71,7 +73,7 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
   group.add(outside, area(scene.fence.outline, colour("--ground"), ground - layer));
   group.add(gridLines(scene.fence.outline, ground, half));
   for (const item of scene.decorations) {
-    group.add(area(item.outline, dim(item.colour), ground + (item.kind === "water" ? 1 : 2) * layer));
+    group.add(area(item.outline, dim(item.colour), ground + (LAYERS[item.kind] ?? 2) * layer));
   }
   const changing: { part: Object3D; from: number; until: number }[] = [];
   for (const obstacle of scene.obstacles) {
@@ -81,7 +83,7 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
   }
   for (const { homes, colour: hex } of scene.uas) {
     homes.forEach(({ from, at }, n) => {
-      const part = pad(at, hex, ground + 3 * layer, half);
+      const part = pad(at, hex, ground + 4 * layer, half);
       group.add(part);
       changing.push({ part, from, until: homes[n + 1]?.from ?? Infinity });
     });
