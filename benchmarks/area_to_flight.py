@@ -168,7 +168,7 @@ def _flown(what: str, missions: Sequence[Scenario], planners: Sequence[str]) -> 
 
 
 def _row(what: str, planner: str, flown: Sequence[sorties.Flown]) -> Row:
-    """What is not covered is out of reach of the charge: for some planners there is not enough."""
+    """How much is covered is measured, not claimed: a planner may run out of charge before."""
     covered, time_s, spent_wh, packs, harm = sorties.row(flown)
     found = f"{covered} covered, {time_s} s, {spent_wh} Wh, {packs} packs"
     return Row(f"{what}: `{planner}`", found, "without harm", harm == "0")
