@@ -12,6 +12,7 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.reproduction import command as reproduction
 
 from uas_coverage_env import generate_scenario
+from uas_coverage_env.bound import carried
 from uas_coverage_env.cli import main
 
 QUICK = {"nearest-waypoint", "lawnmower", "learned-velocity"}
@@ -61,6 +62,7 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
     # nobody is timed here, so nothing has to be compiled before the first decision
     monkeypatch.setattr(MovingHorizon, "warm_up", lambda planner, scenario: None)
     monkeypatch.setattr(reproduction, "_QUICK_CAP_S", 0.2)  # of each of a dozen programs
+    monkeypatch.setattr(carried, "_ROUNDS", 2)  # in which the best prices of a bound are sought
     # what the reader brings along: a scenario of one's own, and what the page says to save
     save_files(page, tmp_path)
     generate_scenario(seed=1, n_uas=1, n_waypoints=4, n_obstacles=2).to_file("my_area.toml")
