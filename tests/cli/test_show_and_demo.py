@@ -10,7 +10,7 @@ from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import demo as demo_command
 from uas_coverage_env.cli import main
 from uas_coverage_env.flight import Flight, summary
-from uas_coverage_env.scenario import generate_scenario, load_scenario
+from uas_coverage_env.scenario import generate_scenario
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
