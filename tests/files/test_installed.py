@@ -1,11 +1,11 @@
-"""Entry points are read once, and again where something has been installed."""
+"""Entry points and versions are read once, and again where something has been installed."""
 
 import os
 from importlib import metadata
 
 import pytest
 
-from uas_coverage_env.files.installed import entry_points
+from uas_coverage_env.files.installed import entry_points, version_of
 
 GROUP = "uas_coverage.test_installed"
 
@@ -32,7 +32,9 @@ def names():
 
 def test_what_is_installed_later_is_found_and_what_is_removed_is_not(folder):
     assert names() == []
+    assert version_of("first") is None
     install(folder, "first")
+    assert version_of("first") == "1.0"
     assert names() == ["first"]
     install(folder, "second")
     assert sorted(names()) == ["first", "second"]
@@ -40,6 +42,7 @@ def test_what_is_installed_later_is_found_and_what_is_removed_is_not(folder):
     (folder / "first-1.0.dist-info" / "METADATA").unlink()
     (folder / "first-1.0.dist-info").rmdir()
     assert names() == ["second"]
+    assert version_of("first") is None
 
 
 def test_what_is_installed_is_read_once(folder, monkeypatch):
