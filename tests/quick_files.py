@@ -59,6 +59,7 @@ QUICK = {
     ),
     "env/test_parallel_env.py": "",
     "env/test_rewards.py": "",
+    "files/test_installed.py": "",
     "files/test_strict_toml.py": "but test_whatever_is_given_the_answer_is_a_car_or_one_line",
     "flight/test_directory.py": ("but test_every_finite_number_survives_the_way_through_the_files"),
     "flight/test_metrics.py": "",

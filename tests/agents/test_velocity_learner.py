@@ -171,9 +171,9 @@ def test_what_is_exported_decides_as_the_model_does(algorithm):
 
 
 @pytest.mark.slow
-def test_half_a_minute_of_training_covers_far_more_than_none():
+def test_a_few_seconds_of_training_cover_far_more_than_none():
     changes = [
-        "steps=300_000",
+        "steps=120_000",
         "lanes=16",
         "learning.rollout_steps=128",
         "learning.batch_size=2048",
@@ -187,7 +187,7 @@ def test_half_a_minute_of_training_covers_far_more_than_none():
     )
     unseen = training_scenarios(load_config(TINY).scenarios, seed=77)
     before = training_run.flights(unseen)[:, MEASURES.index("coverage")].mean()
-    training_run.model.learn(300_000)
+    training_run.model.learn(120_000)
     results = fly(training_run.policy(), unseen)
     assert before < 0.3
     assert results[:, MEASURES.index("coverage")].mean() > 0.8

@@ -30,7 +30,7 @@ def random_mission(seed):
         [HOME, OTHER_HOME][: int(rng.integers(1, 3))],
         places,
         radius_m=float(rng.uniform(5.0, 20.0)),
-        soc_0=float(rng.uniform(0.6, 1.0)),
+        soc_0=float(rng.choice([0.65, 0.95])),  # a table of turns is made for each charge
     )
 
 

@@ -10,7 +10,7 @@ from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import demo as demo_command
 from uas_coverage_env.cli import main
 from uas_coverage_env.flight import Flight, summary
-from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.scenario import generate_scenario
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -63,16 +63,22 @@ def test_show_gives_machines_what_the_summary_says(flown, capsys):
     assert [entry["accomplished"] for entry in json.loads(capsys.readouterr().out)] == [True, False]
 
 
-def test_show_puts_the_least_energy_beside_a_flight_that_has_one(flown, capsys):
-    assert main(["show", *flown, "--bound", "--json"]) == 0
+def test_show_puts_the_least_energy_beside_a_flight_that_has_one(elsewhere, capsys):
+    # of few waypoints: a bound takes the longer the more there are
+    scenario = generate_scenario(1, n_uas=1, n_waypoints=4, n_obstacles=2)
+    scenario.to_file("area.toml")
+    fly = ["run", "area.toml", "--quiet"]
+    assert main([*fly, "--planner", "nearest-waypoint", "--out", "good"]) == 0
+    assert main([*fly, "--planner", "hover", "--steps", "3", "--out", "bad"]) == 0
+    assert main(["show", "good", "bad", "--bound", "--json"]) == 0
     good, bad = (entry["bound"] for entry in json.loads(capsys.readouterr().out))
-    flight = Flight.load(flown[0])
-    least_Wh = MissionBound(load_scenario("open_field")).energy_Wh(flight.steps)
+    flight = Flight.load("good")
+    least_Wh = MissionBound(scenario).energy_Wh(flight.steps)
     assert good["energy_Wh"] == pytest.approx(least_Wh)
     assert good["above"] == pytest.approx(summary(flight)["energy_Wh"] / least_Wh - 1.0)
     assert good["above"] > 0.0
     assert bad["above"] is None, "of a mission that is not accomplished"
-    assert main(["show", *flown, "--bound"]) == 0
+    assert main(["show", "good", "bad", "--bound"]) == 0
     out = capsys.readouterr().out
     assert row(out, "least energy, Wh")[0] == f"{least_Wh:.2f}"
     assert row(out, "above it")[0] == f"{good['above']:.1%}"

@@ -53,11 +53,11 @@ def visited_by(flight, name, since):
 
 @every_planner
 def test_the_others_cover_what_a_uas_without_a_radio_leaves(planner, waypoints):
-    silent = event("radio_lost", 12.0, uas="uas_1", for_s=220.0, then="hover")
+    silent = event("radio_lost", 12.0, uas="uas_1", for_s=120.0, then="hover")
     flight = rollout(field(silent, waypoints=waypoints), planner(), safety_filter=True)
     assert accomplished(flight)
     assert not flight.breaches
-    assert flight.covered[:220].max() == len(waypoints)
+    assert flight.covered[:120].max() == len(waypoints)
 
 
 @every_planner

@@ -23,7 +23,10 @@ SHORTER = {
         "relative_gap=0.01)": "relative_gap=0.5)",
         '"horizon": 12}))': '"horizon": 12}), max_steps=12)',
     },
-    "3_village_mission": {"rollout(village, planner,": "rollout(village, planner, max_steps=70,"},
+    "3_village_mission": {
+        "rollout(village, planner,": "rollout(village, planner, max_steps=12,",
+        "map_figure(flight, step=60)": "map_figure(flight, step=10)",
+    },
     "4_learn_and_compare": {
         "steps=60_000": "steps=8_000",
         "scenarios.pool=40": "scenarios.pool=8",

@@ -78,7 +78,7 @@ def test_every_formulation_has_the_optimum_of_the_papers(step, uas):
 
 
 def test_two_uas_together_have_the_optimum_of_the_papers():
-    problem = smaller(FLOWN[0], 7, 1)
+    problem = smaller(FLOWN[0], 6, 1)
     between = problem.x0[:, :3].mean(axis=0) + np.array([0.0, 0.0, -12.0])
     problem = replace(
         problem,

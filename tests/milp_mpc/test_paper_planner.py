@@ -55,7 +55,7 @@ def first_problem(planner, scenario=None):
 @pytest.fixture(scope="module")
 def flight():
     """A whole mission, and what was solved at each step."""
-    planner, solved = MilpMpcPaper(MilpMpcPaper.Options(horizon=7)), []
+    planner, solved = MilpMpcPaper(MilpMpcPaper.Options(horizon=6)), []
     scenario = field(moving_obstacles=[BALLOON])
     flown = rollout(scenario, planner, on_step=lambda _: solved.append(planner.last_program))
     return flown, solved[1:]  # the first is of before take-off
@@ -80,7 +80,7 @@ def test_every_decision_is_solved_to_the_gap_that_was_asked_for(flight):
 
 def test_the_sizes_that_are_told_are_those_of_the_program(flight):
     _, solved = flight
-    planner = paper(horizon=7)
+    planner = paper(horizon=6)
     form = FORMULATIONS[planner.options.formulation]
     built, _ = form.build(first_problem(planner), PAPER_OCP)
     first = solved[0]
@@ -198,10 +198,10 @@ def test_every_formulation_has_the_optimum_of_the_papers_own_rows(step, uas):
 def test_the_formulations_agree_where_nothing_is_asked_between_samples():
     start = state((50.0, 50.0, -10.0), (8.0, 0.0, 0.0))
     other = state((84.0, 58.0, -10.0), (-6.0, 0.0, 0.0))
-    balloon = moving([(66.0 - n, 50.0, -10.0) for n in range(5)], radius_m=2.0)
+    balloon = moving([(66.0 - n, 50.0, -10.0) for n in range(4)], radius_m=2.0)
     problem = toy(
         *(start, other),
-        horizon=4,
+        horizon=3,
         moving_obstacles=[balloon],
         waypoints=[((78.0, 53.0, -10.0), 7.0)],
         corners_of_all=False,

@@ -7,7 +7,7 @@ from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
 from uas_coverage_env.flight import accomplished, load_planner, rollout
-from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import VZ
 from uas_coverage_env.world import LANDED
@@ -133,7 +133,8 @@ def test_a_uas_that_is_at_home_and_still_moves_comes_to_rest_and_lands(horizon):
 
 @pytest.mark.slow
 def test_a_whole_mission_is_flown_to_its_end_without_a_violation():
-    options = {"deterministic": "true", "horizon": "16", "teams": "2"}
-    flight = rollout(load_scenario("open_field"), load_planner("milp-mpc", options), seed=0)
+    options = {"deterministic": "true", "horizon": "12", "teams": "2"}
+    town = generate_scenario(12, n_uas=2, n_waypoints=4, n_obstacles=2)
+    flight = rollout(town, load_planner("milp-mpc", options), seed=0)
     assert accomplished(flight)
     assert flight.breaches == 0

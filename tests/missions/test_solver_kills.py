@@ -79,11 +79,15 @@ def at_random(seed, first_run=()):
     return failures
 
 
+def town_of(n_uas):
+    """UAS among four blocks, and a balloon that drifts across their ways."""
+    built = generate_scenario(7, n_uas=n_uas, n_waypoints=5, n_obstacles=4)
+    return with_balloon(built, start_m=(200.0, 150.0, -18.0), velocity_mps=(-1.5, -1.0, 0.0))
+
+
 @pytest.fixture(scope="module")
 def town():
-    """Three UAS among four blocks, and a balloon that drifts across their ways."""
-    built = generate_scenario(7, n_uas=3, n_waypoints=5, n_obstacles=4)
-    return with_balloon(built, start_m=(200.0, 150.0, -18.0), velocity_mps=(-1.5, -1.0, 0.0))
+    return town_of(3)
 
 
 def judged(flight, directory):
@@ -96,13 +100,14 @@ def judged(flight, directory):
 
 
 @pytest.mark.parametrize(
-    ("seed", "first_run", "options"), [(0, (5, 8), QUICK), (1, (30,), QUICK), (3, (), TOGETHER)]
+    ("seed", "first_run", "options", "n_uas"),
+    [(0, (5, 8), QUICK, 3), (1, (30,), QUICK, 3), (3, (), TOGETHER, 2)],
 )
 def test_a_mission_survives_a_solver_killed_at_random(
-    monkeypatch, tmp_path, town, seed, first_run, options
+    monkeypatch, tmp_path, seed, first_run, options, n_uas
 ):
     planner = Killed(load_planner("milp-mpc", options), at_random(seed, first_run), monkeypatch)
-    flight = rollout(town, planner, max_steps=200)
+    flight = rollout(town_of(n_uas), planner, max_steps=200)
     report = judged(flight, tmp_path / "flight")
     fallbacks = [decision.fallback for decision in flight.decisions]
     assert sum(planner.failed) >= 15, "a mission that nothing happens to proves nothing"

@@ -26,7 +26,9 @@ IN_TURNS = {
 @pytest.fixture(scope="module")
 def village(tmp_path_factory):
     directory = tmp_path_factory.mktemp("flights") / "village"
-    options = [word for item in IN_TURNS.items() for word in ("--option", "=".join(item))]
+    # one team for each decision, which halves the work: the missions below weigh up two
+    chosen = {**IN_TURNS, "teams": "1"}
+    options = [word for item in chosen.items() for word in ("--option", "=".join(item))]
     code = main(["run", "village", *options, "--out", str(directory)])
     return code, directory
 
@@ -40,8 +42,8 @@ def test_the_village_is_covered_in_time_and_every_uas_comes_home(village):
     assert summary["all_home"]
     assert summary["violations"] == []
     assert summary["breaches"] == 0
-    assert summary["steps"] <= 340, "324 when this was written"
-    assert summary["energy_Wh"] <= 27.5, "26.4 when this was written"
+    assert summary["steps"] <= 270, "255 when this was written"
+    assert summary["energy_Wh"] <= 25.5, "24.4 when this was written"
 
 
 @pytest.mark.slow
@@ -88,7 +90,7 @@ def test_the_summary_follows_from_the_rows_of_the_flight(village):
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "n_uas"), [(11, 1), (13, 3), (14, 4)])
 def test_generated_missions_are_flown_without_a_violation(seed, n_uas):
-    scenario = generate_scenario(seed, n_uas=n_uas, n_waypoints=9, n_obstacles=4)
+    scenario = generate_scenario(seed, n_uas=n_uas, n_waypoints=6, n_obstacles=4)
     flight = rollout(scenario, load_planner("milp-mpc", IN_TURNS), seed=seed)
     assert flight.violations == ()
     assert flight.breaches == 0

@@ -5,12 +5,13 @@ command is called or listed, so its module should import what is heavy only when
 """
 
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any, NoReturn
 
 from uas_coverage_env.cli.lazy import CommandEntry
 from uas_coverage_env.cli.output import one_line
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.installed import entry_points
 
 GROUP = "uas_coverage.commands"
 

@@ -11,13 +11,14 @@ import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.flight.planner import Planner

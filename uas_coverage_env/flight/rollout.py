@@ -5,7 +5,6 @@ import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from uas_coverage_env.disturbances import Disturbance
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.files.errors import PlannerError
+from uas_coverage_env.files.installed import version_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import interruptions_noted
@@ -28,8 +28,9 @@ from uas_coverage_env.simulation import Dynamics, World
 from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
 from uas_coverage_env.world.packs import swaps_alone
 
-_RECORDED_PACKAGES = ("uas-coverage-env", "numpy", "scipy", "numba", "highspy")
-_RECORDED_WHERE_INSTALLED = ("pyscipopt", "gurobipy")
+_RECORDED_PACKAGES = (
+    "uas-coverage-env", "numpy", "scipy", "numba", "highspy", "pyscipopt", "gurobipy",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -254,8 +255,6 @@ def _decide(
 
 def recorded_versions() -> dict[str, str]:
     """Package -> version of what decides how a flight comes out."""
-    packages = {name: version(name) for name in _RECORDED_PACKAGES}
-    for name in _RECORDED_WHERE_INSTALLED:
-        with contextlib.suppress(PackageNotFoundError):
-            packages[name] = version(name)
-    return {**packages, "python": platform.python_version()}
+    found = {name: version_of(name) for name in _RECORDED_PACKAGES}
+    installed = {name: version for name, version in found.items() if version is not None}
+    return {**installed, "python": platform.python_version()}

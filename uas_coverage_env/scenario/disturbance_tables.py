@@ -1,11 +1,11 @@
 """The tables `[disturbances.NAME]` of a scenario, each read by the package that installed NAME."""
 
 from collections.abc import Mapping
-from importlib.metadata import entry_points
 from typing import Annotated, Any
 
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
+from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import StrictModel, parse
 
 GROUP = "uas_coverage.disturbances"

@@ -7,11 +7,11 @@ is known by its name.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
 
+from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.scenario.families.courtyards import courtyards
 from uas_coverage_env.scenario.families.irregular import irregular
 from uas_coverage_env.scenario.families.low_charge import low_charge, with_charge_for

@@ -5,10 +5,10 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import entry_points
 from typing import Any
 
 from uas_coverage_baselines.milp_mpc.model.ocp import Block
+from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import InputError
 
 GROUP = "uas_coverage.blocks"
