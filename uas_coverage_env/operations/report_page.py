@@ -13,22 +13,38 @@ from uas_coverage_env.operations.convex import hull_of
 from uas_coverage_env.operations.formats.qgc import ZONES
 from uas_coverage_env.scenario import Obstacle
 
-_COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
-_OBSTACLE, _NO_FLY = "#bbb8b0", "#d9a29c"
+# custom properties of the style, so that the page can be light or dark
+_INK, _AREA, _FENCE, _WAYPOINT = "var(--ink)", "var(--area)", "var(--fence)", "var(--waypoint)"
+_OBSTACLE, _NO_FLY, _BAD = "var(--obstacle)", "var(--no-fly)", "var(--bad)"
 _FILLS = {_OBSTACLE: "obstacle", _NO_FLY: "no-fly zone"}
-_STYLE = """
-body{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#26282c}
-table{border-collapse:collapse;margin:1rem 0}
-th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
-th:first-child,td:first-child{text-align:left}
-td{white-space:nowrap}
-svg{width:100%;max-width:48rem;max-height:80vh;background:#eaebe0}
-svg text{font-weight:600;paint-order:stroke;stroke:#fff}
-.wide{overflow-x:auto}
-.key span{display:inline-block;margin-right:1rem}
-.key i{display:inline-block;width:.8em;height:.8em;margin-right:.3em}
-.bad{color:#c81e2d;font-weight:600}
-summary{cursor:pointer}
+_LIGHT = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
+_DARK = ("#4d9cc9", "#e28e4d", "#c481ae", "#4dbb9d", "#eebc4d", "#89cbf0", "#b2b3b4")
+
+
+def _of_uas(colours: Sequence[str]) -> str:
+    return "".join(f"--uas-{n}:{colour};" for n, colour in enumerate(colours))
+
+
+_STYLE = f"""
+:root{{color-scheme:light dark;--paper:#fff;--ink:#26282c;--edge:#ddd;--outside:#eaebe0;
+--area:#fff;--fence:#888;--obstacle:#bbb8b0;--no-fly:#d9a29c;--waypoint:#70be86;--bad:#c81e2d;
+{_of_uas(_LIGHT)}}}
+@media screen and (prefers-color-scheme:dark){{:root{{--paper:#131618;--ink:#e9e9e4;--edge:#363c3f;
+--outside:#181c1d;--area:#262b2b;--fence:#c9ccc8;--obstacle:#5d5f5f;--no-fly:#7d4440;
+--waypoint:#70be86;--bad:#ff5a5f;{_of_uas(_DARK)}}}}}
+body{{font:15px system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;
+color:var(--ink);background:var(--paper)}}
+table{{border-collapse:collapse;margin:1rem 0}}
+th,td{{padding:.2rem .7rem;text-align:right;border-bottom:1px solid var(--edge)}}
+th:first-child,td:first-child{{text-align:left}}
+td{{white-space:nowrap}}
+svg{{width:100%;max-width:48rem;max-height:80vh;background:var(--outside)}}
+svg text{{font-weight:600;paint-order:stroke;stroke:var(--area);fill:var(--ink)}}
+.wide{{overflow-x:auto}}
+.key span{{display:inline-block;margin-right:1rem}}
+.key i{{display:inline-block;width:.8em;height:.8em;margin-right:.3em}}
+.bad{{color:var(--bad);font-weight:600}}
+summary{{cursor:pointer}}
 """
 _NOTE = (
     "Times, charges and delays are those of a model of how ArduCopter flies the files, in still "
@@ -200,45 +216,41 @@ def _map(parts: Sequence[Part]) -> str:
     low, high = corners_m.min(axis=0), corners_m.max(axis=0)
     span_m = float((high - low).max())
     pen = span_m / 400.0
-    shapes = [
-        _outline(scenario.fence.vertices_m, f'fill="#fff" stroke="#888" stroke-width="{pen}"')
-    ]
+    shapes = [_outline(scenario.fence.vertices_m, _drawn(pen, _FENCE, fill=_AREA))]
     shapes += [
-        _outline(hull.vertices_m, f'fill="{_fill_of(obstacle)}"', obstacle.name)
+        _outline(hull.vertices_m, f'style="fill:{_fill_of(obstacle)}"', obstacle.name)
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
     ]
     shapes += [
         f'<circle cx="{w.position_m[1]:.1f}" cy="{-w.position_m[0]:.1f}" r="{w.radius_m:g}" '
-        f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
+        f"{_drawn(pen / 2, _WAYPOINT)}/>"
         for w in scenario.waypoints
     ]
     homes: dict[str, tuple[float, float]] = {}
     names = parts[0].flight.names
     files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
     for n, one in files:
-        colour = _COLOURS[n % len(_COLOURS)]
+        colour = _colour(n)
         line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
         shapes.append(
-            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="{1.5 * pen}">'
+            f'<polyline points="{line}" {_drawn(1.5 * pen, colour)}>'
             f"<title>{escape(one.track.name)}</title></polyline>"
         )
         x, y, _ = one.track.home_m
-        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
+        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" style="fill:{colour}"/>')
         homes[names[n]] = (y, -x)
         if one.track.lands_elsewhere:
             x, y, _ = one.track.landing_m
             shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="none" stroke="{colour}" '
-                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: landing</title>'
-                "</circle>"
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_drawn(2 * pen, colour)}>'
+                f"<title>{escape(one.track.name)}: landing</title></circle>"
             )
         lost = one.point_of_no_return
         if lost is not None:
             x, y, _ = one.track.legs[lost].end_m
             shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" fill="none" stroke="#c81e2d" '
-                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: point of no return'
-                f"</title></circle>"
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" {_drawn(2 * pen, _BAD)}>'
+                f"<title>{escape(one.track.name)}: point of no return</title></circle>"
             )
     around = 0.02 * span_m
     for name, (x, y) in homes.items():
@@ -260,14 +272,14 @@ def _scale(west: float, south: float, span_m: float, pen: float) -> str:
     long_m = scale_step_m(span_m)
     bar = f"M{west + 4 * pen:.1f} {south - 4 * pen:.1f}h{long_m:g}"
     words = _words(f"{long_m:g} m, N \N{UPWARDS ARROW}", west + 4 * pen, south - 8 * pen, pen)
-    return f'<path d="{bar}" stroke="#26282c" stroke-width="{2 * pen:.1f}"/>{words}'
+    return f'<path d="{bar}" {_drawn(2 * pen, _INK)}/>{words}'
 
 
 def _key(parts: Sequence[Part]) -> str:
     """What is what on the map."""
     flight = parts[0].flight
     entries = [
-        (_COLOURS[n % len(_COLOURS)], "50%", name)
+        (_colour(n), "50%", name)
         for n, name in enumerate(flight.names)
         if any(part.of(name) for part in parts)
     ]
@@ -278,6 +290,16 @@ def _key(parts: Sequence[Part]) -> str:
         for colour, corner, name in entries
     )
     return f'<p class="key">{marks}<span>green circles: waypoints</span></p>'
+
+
+def _drawn(width_m: float, colour: str, fill: str = "none") -> str:
+    """How a shape is drawn."""
+    return f'style="fill:{fill};stroke:{colour}" stroke-width="{width_m:g}"'
+
+
+def _colour(n: int) -> str:
+    """That of the n-th UAS."""
+    return f"var(--uas-{n % len(_LIGHT)})"
 
 
 def _fill_of(obstacle: Obstacle) -> str:
