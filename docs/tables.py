@@ -12,7 +12,7 @@ import json
 import re
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -33,7 +33,12 @@ from uas_coverage_env.env.observation import (
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.flight.registry import GROUP, KINDS, describe_planners
+from uas_coverage_env.flight.registry import (
+    GROUP,
+    KINDS,
+    PlannerDescription,
+    describe_planners,
+)
 from uas_coverage_env.scenario.events import EVENT_KINDS, EventTable
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -285,20 +290,37 @@ def planners() -> str:
     """Every planner of this repository with its options."""
     project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     ours = {name for group in (GROUP, KINDS) for name in project["entry-points"][group]}
-    parts = []
+    families: dict[str, list[PlannerDescription]] = {}
     for planner in describe_planners():
         if planner.name.partition(":")[0] not in ours:
             continue
         if planner.missing:
             raise ValueError(f"planner {planner.name} cannot be described: {planner.missing}")
-        parts += [f"**{planner.name}**: {planner.summary}"]
-        if planner.options:
-            rows = [
-                (f"`{o.name}`", o.values.replace("|", "\\|"), o.default, o.description)
-                for o in planner.options
-            ]
-            parts.append(table(("option", "values", "default", "meaning"), rows))
-    return "\n\n".join(parts)
+        kin = _FAMILY if planner.name.startswith(_FAMILY) else planner.name
+        families.setdefault(kin, []).append(planner)
+    return "\n\n".join(map(_options, families.values()))
+
+
+_FAMILY = "milp-mpc"
+"""What the names of planners begin with that share a table, as they share most options."""
+
+
+def _options(family: Sequence[PlannerDescription]) -> str:
+    """One table, with a column for each planner's defaults; of a planner alone, just `default`."""
+    defaults: dict[tuple[str, str, str], dict[str, str]] = {}
+    for planner in family:
+        for o in planner.options:
+            key = (o.name, o.values, o.description)
+            defaults.setdefault(key, {})[planner.name] = o.default
+    columns = ["default"] if len(family) == 1 else [f"`{planner.name}`" for planner in family]
+    rows = [
+        (f"`{name}`", values.replace("|", "\\|"), *(of.get(p.name, "") for p in family), meaning)
+        for (name, values, meaning), of in sorted(defaults.items(), key=lambda it: -len(it[1]))
+    ]
+    lines = [f"**{planner.name}**: {planner.summary}" for planner in family]
+    if rows:
+        lines.append(table(("option", "values", *columns, "meaning"), rows))
+    return "\n\n".join(lines)
 
 
 PARTS: dict[str, Callable[[], str]] = {
