@@ -4,8 +4,9 @@
     python benchmarks/put_table.py sweep test    the same planners on the `test` set
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (`table.md`
-without what its columns mean, and without single scenarios) and of `README.md` (a short table), and copies the picture to `docs/pictures`; or the
-short table between the marks `<!-- test -->` of `baselines/README.md`.
+without what its columns mean, and without single scenarios) and of `README.md` (a short table),
+and copies the picture to `docs/pictures`; or the short table between the marks `<!-- test -->` of
+`baselines/README.md`.
 Exits 2 where a file or a mark is missing, or a file was damaged.
 """
 

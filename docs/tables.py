@@ -39,7 +39,7 @@ from uas_coverage_env.flight.registry import (
     PlannerDescription,
     describe_planners,
 )
-from uas_coverage_env.scenario.events import EVENT_KINDS, EventTable
+from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
 DOCS = Path(__file__).resolve().parent
@@ -218,40 +218,37 @@ def scenario_fields() -> str:
 
 
 def event_fields() -> str:
-    """One table per kind of event."""
-    return _keys(_events(scenario_schema()["$defs"]))
+    """The keys of all kinds of event, those that kinds share once."""
+    parts = scenario_schema()["$defs"]
+    having: dict[tuple[str, str, str, str], list[str]] = {}
+    for kind in EVENT_KINDS:
+        part = parts[kind.__name__]
+        own = dict(part["properties"])
+        name = own.pop("kind")["const"]
+        for key, entry in own.items():
+            having.setdefault(_key(key, entry, part), []).append(f"`{name}`")
+    everyone = len(EVENT_KINDS)
+    rows = [
+        (key, "all" if len(kinds) == everyone else ", ".join(kinds), *rest)
+        for (key, *rest), kinds in having.items()
+    ]
+    return table(("key", "of `kind`", "value", "", "meaning"), rows)
 
 
 def _keys(tables: list[tuple[str, dict[str, Any]]]) -> str:
     parts = []
     for title, part in tables:
-        rows = [
-            (
-                f"`{name}`",
-                _type(entry),
-                "required" if name in part.get("required", ()) else "optional",
-                entry["description"],
-            )
-            for name, entry in part["properties"].items()
-        ]
+        rows = [_key(name, entry, part) for name, entry in part["properties"].items()]
         parts += [f"### {title}", part["description"]]
         if rows:
             parts += [table(("key", "value", "", "meaning"), rows)]
     return "\n\n".join(parts)
 
 
-def _events(parts: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """What all kinds of events have, then a table for each kind."""
-    first = parts[EVENT_KINDS[0].__name__]
-    shared = {name: first["properties"][name] for name in EventTable.model_fields}
-    description = inspect.getdoc(EventTable) or ""
-    tables = [("`[[events]]`", {"properties": shared, "description": description.splitlines()[0]})]
-    for kind in EVENT_KINDS:
-        part = parts[kind.__name__]
-        own = {name: entry for name, entry in part["properties"].items() if name not in shared}
-        name = own.pop("kind")["const"]
-        tables.append((f'`[[events]]` of `kind = "{name}"`', {**part, "properties": own}))
-    return tables
+def _key(name: str, entry: dict[str, Any], part: dict[str, Any]) -> tuple[str, str, str, str]:
+    """A row: the key, its values, whether it is needed, what it means."""
+    needed = "required" if name in part.get("required", ()) else "optional"
+    return f"`{name}`", _type(entry), needed, entry["description"]
 
 
 def _type(entry: dict[str, Any]) -> str:
@@ -323,11 +320,17 @@ def _options(family: Sequence[PlannerDescription]) -> str:
     return "\n\n".join(lines)
 
 
+def _without_meanings(rows: str) -> str:
+    """Of a table of features, the columns of indices and names."""
+    cut = [line.split("|")[1:3] for line in rows.splitlines()]
+    return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
+
+
 PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
-    "observation_local": lambda: layout_table(local()),
+    "observation_local": lambda: _without_meanings(layout_table(local())),
     "observation_grid": picture_channels,
     "observation_full_state": lambda: layout_table(full_state(2, 3, 1)),
     "actions": action_tables,
