@@ -24,7 +24,10 @@ export class ProfileChart extends TimeCanvas {
     this.canvas.classList.add("profile");
     this.altitudes = flight.scene.uas.map((_, i) => heights(flight, i));
     this.floors = flight.scene.uas.map((_, i) => flight.column(flight.data.floor, i));
-    const shown = all.flatMap((each) => each.scene.uas.flatMap((_, i) => heights(each, i)));
+    const shown = all.flatMap((each) => [
+      ...each.scene.uas.flatMap((_, i) => heights(each, i)),
+      ...each.scene.waypoints.filter((_, w) => each.data.covered_at[w] < each.data.samples).map(({ at }) => -at[2]),
+    ]);
     this.high = Math.max(1, shown.reduce((a, b) => Math.max(a, b), 0)) * 1.08;
   }
 
