@@ -2,11 +2,12 @@
 
     python benchmarks/put_table.py sweep         the leaderboard
     python benchmarks/put_table.py sweep test    the same planners on the `test` set
-    python benchmarks/put_table.py sweep light   in light wind; likewise moderate, strong
+    python benchmarks/put_table.py sweep light   in light wind; likewise moderate, strong, karhula
 
-Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (all of
-`table.md`) and of `README.md` (a short table), and copies the picture to `docs/pictures`; or a
-short table between the marks of another name (`<!-- test -->`) of `baselines/README.md`.
+Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (`table.md`
+without what its columns mean, and without single scenarios) and of `README.md` (a short table),
+and copies the picture to `docs/pictures`; or a short table between the marks of another name
+(`<!-- test -->`) of `baselines/README.md`.
 Exits 2 where a file or a mark is missing, or a file was damaged.
 """
 
@@ -21,7 +22,8 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 WIND = ("light", "moderate", "strong")
-MARKS = ("leaderboard", "test", *WIND)
+MARKS = ("leaderboard", "test", "karhula", *WIND)
+COLUMNS_EXPLAINED = "Interquartile means"
 PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
 
 
@@ -109,7 +111,7 @@ def main(folder: str, mark: str = "leaderboard") -> int:
         short = _short(sweep, mark)
         contents = {ROOT / "baselines" / "README.md": short}
         if mark == "leaderboard":
-            long = (sweep / "table.md").read_text(encoding="utf-8")
+            long = _long((sweep / "table.md").read_text(encoding="utf-8"))
             contents = {ROOT / "README.md": short, ROOT / "baselines" / "README.md": long}
         texts = {}
         for path, content in contents.items():
@@ -125,6 +127,11 @@ def main(folder: str, mark: str = "leaderboard") -> int:
         sys.stderr.write(f"error: {error}\n")
         return 2
     return 0
+
+
+def _long(table: str) -> str:
+    """The table up to the words on its columns, which `docs/leaderboard.md` explains."""
+    return table.partition(f"\n{COLUMNS_EXPLAINED}")[0]
 
 
 def _short(sweep: Path, mark: str) -> str:

@@ -23,11 +23,11 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env import Flight
 
-PAGE_PX = (1240, 699)
+PAGE_PX = (1280, 721)
 SCALE = 2  # without a graphics card edges are smooth only if they are drawn larger
 GIF_PX = (880, 496)
 COLOURS = 128
-FRAME_MS = 80
+FRAME_MS = 120
 LAST_FRAME_MS = 2000
 _DRAWN = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))"
 
@@ -88,7 +88,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Record a replay page as a GIF.")
     parser.add_argument("flight", type=Path, help="flight directory that holds a replay.html")
     parser.add_argument("gif", type=Path, help="file to write")
-    parser.add_argument("--stride", type=int, default=2, help="steps of flight per picture")
+    parser.add_argument("--stride", type=int, default=3, help="steps of flight per picture")
     arguments = parser.parse_args()
     steps = Flight.load(arguments.flight).steps
     driver = browser()

@@ -12,7 +12,7 @@ import json
 import re
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -33,8 +33,13 @@ from uas_coverage_env.env.observation import (
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.flight.registry import GROUP, KINDS, describe_planners
-from uas_coverage_env.scenario.events import EVENT_KINDS, EventTable
+from uas_coverage_env.flight.registry import (
+    GROUP,
+    KINDS,
+    PlannerDescription,
+    describe_planners,
+)
+from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
 DOCS = Path(__file__).resolve().parent
@@ -213,40 +218,37 @@ def scenario_fields() -> str:
 
 
 def event_fields() -> str:
-    """One table per kind of event."""
-    return _keys(_events(scenario_schema()["$defs"]))
+    """The keys of all kinds of event, those that kinds share once."""
+    parts = scenario_schema()["$defs"]
+    having: dict[tuple[str, str, str, str], list[str]] = {}
+    for kind in EVENT_KINDS:
+        part = parts[kind.__name__]
+        own = dict(part["properties"])
+        name = own.pop("kind")["const"]
+        for key, entry in own.items():
+            having.setdefault(_key(key, entry, part), []).append(f"`{name}`")
+    everyone = len(EVENT_KINDS)
+    rows = [
+        (key, "all" if len(kinds) == everyone else ", ".join(kinds), *rest)
+        for (key, *rest), kinds in having.items()
+    ]
+    return table(("key", "of `kind`", "value", "", "meaning"), rows)
 
 
 def _keys(tables: list[tuple[str, dict[str, Any]]]) -> str:
     parts = []
     for title, part in tables:
-        rows = [
-            (
-                f"`{name}`",
-                _type(entry),
-                "required" if name in part.get("required", ()) else "optional",
-                entry["description"],
-            )
-            for name, entry in part["properties"].items()
-        ]
+        rows = [_key(name, entry, part) for name, entry in part["properties"].items()]
         parts += [f"### {title}", part["description"]]
         if rows:
             parts += [table(("key", "value", "", "meaning"), rows)]
     return "\n\n".join(parts)
 
 
-def _events(parts: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """What all kinds of events have, then a table for each kind."""
-    first = parts[EVENT_KINDS[0].__name__]
-    shared = {name: first["properties"][name] for name in EventTable.model_fields}
-    description = inspect.getdoc(EventTable) or ""
-    tables = [("`[[events]]`", {"properties": shared, "description": description.splitlines()[0]})]
-    for kind in EVENT_KINDS:
-        part = parts[kind.__name__]
-        own = {name: entry for name, entry in part["properties"].items() if name not in shared}
-        name = own.pop("kind")["const"]
-        tables.append((f'`[[events]]` of `kind = "{name}"`', {**part, "properties": own}))
-    return tables
+def _key(name: str, entry: dict[str, Any], part: dict[str, Any]) -> tuple[str, str, str, str]:
+    """A row: the key, its values, whether it is needed, what it means."""
+    needed = "required" if name in part.get("required", ()) else "optional"
+    return f"`{name}`", _type(entry), needed, entry["description"]
 
 
 def _type(entry: dict[str, Any]) -> str:
@@ -285,27 +287,50 @@ def planners() -> str:
     """Every planner of this repository with its options."""
     project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     ours = {name for group in (GROUP, KINDS) for name in project["entry-points"][group]}
-    parts = []
+    families: dict[str, list[PlannerDescription]] = {}
     for planner in describe_planners():
         if planner.name.partition(":")[0] not in ours:
             continue
         if planner.missing:
             raise ValueError(f"planner {planner.name} cannot be described: {planner.missing}")
-        parts += [f"**{planner.name}**: {planner.summary}"]
-        if planner.options:
-            rows = [
-                (f"`{o.name}`", o.values.replace("|", "\\|"), o.default, o.description)
-                for o in planner.options
-            ]
-            parts.append(table(("option", "values", "default", "meaning"), rows))
-    return "\n\n".join(parts)
+        kin = _FAMILY if planner.name.startswith(_FAMILY) else planner.name
+        families.setdefault(kin, []).append(planner)
+    return "\n\n".join(map(_options, families.values()))
+
+
+_FAMILY = "milp-mpc"
+"""What the names of planners begin with that share a table, as they share most options."""
+
+
+def _options(family: Sequence[PlannerDescription]) -> str:
+    """One table, with a column for each planner's defaults; of a planner alone, just `default`."""
+    defaults: dict[tuple[str, str, str], dict[str, str]] = {}
+    for planner in family:
+        for o in planner.options:
+            key = (o.name, o.values, o.description)
+            defaults.setdefault(key, {})[planner.name] = o.default
+    columns = ["default"] if len(family) == 1 else [f"`{planner.name}`" for planner in family]
+    rows = [
+        (f"`{name}`", values.replace("|", "\\|"), *(of.get(p.name, "") for p in family), meaning)
+        for (name, values, meaning), of in sorted(defaults.items(), key=lambda it: -len(it[1]))
+    ]
+    lines = [f"**{planner.name}**: {planner.summary}" for planner in family]
+    if rows:
+        lines.append(table(("option", "values", *columns, "meaning"), rows))
+    return "\n\n".join(lines)
+
+
+def _without_meanings(rows: str) -> str:
+    """Of a table of features, the columns of indices and names."""
+    cut = [line.split("|")[1:3] for line in rows.splitlines()]
+    return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
 PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
-    "observation_local": lambda: layout_table(local()),
+    "observation_local": lambda: _without_meanings(layout_table(local())),
     "observation_grid": picture_channels,
     "observation_full_state": lambda: layout_table(full_state(2, 3, 1)),
     "actions": action_tables,

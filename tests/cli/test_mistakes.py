@@ -70,6 +70,8 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
+        (["run"], "Name of a shipped scenario"),
+        (["export", "flown", "--out", "plans"], "--format': qgc (.plan)"),
         (["run", "atlantis"], "atlantis"),
         (["run", "no/such/file.toml"], "no/such/file.toml"),
         (["scenarios", "check", "no/such/file.toml"], "no/such/file.toml"),

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 import warnings
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
@@ -293,6 +294,16 @@ def test_the_page_shows_every_uas_and_needs_no_network(flight, place):
     assert words[-1].endswith(" m, N ↑")
     assert all(name in svg.attrib["aria-label"] for name in names)
     assert 'name="viewport"' in page
+
+
+def test_every_colour_of_the_page_is_declared_for_light_and_for_dark(flight, place):
+    page = exported(flight, place, "csv").files["report.html"]
+    light, dark = page.split("prefers-color-scheme:dark")
+    declared = [set(re.findall(r"(--[\w-]+):", half.split("body{")[0])) for half in (light, dark)]
+    assert declared[0] == declared[1] >= set(re.findall(r"var\((--[\w-]+)\)", page))
+    shapes = page[page.index("<svg") : page.index("</svg>")]
+    assert "var(--uas-0)" in shapes
+    assert "#" not in shapes
 
 
 @pytest.fixture(scope="module")

@@ -99,7 +99,9 @@ def entries_at(flight, step):
 
 def test_the_legend_says_only_what_is_on_the_map_at_its_sample(flight):
     charge = {"charged", "medium", "discharged"}
-    assert charge | {"geofence", "height"} <= entries_at(flight, 25)
+    assert charge | {"geofence", "height", "predicted"} <= entries_at(flight, 25)
+    elsewhere = dataclasses.replace(flight, plan=flight.plan[flight.plan["step"] != 25])
+    assert "predicted" not in entries_at(elsewhere, 25)
     mode = np.full_like(flight.mode, MODES.index("landed"))
     mode[:, 1] = MODES.index("lost")
     over = entries_at(dataclasses.replace(flight, mode=mode), 25)
@@ -111,8 +113,8 @@ def test_the_path_of_a_moving_obstacle_is_drawn_once_it_has_moved(flight):
     moved_m = flight.moving_position_m.copy()
     moved_m[10:, 0, 0] += 50.0
     moved = dataclasses.replace(flight, moving_position_m=moved_m)
-    assert "path of it" not in entries_at(moved, 5)
-    assert "path of it" in entries_at(moved, 25)
+    assert "its path" not in entries_at(moved, 5)
+    assert "its path" in entries_at(moved, 25)
     drawn = lines(map_figure(moved, step=25).axes[0])
     assert any(np.array_equal(line, moved_m[:26, 0, [1, 0]]) for line in drawn)
 

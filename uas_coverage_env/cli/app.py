@@ -195,6 +195,9 @@ def _of_the_command_line(error: typer.TyperException) -> str:
     if close:
         return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"
     message = error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
+    what = getattr(getattr(error, "param", None), "help", None)
+    if message.startswith("Missing ") and message.endswith("'.") and what:
+        return f"{message.removesuffix('.')}: {what}"
     if message.startswith("No such command") and "Did you mean" not in message:
         context = getattr(error, "ctx", None)
         known = list(getattr(context and context.command, "commands", ()))

@@ -14,14 +14,29 @@ from uas_coverage_env.operations.convex import hull_of
 from uas_coverage_env.operations.formats.qgc import ZONES
 from uas_coverage_env.scenario import Decoration, Obstacle
 
-_COLOURS = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
-_OBSTACLE, _NO_FLY, _SEARCH, _STREET = "#bbb8b0", "#d9a29c", "#f3eedd", "#e3e3e0"
+# custom properties of the page's style, so that it can be light or dark
+_INK, _AREA, _FENCE, _WAYPOINT = "var(--ink)", "var(--area)", "var(--fence)", "var(--waypoint)"
+_OBSTACLE, _NO_FLY, _BAD = "var(--obstacle)", "var(--no-fly)", "var(--bad)"
+_SEARCH, _STREET = "var(--search)", "var(--street)"
+_OF_UAS_LIGHT = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
+_OF_UAS_DARK = ("#4d9cc9", "#e28e4d", "#c481ae", "#4dbb9d", "#eebc4d", "#89cbf0", "#b2b3b4")
 _FILLS = {
     _SEARCH: "area to search",
     _STREET: "street",
     _OBSTACLE: "obstacle",
     _NO_FLY: "no-fly zone",
 }
+
+
+def _of_uas(colours: Sequence[str]) -> str:
+    return "".join(f"--uas-{n}:{colour};" for n, colour in enumerate(colours))
+
+
+LIGHT = f"""--area:#fff;--fence:#888;--obstacle:#bbb8b0;--no-fly:#d9a29c;--search:#f3eedd;
+--street:#e3e3e0;--waypoint:#70be86;{_of_uas(_OF_UAS_LIGHT)}"""
+DARK = f"""--area:#262b2b;--fence:#c9ccc8;--obstacle:#5d5f5f;--no-fly:#7d4440;--search:#353224;
+--street:#343a3b;--waypoint:#70be86;{_of_uas(_OF_UAS_DARK)}"""
+"""Colours of the map, on light and on dark pages; `--ink` and `--bad` are the page's."""
 
 
 def map_of(parts: Sequence[Part]) -> str:
@@ -35,42 +50,39 @@ def map_of(parts: Sequence[Part]) -> str:
     low, high = corners_m.min(axis=0), corners_m.max(axis=0)
     span_m = float((high - low).max())
     pen = span_m / 400.0
-    shapes = [
-        _outline(scenario.fence.vertices_m, f'fill="#fff" stroke="#888" stroke-width="{pen}"')
-    ]
+    shapes = [_outline(scenario.fence.vertices_m, _drawn(pen, _FENCE, fill=_AREA))]
     shapes += [
-        _polygon([(-x, y) for x, y in item.polygon_m], f'fill="{fill}"', item.name)
+        _polygon([(-x, y) for x, y in item.polygon_m], _filled(fill), item.name)
         for item in scenario.decorations
         if (fill := _fill_of(item))
     ]
     shapes += [
-        _outline(hull.vertices_m, f'fill="{_fill_of(obstacle)}"', obstacle.name)
+        _outline(hull.vertices_m, _filled(_fill_of(obstacle)), obstacle.name)
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
     ]
     shapes += [
         f'<circle cx="{w.position_m[1]:.1f}" cy="{-w.position_m[0]:.1f}" r="{w.radius_m:g}" '
-        f'fill="none" stroke="#70be86" stroke-width="{pen / 2}"/>'
+        f"{_drawn(pen / 2, _WAYPOINT)}/>"
         for w in scenario.waypoints
     ]
     homes: dict[str, tuple[float, float]] = {}
     names = parts[0].flight.names
     files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
     for n, one in files:
-        colour = _COLOURS[n % len(_COLOURS)]
+        colour = _colour(n)
         line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
         shapes.append(
-            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="{1.5 * pen}">'
+            f'<polyline points="{line}" {_drawn(1.5 * pen, colour)}>'
             f"<title>{escape(one.track.name)}</title></polyline>"
         )
         x, y, _ = one.track.home_m
-        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="{colour}"/>')
+        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_filled(colour)}/>')
         homes[names[n]] = (y, -x)
         if one.track.lands_elsewhere:
             x, y, _ = one.track.landing_m
             shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" fill="none" stroke="{colour}" '
-                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: landing</title>'
-                "</circle>"
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_drawn(2 * pen, colour)}>'
+                f"<title>{escape(one.track.name)}: landing</title></circle>"
             )
         lost = one.still.point_of_no_return
         if lost is None and one.in_wind is not None:
@@ -78,9 +90,8 @@ def map_of(parts: Sequence[Part]) -> str:
         if lost is not None:
             x, y, _ = one.track.legs[lost].end_m
             shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" fill="none" stroke="#c81e2d" '
-                f'stroke-width="{2 * pen}"><title>{escape(one.track.name)}: point of no return'
-                f"</title></circle>"
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" {_drawn(2 * pen, _BAD)}>'
+                f"<title>{escape(one.track.name)}: point of no return</title></circle>"
             )
     around = 0.02 * span_m
     for name, (x, y) in homes.items():
@@ -102,7 +113,7 @@ def _scale(west: float, south: float, span_m: float, pen: float) -> str:
     long_m = scale_step_m(span_m)
     bar = f"M{west + 4 * pen:.1f} {south - 4 * pen:.1f}h{long_m:g}"
     words = _words(f"{long_m:g} m, N \N{UPWARDS ARROW}", west + 4 * pen, south - 8 * pen, pen)
-    return f'<path d="{bar}" stroke="#26282c" stroke-width="{2 * pen:.1f}"/>{words}'
+    return f'<path d="{bar}" {_drawn(2 * pen, _INK)}/>{words}'
 
 
 def key_of(parts: Sequence[Part]) -> str:
@@ -113,7 +124,7 @@ def key_of(parts: Sequence[Part]) -> str:
     """
     flight = parts[0].flight
     entries = [
-        (_COLOURS[n % len(_COLOURS)], "50%", name)
+        (_colour(n), "50%", name)
         for n, name in enumerate(flight.names)
         if any(part.of(name) for part in parts)
     ]
@@ -125,6 +136,20 @@ def key_of(parts: Sequence[Part]) -> str:
         for colour, corner, name in entries
     )
     return f'<p class="key">{marks}<span>green circles: waypoints</span></p>'
+
+
+def _drawn(width_m: float, colour: str, fill: str = "none") -> str:
+    """How a shape is drawn."""
+    return f'style="fill:{fill};stroke:{colour}" stroke-width="{width_m:g}"'
+
+
+def _filled(colour: str) -> str:
+    return f'style="fill:{colour}"'
+
+
+def _colour(n: int) -> str:
+    """That of the n-th UAS."""
+    return f"var(--uas-{n % len(_OF_UAS_LIGHT)})"
 
 
 def _fill_of(drawn: Decoration | Obstacle) -> str:

@@ -1,5 +1,8 @@
 // Of many curves what lies between the least and the greatest, and the one in the middle.
 
+/** What its curves are. */
+export const BAND_WORDS = "least, median";
+
 export interface Band {
   least: number[];
   median: number[];

@@ -1,8 +1,8 @@
 // One small chart over time: lines that are told apart by dashes and numbers as well as colour,
 // and a cursor at the time of the page.
 
-import { bandOf, drawBand } from "./band";
-import { noReturn, stroke, words } from "./marks";
+import { BAND_WORDS, bandOf, drawBand } from "./band";
+import { noReturn, stroke } from "./marks";
 import { bright, colour, legible } from "./palette";
 import { roundStep } from "./round_step";
 
@@ -132,12 +132,6 @@ export abstract class TimeCanvas {
     return LEFT + (time / Math.max(this.duration, 1e-9)) * (this.width - LEFT - RIGHT);
   }
 
-  /** What the curves of a band are, on it. */
-  protected bandWords(count: number, above: number): void {
-    const [x, y] = [this.width - RIGHT, this.height - BOTTOM - above];
-    words(this.pen, `least and median of ${count}`, x, y, 11, colour("--faint"), "right", 400);
-  }
-
   protected write(
     text: string,
     x: number,
@@ -188,7 +182,9 @@ export class Chart extends TimeCanvas {
     const content = (this.content = this.contentOf(this.focused));
     const { pen } = this;
     const [left, right] = [LEFT, this.width - RIGHT];
-    this.write(content.title, 2, 9, colour("--ink"), "left", 600);
+    const together = content.lines.filter((line) => line.uas !== undefined && !line.limit);
+    const many = together.length > MANY;
+    this.write(`${content.title}${many ? ` (${BAND_WORDS})` : ""}`, 2, 9, colour("--ink"), "left", 600);
     let beside = right;
     for (const [word, hex] of [...(content.legend ?? [])].reverse()) {
       beside -= this.write(word, beside, 9, legible(hex), "right", 600) + 8;
@@ -208,8 +204,6 @@ export class Chart extends TimeCanvas {
       pen.setLineDash([]);
       this.write(words, left + 4, y + 7, colour("--faint"));
     }
-    const together = content.lines.filter((line) => line.uas !== undefined && !line.limit);
-    const many = together.length > MANY;
     if (many) this.band(together);
     for (const line of content.lines) {
       if (!many || line.uas === undefined || line.uas === this.focused) this.line(line);
@@ -282,7 +276,6 @@ export class Chart extends TimeCanvas {
     const x = (k: number) => this.x(k * content.dt);
     const ink = this.focused === null ? "--accent" : "--faint";
     drawBand(pen, band, colour(ink), x, (value) => this.y(value));
-    this.bandWords(lines.length, 10);
   }
 
   private point({ sample, value, serious, colour: hex, words }: Point): void {

@@ -58,7 +58,7 @@ function charge(flight: Flight, focused: number | null): ChartContent {
     return [{ sample, value, serious: passed !== null, colour, words }];
   });
   return {
-    title: "Charge, %; dotted: for home",
+    title: `Charge, %${needed.length > 0 ? "; dotted: for home" : ""}`,
     lines: [...lines(flight, flight.data.soc, 100), ...needed],
     points,
     dt: flight.data.dt_s,

@@ -109,7 +109,7 @@ export function landed(pen: Pen, x: number, y: number, radius: number, hex: stri
 /** A UAS of another flight: a thin ring, its number with a stroke. */
 export function ghost(pen: Pen, x: number, y: number, radius: number, label: string, hex: string): void {
   ring(pen, x, y, radius, 2 * Math.PI, 0.16 * radius, bright(hex));
-  words(pen, `${label}′`, x + 1.2 * radius, y + 1.1 * radius, 0.9 * radius, legible(hex));
+  words(pen, `${label}′`, x + 1.2 * radius, y + 1.1 * radius, Math.max(11, 0.9 * radius), legible(hex));
 }
 
 /** A red cross: a UAS that is lost, or a violation. */

@@ -1,6 +1,6 @@
 // The height profile under the map: UAS, roofs and the least height over them, waypoints covered.
 
-import { type Band, bandOf, drawBand } from "./band";
+import { type Band, BAND_WORDS, bandOf, drawBand } from "./band";
 import { DASHES, LEFT, RIGHT, TimeCanvas } from "./chart";
 import type { Flight } from "./flight";
 import { shortName, stroke } from "./marks";
@@ -24,25 +24,30 @@ export class ProfileChart extends TimeCanvas {
     this.canvas.classList.add("profile");
     this.altitudes = flight.scene.uas.map((_, i) => heights(flight, i));
     this.floors = flight.scene.uas.map((_, i) => flight.column(flight.data.floor, i));
-    const shown = all.flatMap((each) => each.scene.uas.flatMap((_, i) => heights(each, i)));
+    const shown = all.flatMap((each) => [
+      ...each.scene.uas.flatMap((_, i) => heights(each, i)),
+      ...each.scene.waypoints.filter((_, w) => each.data.covered_at[w] < each.data.samples).map(({ at }) => -at[2]),
+    ]);
     this.high = Math.max(1, shown.reduce((a, b) => Math.max(a, b), 0)) * 1.08;
   }
 
   protected drawStill(): void {
     const { pen, flight } = this;
     const least = flight.data.min_height_m;
-    const dashed = least > 0 && this.width > WIDE ? " (dashed: least height)" : "";
-    this.write(`Height, m${dashed}`, 2, 9, colour("--ink"), "left", 600);
+    const uas = flight.scene.uas.map((_, i) => i);
+    const many = uas.length > MANY;
+    const looked = this.focused === null ? (uas.length <= FEW ? uas : []) : [this.focused];
+    const dashed = least > 0 && looked.length > 0 && this.width > WIDE;
+    const notes = [...(many ? [BAND_WORDS] : []), ...(dashed ? ["dashed: least height"] : [])];
+    const title = `Height, m${notes.length > 0 ? ` (${notes.join("; ")})` : ""}`;
+    this.write(title, 2, 9, colour("--ink"), "left", 600);
     const step = roundStep(this.high / 2);
     for (let at = 0; at <= this.high; at += step) {
       const y = this.y(at);
       stroke(pen, LEFT, y, this.width - RIGHT, y, 1, colour("--grid"));
       this.write(String(at), LEFT - 5, y, colour("--faint"), "right");
     }
-    const uas = flight.scene.uas.map((_, i) => i);
-    const looked = this.focused === null ? (uas.length <= FEW ? uas : []) : [this.focused];
     for (const i of looked) this.below(i);
-    const many = uas.length > MANY;
     if (many) this.band();
     for (const i of many ? looked : uas) {
       pen.globalAlpha = this.focused === null || this.focused === i ? 1 : 0.2;
@@ -75,7 +80,6 @@ export class ProfileChart extends TimeCanvas {
     const x = (k: number) => this.x(k * this.flight.data.dt_s);
     const ink = this.focused === null ? "--accent" : "--faint";
     drawBand(this.pen, this.spread, colour(ink), x, (height) => this.y(height));
-    this.bandWords(this.flight.uas, 8);
   }
 
   protected words(time: number): string {

@@ -111,7 +111,7 @@ export class SceneView implements View {
     this.moving.draw(moment);
     this.renderer.render(this.scene, lens);
     this.pen.clearRect(0, 0, width, height);
-    for (const [text, point] of this.terrain.signs) {
+    for (const [text, point] of this.extent.signs) {
       const at = this.pixel(point);
       if (at) words(this.pen, text, ...at, Math.max(11, 15 * size), colour("--faint"));
     }

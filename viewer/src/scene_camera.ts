@@ -2,6 +2,7 @@
 
 import { Box3, PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { place } from "./scene_space";
 import type { Extent } from "./scene_terrain";
 import type { Pose } from "./view";
 
@@ -46,7 +47,7 @@ export class Camera {
   /** Whether a hand moves it just now. */
   byHand = false;
 
-  /** From the south, so far away that the whole fence is in the picture. */
+  /** From the south, so far away that the whole fence and the words beside it are in the picture. */
   overview(): void {
     this.lookFrom(new Vector3(-0.12, this.lens.aspect > 1.2 ? 0.85 : 1.3, 1));
   }
@@ -88,7 +89,8 @@ export class Camera {
   private lookFrom(direction: Vector3): void {
     this.followed = null;
     this.orbit.enablePan = this.orbit.zoomToCursor = true;
-    const { centre, half, ground, corners } = this.extent;
+    const { centre, half, ground, corners, signs } = this.extent;
+    const whole = [...corners, ...signs.map(([, at]) => place(at))];
     const target = new Vector3(centre.x, ground, centre.z);
     direction.normalize();
     // from a distance that is enough: centre what is seen, come as close as it stays in the picture
@@ -98,7 +100,7 @@ export class Camera {
       this.lens.lookAt(target);
       this.lens.updateMatrixWorld();
       this.lens.updateProjectionMatrix();
-      const seen = new Box3().setFromPoints(corners.map((corner) => corner.clone().project(this.lens)));
+      const seen = new Box3().setFromPoints(whole.map((corner) => corner.clone().project(this.lens)));
       const { x, y } = seen.getCenter(new Vector3());
       const height = distance * Math.tan((UPRIGHT_DEG * Math.PI) / 360);
       const axes = [new Vector3(), new Vector3(), new Vector3()];

@@ -37,7 +37,13 @@ export interface Extent {
   /** Height of the ground in the scene. */
   ground: number;
   corners: Vector3[];
+  /** Between the lines of the grid [m]. */
+  step: number;
+  signs: Sign[];
 }
+
+/** Words on the ground, and where. */
+export type Sign = [string, Point3];
 
 export function extentOf(scene: Scene): Extent {
   const corners = scene.fence.corners.map(([n, e, d]) => new Vector3(e, -d, -n));
@@ -45,18 +51,19 @@ export function extentOf(scene: Scene): Extent {
   const high = corners.reduce((a, b) => a.clone().max(b));
   const half = Math.max(high.x - low.x, high.z - low.z) / 2;
   const centre = low.clone().add(high).multiplyScalar(0.5);
-  return { centre, half, ground: low.y, corners };
+  const step = roundStep(half / 2);
+  const signs: Sign[] = [
+    ["N", [-low.z + 0.09 * half, centre.x, -low.y]],
+    [`grid ${step} m`, [-high.z - 0.08 * half, low.x + 0.5 * step, -low.y]],
+  ];
+  return { centre, half, ground: low.y, corners, step, signs };
 }
-
-/** Words on the ground, and where. */
-export type Sign = [string, Point3];
 
 /** What stands still, and what of it is there at a sample: events add obstacles and move homes. */
 export interface Terrain {
   group: Group;
   /** Show what is there; whether that is something else than before. */
   at(sample: number): boolean;
-  signs: Sign[];
 }
 
 export function terrain(scene: Scene, extent: Extent): Terrain {
@@ -71,7 +78,7 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
   outside.rotation.x = -Math.PI / 2;
   outside.position.set(centre.x, ground - 2 * layer, centre.z);
   group.add(outside, area(scene.fence.outline, colour("--ground"), ground - layer));
-  group.add(gridLines(scene.fence.outline, ground, half));
+  group.add(gridLines(scene.fence.outline, ground, extent.step));
   for (const item of scene.decorations) {
     group.add(area(item.outline, dim(item.colour), ground + (LAYERS[item.kind] ?? 2) * layer));
   }
@@ -88,13 +95,6 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
       changing.push({ part, from, until: homes[n + 1]?.from ?? Infinity });
     });
   }
-  const [south, north] = [Math.min, Math.max].map((pick) => pick(...extent.corners.map((c) => -c.z)));
-  const west = Math.min(...extent.corners.map((corner) => corner.x));
-  const step = roundStep(half / 2);
-  const signs: Sign[] = [
-    ["N", [north + 0.09 * half, centre.x, -ground]],
-    [`grid ${step} m`, [south - 0.08 * half, west + 0.5 * step, -ground]],
-  ];
   const fence = new EdgesGeometry(bodyGeometry(scene.fence), 1);
   group.add(new LineSegments(fence, new LineBasicMaterial({ color: colour("--fence") })));
   const at = (sample: number): boolean => {
@@ -102,7 +102,7 @@ export function terrain(scene: Scene, extent: Extent): Terrain {
     for (const { part } of wrong) part.visible = !part.visible;
     return wrong.length > 0;
   };
-  return { group, at, signs };
+  return { group, at };
 }
 
 /** Where a UAS starts and lands. */
@@ -125,8 +125,7 @@ function area(outline: Point2[], paint: string, height: number): Mesh {
 }
 
 /** Lines every 1, 2 or 5 times a power of ten metres, some five over the area. */
-function gridLines(outline: Point2[], ground: number, half: number): LineSegments {
-  const step = roundStep((2 * half) / 4);
+function gridLines(outline: Point2[], ground: number, step: number): LineSegments {
   const values: number[] = [];
   const [low, high] = [Math.min, Math.max].map((pick) => [
     pick(...outline.map((p) => p[0])),

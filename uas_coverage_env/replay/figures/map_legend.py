@@ -54,7 +54,7 @@ def legend_of(
         Line2D([], [], **{**_RING, **covered}, label="covered"),
         Line2D([], [], color=uas_colour(0), label="flown"),
     ]
-    if len(flight.plan):
+    if (flight.plan["step"] == now).any():
         marks.append(
             Line2D([], [], color=uas_colour(0), marker=".", ls="", ms=3, label="predicted")
         )
@@ -112,8 +112,8 @@ def _places(scenario: Scenario, moving_m: NDArray[np.float64]) -> list[Artist]:
         name = in_words(kinds.pop()) if len(kinds) == 1 else "moving obstacle"
         patches += [
             Line2D([], [], marker="o", ls="", color=red, mec="black", ms=6, label=name),
-            Line2D([], [], color=red, ls="--", lw=0.8, label="safe distance of it"),
+            Line2D([], [], color=red, ls="--", lw=0.8, label="its safe distance"),
         ]
         if np.ptp(moving_m[..., :2], axis=0).any():
-            patches.append(Line2D([], [], color=red, lw=0.7, label="path of it"))
+            patches.append(Line2D([], [], color=red, lw=0.7, label="its path"))
     return patches
