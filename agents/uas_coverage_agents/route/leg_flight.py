@@ -281,7 +281,7 @@ def _over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
 
 
 @allocating_kernel
-def places_ahead(arena, i, x, targets, n_targets, ahead):
+def places_ahead(arena, around, i, x, targets, n_targets, ahead):
     """Write the next places of UAS i: a corner on the way past obstacles, waypoints, then home.
 
     Args:
@@ -299,7 +299,18 @@ def places_ahead(arena, i, x, targets, n_targets, ahead):
     target = targets[0] if n_targets > 0 else arena.waypoints.shape[0] + i
     to_m = arena.waypoints[targets[0]].position_m if n_targets > 0 else arena.uas[i].home_m
     end_x, end_y, _, leg = route(arena, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
-    needed_m, speed_mps = _over_roofs(arena, x, end_x, end_y, -to_m[2], arena.uas[i], leg)
+    uas = arena.uas[i]
+    needed_m, speed_mps = _over_roofs(arena, x, end_x, end_y, -to_m[2], uas, leg)
+    if needed_m > max(-x[Z], -to_m[2]):
+        over_s = max(
+            math.hypot(to_m[0] - x[X], to_m[1] - x[Y]) / uas.speed_mps,
+            (needed_m + x[Z]) / uas.climb_mps + LEAD_S,
+        )
+        over_s += (needed_m + to_m[2] - 10.0 * (n_targets > 0)) / uas.descent_mps if n_targets==0 else 0.0
+        round_x, round_y, way_m, round_leg = route(around, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
+        if round_leg == ROUND_CORNER and way_m / uas.speed_mps < over_s:
+            end_x, end_y, leg = round_x, round_y, round_leg
+            needed_m, speed_mps = _over_roofs(around, x, end_x, end_y, -to_m[2], uas, leg)
     ahead[:] = 0.0
     n = 0
     if leg == ROUND_CORNER:
@@ -320,7 +331,7 @@ def places_ahead(arena, i, x, targets, n_targets, ahead):
 
 @allocating_kernel
 def steer_along(
-    arena, i, x, reference, targets, n_targets, layers, least_held, least_spare_m, command
+    arena, around, i, x, reference, targets, n_targets, layers, least_held, least_spare_m, command
 ):
     """Write the velocity that flies UAS i along its route.
 
@@ -342,14 +353,14 @@ def steer_along(
     """
     rules, uas = arena.rules[0], arena.uas[i]
     ahead = np.empty((AHEAD, 5))
-    leg, needed_m, speed_mps = places_ahead(arena, i, x, targets, n_targets, ahead)
+    leg, needed_m, speed_mps = places_ahead(arena, around, i, x, targets, n_targets, ahead)
     if leg == NO_WAY:
         return False
     path_m = np.empty((rules.lookahead_steps + MOST_HELD, 3))
     if ahead[0, IS_HOME] > 0.0:
         values = np.empty(3)
         towards_home(arena.vehicles[i], uas, rules, x, reference, values, command)
-        altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
+        altitude_m = max(values[2], needed_m)
         share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
         write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)
         return _is_safe(arena, i, x, reference, command, least_held, least_spare_m, path_m)

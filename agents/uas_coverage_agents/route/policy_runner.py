@@ -57,6 +57,10 @@ class RouteRunner:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples draw from the seed."""
         self._routes = FleetRoutes(brief, seed, self._score, self._home_score, self._samples)
+        from uas_coverage_baselines.routing.terrain import _raised
+        from uas_coverage_env.world import build_arena
+        r=_raised(brief)
+        self._around = build_arena((r or brief).as_scenario())
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
         self._ahead = np.full(AHEAD, -1)
 
@@ -72,7 +76,7 @@ class RouteRunner:
         targets = routes.of(u)[:AHEAD]
         self._ahead[: len(targets)] = targets
         if not steer_along(
-            routes.view.arena, u, state.x[u], state.reference[u], self._ahead, len(targets),
+            routes.view.arena, self._around, u, state.x[u], state.reference[u], self._ahead, len(targets),
             self._flight, 1, 0.0, self._command,
         ):  # fmt: skip
             return routes.onwards(u)
