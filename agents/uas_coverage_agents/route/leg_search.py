@@ -1,8 +1,8 @@
 """Flying along a route without stopping: the velocities of the next steps, searched past obstacles.
 
 A plan is a velocity and an altitude for each of the next steps, until the next waypoint is covered.
-It is simulated with the vehicle's own inner loop, and counts only if it is clear of what is fixed,
-and so is braking after its first step and after its last one. A network says how long the two
+It is simulated with the vehicle's own inner loop, and counts only if it is clear of what is fixed
+or moves as now, and so is braking after its last step, and of what is fixed after its first one. A network says how long the two
 waypoints after it take from the state reached. The search begins with the plan of the step before,
 with the velocity that `leg_flight` would choose, and with ways straight, over and round; then parts
 of the best plan are changed at random. Its first velocity is flown, so nothing that the network
@@ -31,7 +31,7 @@ from uas_coverage_agents.route.leg_flight import (
 )
 from uas_coverage_agents.route.places import detour_s, places_along, write_place
 from uas_coverage_env.autopilot.control import command_wrench, write_brake, write_command
-from uas_coverage_env.autopilot.lookahead import PLENTY_M, fixed_slack
+from uas_coverage_env.autopilot.lookahead import PLENTY_M, fixed_slack, moving_slack
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE
@@ -142,7 +142,8 @@ def _is_clear(arena, i, x, reference, first, steps, room):
         _note(room, n)
         if math.hypot(room.x[VX], room.x[VY]) < _STANDS_MPS:
             break
-    if fixed_slack(arena, i, room.path_m[: n + 1], n, 0.0, PLENTY_M) < 0.0:
+    slack_m = fixed_slack(arena, i, room.path_m[: n + 1], n, 0.0, PLENTY_M)
+    if moving_slack(arena, 0, i, room.path_m[: n + 1], 0.0, slack_m) < 0.0:
         return False
     write_command(command, VELOCITY, first[0], first[1], first[2])
     return spare_distance(arena, i, x, reference, command, 1, 0.0, room.braking_m) >= 0.0
