@@ -153,9 +153,9 @@ def test_at_full_speed_it_brakes_so_late_that_it_lands_two_steps_after_flying_pa
 
 @pytest.fixture(scope="module")
 def behind_a_house():
-    """A UAS, a waypoint, and between them a house higher than the waypoint, but no tall one."""
+    """A UAS, a waypoint, and between them a house somewhat higher than the waypoint."""
     scenario = generate_scenario(seed=5, n_uas=1, n_waypoints=2, n_obstacles=1)
-    box_m = [(n, e, d) for n in (50.0, 62.0) for e in (40.0, 60.0) for d in (0.0, -28.0)]
+    box_m = [(n, e, d) for n in (50.0, 62.0) for e in (40.0, 60.0) for d in (0.0, -20.0)]
     house = scenario.obstacles[0].model_copy(update={"vertices_m": tuple(box_m)})
     places_m = ((90.0, 50.0, -14.0), (110.0, 70.0, -14.0))
     waypoints = tuple(
@@ -190,7 +190,7 @@ def test_what_takes_longer_to_pass_over_is_passed_round(behind_a_house):
     assert places[-1, IS_HOME] == 1.0 or places[-1, NORTH] == 110.0
     to = np.array([90.0, 50.0, -14.0, 10.0, 0.0])
     beside = np.array([20.0, 90.0, -14.0, 10.0, 0.0])
-    assert 0.0 < detour_s(arena, around, 0, 0, x, to) < 5.0
+    assert 0.0 < detour_s(around, around, 0, 0, x, to) < 5.0
     assert detour_s(arena, around, 0, 0, x, beside) == 0.0
 
 
