@@ -1,12 +1,12 @@
 """Flying along a route without stopping: the velocities of the next steps, searched past obstacles.
 
 A plan is a velocity and an altitude for each of the next steps, until the next waypoint is covered.
-It is simulated with the vehicle's own inner loop, and counts only if it is clear of what is fixed
-or moves as now, and so is braking after its last step, and of what is fixed after its first one. A network says how long the two
-waypoints after it take from the state reached. The search begins with the plan of the step before,
-with the velocity that `leg_flight` would choose, and with ways straight, over and round; then parts
-of the best plan are changed at random. Its first velocity is flown, so nothing that the network
-gets wrong misses a waypoint.
+It is simulated with the vehicle's own inner loop. It counts only if it, with braking after its last
+step, is clear of what is fixed and of what moves as now, and if braking after its first step is
+clear of what is fixed. A network says how long the two waypoints after it take from the state
+reached. The search begins with the plan of the step before, with the velocity that `leg_flight`
+would choose, and with ways straight, over and round; then parts of the best plan are changed at
+random. Its first velocity is flown, so nothing that the network gets wrong misses a waypoint.
 """
 
 import math
