@@ -169,7 +169,7 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, room):
     cost_s = steps * arena.vehicles[i].dt_s
     if covered:
         cost_s += look_ahead(
-            there, room.reference, uas.speed_mps, ahead[1], ahead[2], ahead[3], room.row
+            there, room.reference, uas.speed_mps, ahead[1], ahead[2], ahead[AHEAD - 1], room.row
         )
         cost_s += value_of(layers, room.row)
     else:
