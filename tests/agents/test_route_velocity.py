@@ -214,7 +214,8 @@ class ByLegFlight(RouteRunner):
             self._flight, 1, 0.0, command,
         ):  # fmt: skip
             return routes.onwards(u)
-        return Velocity(*command["values"][:3].tolist(), routes.mode(u))
+        north_mps, east_mps, altitude_m, _ = command["values"].tolist()
+        return Velocity(north_mps, east_mps, altitude_m, routes.mode(u))
 
 
 class ByLegs(LearnedRoute):
