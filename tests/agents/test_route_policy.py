@@ -6,15 +6,26 @@ from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import layers_of, value_of
-from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
+from uas_coverage_agents.route.leg_flight import (
+    AHEAD,
+    IS_HOME,
+    NORTH,
+    RADIUS,
+    places_ahead,
+    steer_along,
+)
+from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_room
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, no_record, route_workspace
+from uas_coverage_agents.route.places import detour_s, places_along
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
 
 from uas_coverage_env import generate_scenario, rollout
 from uas_coverage_env.autopilot.control import command_wrench, write_command
+from uas_coverage_env.autopilot.lookahead import fixed_slack
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission.raised import raised
 from uas_coverage_env.vehicle import THETA, VX, VY, X, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 from uas_coverage_env.world.commands import VELOCITY
@@ -138,3 +149,70 @@ def test_at_full_speed_it_brakes_so_late_that_it_lands_two_steps_after_flying_pa
         fly_kinematics(vehicle, x, u)
         steps += 1
     assert steps * vehicle.dt_s <= 60.0 / uas.speed_mps + 2.0
+
+
+@pytest.fixture(scope="module")
+def behind_a_house():
+    """A UAS, a waypoint, and between them a house somewhat higher than the waypoint."""
+    scenario = generate_scenario(seed=5, n_uas=1, n_waypoints=2, n_obstacles=1)
+    box_m = [(n, e, d) for n in (50.0, 62.0) for e in (40.0, 60.0) for d in (0.0, -20.0)]
+    house = scenario.obstacles[0].model_copy(update={"vertices_m": tuple(box_m)})
+    places_m = ((90.0, 50.0, -14.0), (110.0, 70.0, -14.0))
+    waypoints = tuple(
+        w.model_copy(update={"position_m": at_m, "radius_m": 10.0})
+        for w, at_m in zip(scenario.waypoints, places_m, strict=True)
+    )
+    return scenario.model_copy(update={"obstacles": (house,), "waypoints": waypoints})
+
+
+def _arenas(scenario):
+    brief = MissionBrief.of(scenario)
+    higher = raised(brief)
+    assert higher is not None
+    return WorldView(brief).arena, build_arena(higher.as_scenario())
+
+
+def _state(north_m, east_m, speed_mps):
+    x = np.zeros(14)
+    x[:3] = north_m, east_m, -14.0
+    x[VX] = speed_mps
+    return x
+
+
+def test_what_takes_longer_to_pass_over_is_passed_round(behind_a_house):
+    arena, around = _arenas(behind_a_house)
+    x, places, targets = _state(20.0, 50.0, 8.0), np.zeros((AHEAD, 5)), np.arange(AHEAD)
+    places_ahead(arena, 0, x, targets, 2, places)
+    assert places[0, NORTH] == 90.0  # the world's routes lead over it
+    places_along(arena, around, 0, x, targets, 2, places)
+    assert places[0, RADIUS] < 10.0  # a corner, and then the waypoint
+    assert places[1, NORTH] == 90.0 or places[2, NORTH] == 90.0
+    assert places[-1, IS_HOME] == 1.0 or places[-1, NORTH] == 110.0
+    to = np.array([90.0, 50.0, -14.0, 10.0, 0.0])
+    beside = np.array([20.0, 90.0, -14.0, 10.0, 0.0])
+    assert 0.0 < detour_s(around, around, 0, 0, x, to) < 5.0
+    assert detour_s(arena, around, 0, 0, x, beside) == 0.0
+
+
+def test_a_plan_covers_the_waypoint_behind_a_house_and_stays_clear(behind_a_house):
+    arena, around = _arenas(behind_a_house)
+    policy = load_policy(SHIPPED)
+    network = policy.description.network
+    assert isinstance(network, RouteNetworks)
+    layers = layers_of(network.flight, policy.tensors, "flight.")
+    x, reference, plan = _state(20.0, 50.0, 8.0), np.array([8.0, 0.0]), np.zeros((HORIZON, 3))
+    room = search_room(int(arena.rules[0].lookahead_steps))
+    targets = np.arange(AHEAD)
+    assert plan_along(
+        arena, around, 0, x, reference, targets, 2, layers, plan, False,
+        np.random.default_rng(0), room,
+    )  # fmt: skip
+    command, u, path_m = np.zeros(1, COMMAND_DTYPE)[0], np.zeros(5), [x[:3].copy()]
+    while np.linalg.norm(x[:3] - (90.0, 50.0, -14.0)) > 10.0 and len(path_m) <= HORIZON:
+        write_command(command, VELOCITY, *plan[len(path_m) - 1])
+        command_wrench(arena.vehicles[0], x, reference, command, u)
+        fly_kinematics(arena.vehicles[0], x, u)
+        path_m.append(x[:3].copy())
+    assert len(path_m) <= 12
+    path_m = np.array(path_m)
+    assert fixed_slack(arena, 0, path_m, len(path_m) - 1, -1.0, 2.0) >= 0.0

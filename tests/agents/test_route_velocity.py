@@ -8,7 +8,8 @@ from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.leg_flight import AHEAD, MOST_HELD, spare_distance, steer_along
 from uas_coverage_agents.route.planner import SHIPPED as LEARNED_ROUTE
-from uas_coverage_agents.route.planner import LearnedRoute, LearnedRouteOptions
+from uas_coverage_agents.route.planner import LearnedRoute
+from uas_coverage_agents.route.policy_runner import RouteRunner
 from uas_coverage_agents.route.velocity_layout import (
     AIMED_M,
     ALONG_EAST,
@@ -199,13 +200,37 @@ def test_it_looks_straight_on_at_full_speed_before_training():
     assert values[2] == frame[4]
 
 
+class ByLegFlight(RouteRunner):
+    """Flies what `leg_flight` chooses, without a search."""
+
+    def _command_of(self, swarm, u):
+        routes, state = self._routes, self._routes.view.state
+        if (guided := routes.guided(swarm, u)) is not None:
+            return guided
+        targets, ahead = routes.of(u)[:AHEAD], np.full(AHEAD, -1)
+        ahead[: len(targets)] = targets
+        command = np.zeros(1, COMMAND_DTYPE)[0]
+        if not steer_along(
+            routes.view.arena, u, state.x[u], state.reference[u], ahead, len(targets),
+            self._flight, 1, 0.0, command,
+        ):  # fmt: skip
+            return routes.onwards(u)
+        north_mps, east_mps, altitude_m, _ = command["values"].tolist()
+        return Velocity(north_mps, east_mps, altitude_m, routes.mode(u))
+
+
+class ByLegs(LearnedRoute):
+    def _runner(self):
+        return ByLegFlight(self.policy, self.assistants, samples=8)
+
+
 def test_where_the_teacher_leads_its_own_flight_is_flown_and_noted(town):
     training = VelocityTraining(seed=0)
     rng = np.random.default_rng(0)
     settings = DaggerSettings(samples=8, held=1, spare_m=0.0)
     runner = TaughtRunner(training.policy(), training.teacher, 1.0, settings, rng)
     led = rollout(town, runner, return_mode=False, safety_filter=True)
-    own = rollout(town, LearnedRoute(LearnedRouteOptions(samples=8)), safety_filter=True)
+    own = rollout(town, ByLegs(), safety_filter=True)
     np.testing.assert_allclose(led.x, own.x, atol=1e-6)
     rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
     assert len(rows) == len(outputs) > led.steps

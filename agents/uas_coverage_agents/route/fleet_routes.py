@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -65,6 +66,12 @@ class FleetRoutes:
         self._blocked = self._renew(swarm)
         flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
         self._attempts.update(swarm, flown_to, self._blocked)
+
+    def take(self, routes: Sequence[NDArray[np.int64]]) -> None:
+        """Fly these routes, one for each UAS, until others have to be built."""
+        for u, route in enumerate(routes):
+            self._routes[u, : len(route)] = route
+            self._lengths[u] = len(route)
 
     def of(self, u: int) -> NDArray[np.int64]:
         """The waypoints that UAS u still has to visit, in order; home comes after them."""

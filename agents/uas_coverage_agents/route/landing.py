@@ -16,13 +16,14 @@ _LANDING_SHARE = 0.9
 
 _BRAKING_FROM_S = 6.0
 _BRAKING_STEPS = 7
-_GLIDE_S = 3.0
+_GLIDE_S = 0.8
+_LOW_M = 0.05
 _SPEEDS = np.array([1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4, 0.3, 0.15])
 _BRAKES = np.array([1.0, 0.4, 0.2, 0.0, -0.05, -0.1, -0.2, -0.3])
 
 
 @allocating_kernel
-def _homewards(uas, x, speed_mps, altitude_floor_m, values):
+def _homewards(uas, rules, x, speed_mps, values):
     """Write the velocity (north, east) and altitude that flies straight home at a speed."""
     dx, dy = uas.home_m[0] - x[X], uas.home_m[1] - x[Y]
     way_m, now_mps = math.hypot(dx, dy), math.hypot(x[VX], x[VY])
@@ -31,7 +32,14 @@ def _homewards(uas, x, speed_mps, altitude_floor_m, values):
     length_m = math.hypot(dx, dy) + 1e-9
     values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
     glide_m = -uas.home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - _GLIDE_S, 0.0)
-    values[2] = min(glide_m, max(-x[Z], altitude_floor_m + CRUISE_ALTITUDE_M))
+    values[2] = min(glide_m, max(-x[Z], rules.floor_m + CRUISE_ALTITUDE_M))
+    next_m = math.hypot(
+        uas.home_m[0] - x[X] - rules.dt_s * x[VX], uas.home_m[1] - x[Y] - rules.dt_s * x[VY]
+    )
+    lowest_m = rules.floor_m
+    if next_m > rules.landing_zone_m - 1.0 and rules.min_height_m > 0.0:
+        lowest_m = max(lowest_m, rules.min_height_m + _LOW_M)
+    values[2] = max(values[2], lowest_m)
 
 
 @allocating_kernel
@@ -68,7 +76,7 @@ def towards_home(vehicle, uas, rules, x, reference, values, command):
         command: A record of COMMAND_DTYPE; written.
     """
     way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
-    _homewards(uas, x, _cautious_mps(uas, x), rules.floor_m, values)
+    _homewards(uas, rules, x, _cautious_mps(uas, x), values)
     if way_m > _BRAKING_FROM_S * uas.speed_mps:
         return
     on, on_reference, there, governed = np.zeros(14), np.zeros(2), np.zeros(14), np.zeros(2)
@@ -85,7 +93,7 @@ def towards_home(vehicle, uas, rules, x, reference, values, command):
                 north = -brake * uas.speed_mps * there[VX] / now_mps
                 east = -brake * uas.speed_mps * there[VY] / now_mps
                 for steps in range(held + 1, min(held + _BRAKING_STEPS, most)):
-                    _homewards(uas, there, 0.0, rules.floor_m, trial)
+                    _homewards(uas, rules, there, 0.0, trial)
                     if steps == 1:
                         first[0], first[1], first[2] = north, east, trial[2]
                     write_command(command, VELOCITY, north, east, trial[2])
@@ -95,7 +103,7 @@ def towards_home(vehicle, uas, rules, x, reference, values, command):
                         most = steps
                         values[:] = first
                         break
-            _homewards(uas, on, speed * uas.speed_mps, rules.floor_m, trial)
+            _homewards(uas, rules, on, speed * uas.speed_mps, trial)
             if held == 0:
                 first[:] = trial
             write_command(command, VELOCITY, trial[0], trial[1], trial[2])

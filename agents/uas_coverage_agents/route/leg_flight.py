@@ -51,7 +51,7 @@ _TURNS_BACK, _TURNS_ON = 5, 11
 N_VELOCITIES = (_TURNS_BACK + _TURNS_ON) * len(_SPEEDS)
 
 _LENGTH_M, _SPEED_MPS, _TILT_RAD, _CLIMB_MPS, _RADIUS_M, _RISE_M = 50.0, 12.0, 0.44, 3.0, 15.0, 10.0
-_CORNER_M = 4.0
+CORNER_M = 4.0
 _WITHIN_M = 0.15
 _TRIED = 16
 MOST_HELD = 4
@@ -202,17 +202,23 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
 
 
 @allocating_kernel
+def covers(x, at):
+    """Whether a state covers a place, with something to spare."""
+    within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
+    dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
+    return dx * dx + dy * dy + dz * dz <= within_m * within_m
+
+
+@allocating_kernel
 def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
     """Fly a velocity until a place is covered, at most so long; steps, negative if it is."""
-    within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
     steps = 0
     while steps < most_steps:
         write_command(command, VELOCITY, values[0], values[1], values[2])
         command_wrench(vehicle, x, reference, command, u)
         fly_kinematics(vehicle, x, u)
         steps += 1
-        dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
-        if dx * dx + dy * dy + dz * dz <= within_m * within_m:
+        if covers(x, at):
             return -steps
     return steps
 
@@ -261,7 +267,7 @@ def _is_safe(arena, i, x, reference, command, n_held, least_m, path_m):
 
 
 @allocating_kernel
-def _over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
+def over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
     """Altitude [m] at which a leg passes over what is low; the speed that leaves time to climb."""
     altitude_m = -x[Z]
     length_m = math.hypot(end_x - x[X], end_y - x[Y])
@@ -299,13 +305,13 @@ def places_ahead(arena, i, x, targets, n_targets, ahead):
     target = targets[0] if n_targets > 0 else arena.waypoints.shape[0] + i
     to_m = arena.waypoints[targets[0]].position_m if n_targets > 0 else arena.uas[i].home_m
     end_x, end_y, _, leg = route(arena, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
-    needed_m, speed_mps = _over_roofs(arena, x, end_x, end_y, -to_m[2], arena.uas[i], leg)
+    needed_m, speed_mps = over_roofs(arena, x, end_x, end_y, -to_m[2], arena.uas[i], leg)
     ahead[:] = 0.0
     n = 0
     if leg == ROUND_CORNER:
         ahead[0, NORTH], ahead[0, EAST] = end_x, end_y
         ahead[0, DOWN] = min(to_m[2], x[Z]) if n_targets > 0 else x[Z]
-        ahead[0, RADIUS] = _CORNER_M
+        ahead[0, RADIUS] = CORNER_M
         n = 1
     for k in range(n, AHEAD):
         if k - n < n_targets:
@@ -340,16 +346,27 @@ def steer_along(
         Whether there is one: the way is clear or round a corner, and braking stays possible. Where
         not, the world's guidance knows better.
     """
-    rules, uas = arena.rules[0], arena.uas[i]
     ahead = np.empty((AHEAD, 5))
     leg, needed_m, speed_mps = places_ahead(arena, i, x, targets, n_targets, ahead)
     if leg == NO_WAY:
         return False
+    return steer_to(
+        arena, i, x, reference, ahead, needed_m, speed_mps, layers, least_held, least_spare_m,
+        command,
+    )  # fmt: skip
+
+
+@allocating_kernel
+def steer_to(
+    arena, i, x, reference, ahead, needed_m, speed_mps, layers, least_held, least_spare_m, command
+):
+    """`steer_along` to given places, at a least altitude [m] and a highest speed [m/s]."""
+    rules, uas = arena.rules[0], arena.uas[i]
     path_m = np.empty((rules.lookahead_steps + MOST_HELD, 3))
     if ahead[0, IS_HOME] > 0.0:
         values = np.empty(3)
         towards_home(arena.vehicles[i], uas, rules, x, reference, values, command)
-        altitude_m = max(values[2], lowest_altitude(arena, i, x[X], x[Y]), needed_m)
+        altitude_m = max(values[2], needed_m)
         share = min(1.0, speed_mps / (math.hypot(values[0], values[1]) + 1e-9))
         write_command(command, VELOCITY, share * values[0], share * values[1], altitude_m)
         return _is_safe(arena, i, x, reference, command, least_held, least_spare_m, path_m)

@@ -12,10 +12,12 @@ from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.fleet_routes import SAMPLES, FleetRoutes
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
-from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
+from uas_coverage_agents.route.leg_flight import AHEAD
+from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_room
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.world import COMMAND_DTYPE, Command, SwarmState, Velocity
+from uas_coverage_env.mission.raised import raised
+from uas_coverage_env.world import Command, SwarmState, Velocity, build_arena
 
 
 def observation() -> Observation:
@@ -57,8 +59,13 @@ class RouteRunner:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples draw from the seed."""
         self._routes = FleetRoutes(brief, seed, self._score, self._home_score, self._samples)
-        self._command = np.zeros(1, COMMAND_DTYPE)[0]
-        self._ahead = np.full(AHEAD, -1)
+        arena = self._routes.view.arena
+        self._around = build_arena((raised(brief) or brief).as_scenario())
+        self._room = search_room(int(arena.rules[0].lookahead_steps))
+        self._rng = np.random.default_rng(seed)
+        n_uas = len(brief.uas)
+        self._plans, self._kept = np.zeros((n_uas, HORIZON, 3)), np.zeros(n_uas, np.bool_)
+        self._targets = np.full(AHEAD, -1)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on along the routes; build them again where they are no longer right."""
@@ -67,14 +74,18 @@ class RouteRunner:
 
     def _command_of(self, swarm: SwarmState, u: int) -> Command:
         routes, state = self._routes, self._routes.view.state
+        kept, self._kept[u] = self._kept[u], False
         if (guided := routes.guided(swarm, u)) is not None:
             return guided
         targets = routes.of(u)[:AHEAD]
-        self._ahead[: len(targets)] = targets
-        if not steer_along(
-            routes.view.arena, u, state.x[u], state.reference[u], self._ahead, len(targets),
-            self._flight, 1, 0.0, self._command,
+        self._targets[: len(targets)] = targets
+        plan = self._plans[u]
+        if not plan_along(
+            routes.view.arena, self._around, u, state.x[u], state.reference[u], self._targets,
+            len(targets), self._flight, plan, kept, self._rng, self._room,
         ):  # fmt: skip
             return routes.onwards(u)
-        north_mps, east_mps, altitude_m, _ = self._command["values"].tolist()
+        north_mps, east_mps, altitude_m = plan[0].tolist()
+        plan[:-1] = plan[1:]
+        self._kept[u] = True
         return Velocity(north_mps, east_mps, altitude_m, routes.mode(u))

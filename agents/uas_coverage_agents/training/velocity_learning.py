@@ -1,11 +1,11 @@
 """Train velocities along routes: `python -m uas_coverage_agents.training.velocity_learning OUT`.
 
 `learned-route` is the teacher: it builds the routes, and says in every state that the pupil comes
-to which velocity it would fly there, after simulating eighty of them. It is more cautious than on
-its own, since the pupil errs, and says what leads away from where it would not have come. The
-pupil, one network, learns to say the same without weighing anything (DAgger: Ross, Gordon, Bagnell
-2011). In the first round the teacher flies, in the second either, then the pupil. Nothing here is
-tuned on the set `test`.
+to which velocity its `leg_flight` would choose, after simulating eighty of them. It is more
+cautious than on its own, since the pupil errs, and says what leads away from where it would not
+have come. The pupil, one network, learns to say the same without weighing anything (DAgger: Ross,
+Gordon, Bagnell 2011). In the first round the teacher flies, in the second either, then the pupil.
+Nothing here is tuned on the set `test`.
 """
 
 import argparse

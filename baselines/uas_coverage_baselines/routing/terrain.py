@@ -7,18 +7,15 @@ time with what rises above the usual waypoint made tall.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.mission import Legs, MissionBrief
-from uas_coverage_env.scenario import Obstacle
+from uas_coverage_env.mission.raised import raised
 from uas_coverage_env.world import Arena, route
 from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner
 
 FloatArray = NDArray[np.float64]
-_ABOVE_M = 1.0
 _CORNERS = 20
 
 
@@ -39,9 +36,9 @@ class Terrain:
         self._legs = [self.legs]
         self._arenas = [self.legs.arena]
         self.between_s, self.home_s = self.legs.between_s, self.legs.home_s
-        raised = _raised(brief)
-        if raised is not None:
-            around = Legs(raised)
+        round_all = raised(brief)
+        if round_all is not None:
+            around = Legs(round_all)
             self._legs.append(around)
             self._arenas.append(around.arena)
             self.between_s = np.minimum(self.between_s, around.between_s)
@@ -77,30 +74,3 @@ def _corners(arena: Arena, row: int, start_m: FloatArray, end_m: FloatArray) -> 
         points.append(np.array([north_m, east_m, end_m[2]]))
         north_m, east_m, kind = leg_from_corner(arena, row, *points[-1], *end_m)
     return np.array([*points, end_m])
-
-
-def _raised(brief: MissionBrief) -> MissionBrief | None:
-    """The mission with what rises above the usual waypoint made as tall as the fence.
-
-    None where nothing does, and routes would be the same.
-    """
-    targets_m = [*(w.position_m[2] for w in brief.waypoints), *(u.start_m[2] for u in brief.uas)]
-    usual_m = float(np.median(targets_m)) - _ABOVE_M
-    top_m = float(brief.fence.vertices_m[:, 2].min())
-    radius_m = max(uas.radius_m for uas in brief.uas)
-    obstacles, changed = [], False
-    for obstacle in brief.obstacles:
-        vertices_m = np.array(obstacle.vertices_m, float)
-        roof_m = vertices_m[:, 2].min()
-        if top_m < roof_m and roof_m - radius_m - obstacle.safe_distance_m < usual_m:
-            vertices_m[vertices_m[:, 2] <= roof_m + 1e-6, 2] = top_m
-            known = obstacle.model_dump() | {"vertices_m": tuple(map(tuple, vertices_m.tolist()))}
-            obstacles.append(Obstacle.model_validate(known))
-            changed = True
-        else:
-            obstacles.append(obstacle)
-    if not changed:
-        return None
-    known: dict[str, Any] = {name: getattr(brief, name) for name in MissionBrief.model_fields}
-    known["obstacles"] = tuple(obstacles)
-    return MissionBrief.model_construct(**known)

@@ -1,0 +1,316 @@
+"""Flying along a route without stopping: the velocities of the next steps, searched past obstacles.
+
+A plan is a velocity and an altitude for each of the next steps, until the next waypoint is covered.
+It is simulated with the vehicle's own inner loop. It counts only if it, with braking after its last
+step, is clear of what is fixed and of what moves as now, and if braking after its first step is
+clear of what is fixed. A network says how long the two waypoints after it take from the state
+reached. The search begins with the plan of the step before, with the velocity that `leg_flight`
+would choose, and with ways straight, over and round; then parts of the best plan are changed at
+random. Its first velocity is flown, so nothing that the network gets wrong misses a waypoint.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uas_coverage_agents.route.layers import value_of
+from uas_coverage_agents.route.leg_flight import (
+    AHEAD,
+    EAST,
+    MOST_HELD,
+    N_FLIGHT,
+    NORTH,
+    aim_ahead,
+    covers,
+    look_ahead,
+    over_roofs,
+    spare_distance,
+    steer_to,
+)
+from uas_coverage_agents.route.places import detour_s, places_along, write_place
+from uas_coverage_env.autopilot.control import command_wrench, write_brake, write_command
+from uas_coverage_env.autopilot.lookahead import PLENTY_M, fixed_slack, moving_slack
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
+from uas_coverage_env.world import COMMAND_DTYPE
+from uas_coverage_env.world.commands import VELOCITY
+from uas_coverage_env.world.height import lowest_altitude
+from uas_coverage_env.world.routes import NO_WAY, route
+
+HORIZON = 24
+"""Steps of a plan at most."""
+
+TRIES = 300
+"""Changes that are tried in each step."""
+
+STRAIGHT, OVER, ROUND = range(3)
+"""Ways to aim: at the place itself, as the world's routes lead, or round what could be passed
+over."""
+
+_MISSED_S = 20.0  # what a plan costs that does not cover the waypoint
+_BRAKING, _STANDS_MPS = 12, 0.1
+_LEAD_S = 1.2
+_BEGIN_SPEEDS = (1.0, 0.7)
+_BASE_HELD = 3
+_LONGEST = 4  # steps that a change concerns
+_DECADES = 1.5  # over which the sizes of changes are spread
+_TURN_RAD, _RISE_M = 1.5, 3.0  # largest changes
+_SPEED, _ALTITUDE, _ANEW = 0.4, 0.2, 0.1  # how often they concern speed, altitude, what follows
+
+
+class Room(NamedTuple):
+    """Room for a search.
+
+    Attributes:
+        x: (14,) a state.
+        reference: (2,) of the inner loop.
+        u: (5,) inputs.
+        command: (1,) of COMMAND_DTYPE.
+        row: (N_FLIGHT,) what the network reads.
+        path_m: (N, 3) positions of a plan and of braking after it.
+        braking_m: (N, 3) positions of braking after its first step.
+        trial: (HORIZON, 3) a plan that is tried.
+        best: (HORIZON, 3) the best so far.
+        aims_m: (AHEAD, 3) where the coming spheres are touched on a short way.
+        ahead: (AHEAD, 5) the next waypoints, home repeated at the end.
+        rows: (AHEAD,) their rows in `route`.
+        places: (AHEAD, 5) the same with the corners on the way.
+        base: (3,) what `leg_flight` would fly.
+    """
+
+    x: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    u: NDArray[np.float64]
+    command: NDArray[np.void]
+    row: NDArray[np.float64]
+    path_m: NDArray[np.float64]
+    braking_m: NDArray[np.float64]
+    trial: NDArray[np.float64]
+    best: NDArray[np.float64]
+    aims_m: NDArray[np.float64]
+    ahead: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    places: NDArray[np.float64]
+    base: NDArray[np.float64]
+
+
+def search_room(lookahead_steps: int) -> Room:
+    """An empty one; `lookahead_steps` are those of the arena's rules."""
+    return Room(
+        x=np.zeros(14),
+        reference=np.zeros(2),
+        u=np.zeros(5),
+        command=np.zeros(1, COMMAND_DTYPE),
+        row=np.zeros(N_FLIGHT),
+        path_m=np.zeros((HORIZON + _BRAKING + 1, 3)),
+        braking_m=np.zeros((lookahead_steps + MOST_HELD, 3)),
+        trial=np.zeros((HORIZON, 3)),
+        best=np.zeros((HORIZON, 3)),
+        aims_m=np.zeros((AHEAD, 3)),
+        ahead=np.zeros((AHEAD, 5)),
+        rows=np.zeros(AHEAD, np.int64),
+        places=np.zeros((AHEAD, 5)),
+        base=np.zeros(3),
+    )
+
+
+@allocating_kernel
+def _step(vehicle, values, room):
+    """Fly the state of the room on for a step."""
+    command = room.command[0]
+    write_command(command, VELOCITY, values[0], values[1], values[2])
+    command_wrench(vehicle, room.x, room.reference, command, room.u)
+    fly_kinematics(vehicle, room.x, room.u)
+
+
+@allocating_kernel
+def _note(room, n):
+    room.path_m[n, 0], room.path_m[n, 1], room.path_m[n, 2] = room.x[X], room.x[Y], room.x[Z]
+
+
+@allocating_kernel
+def _is_clear(arena, i, x, reference, first, steps, room):
+    """Whether the plan just flown, and braking after its first and last step, is clear."""
+    command, n = room.command[0], steps
+    write_brake(command)
+    while n < steps + _BRAKING:
+        command_wrench(arena.vehicles[i], room.x, room.reference, command, room.u)
+        fly_kinematics(arena.vehicles[i], room.x, room.u)
+        n += 1
+        _note(room, n)
+        if math.hypot(room.x[VX], room.x[VY]) < _STANDS_MPS:
+            break
+    slack_m = fixed_slack(arena, i, room.path_m[: n + 1], n, 0.0, PLENTY_M)
+    if moving_slack(arena, 0, i, room.path_m[: n + 1], 0.0, slack_m) < 0.0:
+        return False
+    write_command(command, VELOCITY, first[0], first[1], first[2])
+    return spare_distance(arena, i, x, reference, command, 1, 0.0, room.braking_m) >= 0.0
+
+
+@allocating_kernel
+def _weigh(arena, around, i, x, reference, plan, layers, best_s, room):
+    """Time [s] of a plan and of what comes after it, inf if not clear or not below `best_s`.
+
+    Returns:
+        The time, and the steps of the plan.
+    """
+    uas, there, ahead = arena.uas[i], room.x, room.ahead
+    there[:] = x
+    room.reference[:] = reference
+    _note(room, 0)
+    steps, covered = 0, False
+    while steps < HORIZON and not covered:
+        _step(arena.vehicles[i], plan[steps], room)
+        steps += 1
+        _note(room, steps)
+        covered = covers(there, ahead[0])
+    cost_s = steps * arena.vehicles[i].dt_s
+    if covered:
+        cost_s += look_ahead(
+            there, room.reference, uas.speed_mps, ahead[1], ahead[2], ahead[AHEAD - 1], room.row
+        )
+        cost_s += value_of(layers, room.row)
+    else:
+        away_m = math.hypot(ahead[0, NORTH] - there[X], ahead[0, EAST] - there[Y])
+        cost_s += _MISSED_S + away_m / uas.speed_mps
+    if cost_s >= best_s:
+        return np.inf, steps
+    k = 1 if covered else 0
+    cost_s += detour_s(arena, around, i, room.rows[k], there, ahead[k])
+    if cost_s >= best_s or not _is_clear(arena, i, x, reference, plan[0], steps, room):
+        return np.inf, steps
+    return cost_s, steps
+
+
+@allocating_kernel
+def _aim(arena, around, i, x, reference, plan, first, way, share, room):
+    """Fill a plan from step `first` on: towards the next waypoint, and then the one after it."""
+    uas, there, k = arena.uas[i], room.x, 0
+    there[:] = x
+    room.reference[:] = reference
+    for step in range(HORIZON):
+        if step >= first:
+            north_m, east_m, down_m = room.aims_m[k]
+            altitude_m, speed_mps = -down_m, share * uas.speed_mps
+            if way != STRAIGHT:
+                known = around if way == ROUND else arena
+                north_m, east_m, _, leg = route(
+                    known, room.rows[k], there[X], there[Y], there[Z], north_m, east_m, down_m
+                )
+                needed_m, most_mps = over_roofs(known, there, north_m, east_m, -down_m, uas, leg)
+                altitude_m, speed_mps = max(altitude_m, needed_m), min(speed_mps, most_mps)
+            north_m, east_m = north_m - there[X], east_m - there[Y]
+            now_mps = math.hypot(there[VX], there[VY])
+            lead_s = min(_LEAD_S, math.hypot(north_m, east_m) / (2.0 * now_mps + 1e-9))
+            north_m, east_m = north_m - lead_s * there[VX], east_m - lead_s * there[VY]
+            length_m = math.hypot(north_m, east_m) + 1e-9
+            plan[step, 0] = speed_mps * north_m / length_m
+            plan[step, 1] = speed_mps * east_m / length_m
+            plan[step, 2] = max(altitude_m, lowest_altitude(arena, i, there[X], there[Y]))
+        _step(arena.vehicles[i], plan[step], room)
+        if k == 0 and covers(there, room.ahead[0]):
+            k = 1
+
+
+@allocating_kernel
+def _change(plan, used, speed_mps, rng):
+    """Change a part of the steps that are used at random; the step after it."""
+    first = int(rng.random() * used)
+    end = min(used, first + 1 + int(rng.random() * _LONGEST))
+    size = 10.0 ** (-_DECADES * rng.random())
+    angle = (2.0 * rng.random() - 1.0) * _TURN_RAD * size
+    factor = 1.0 + (rng.random() - 0.6) * size if rng.random() < _SPEED else 1.0
+    rise_m = (2.0 * rng.random() - 1.0) * _RISE_M * size if rng.random() < _ALTITUDE else 0.0
+    cosine, sine = factor * math.cos(angle), factor * math.sin(angle)
+    for step in range(first, end):
+        north, east = plan[step, 0], plan[step, 1]
+        north, east = cosine * north - sine * east, sine * north + cosine * east
+        share = min(1.0, speed_mps / (math.hypot(north, east) + 1e-9))
+        plan[step, 0], plan[step, 1] = share * north, share * east
+        plan[step, 2] += rise_m
+    return end
+
+
+@allocating_kernel
+def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room):
+    """The best plan to begin with, in `room.best`: (its time [s], steps that are used, its way)."""
+    trial, best = room.trial, room.best
+    best_s, used, way = np.inf, HORIZON, OVER
+    if kept:
+        best[:] = plan
+        best_s, used = _weigh(arena, around, i, x, reference, plan, layers, best_s, room)
+    for begins in (OVER, ROUND, STRAIGHT):
+        for share in _BEGIN_SPEEDS:
+            _aim(arena, around, i, x, reference, trial, 0, begins, share, room)
+            cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room)
+            if cost_s < best_s:
+                best_s, used, way = cost_s, steps, begins
+                best[:] = trial
+    for held in range(1, _BASE_HELD + 1 if has_base else 0):
+        trial[:held] = room.base
+        _aim(arena, around, i, x, reference, trial, held, OVER, 1.0, room)
+        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room)
+        if cost_s < best_s:
+            best_s, used = cost_s, steps
+            best[:] = trial
+    return best_s, used, way
+
+
+@allocating_kernel
+def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room):
+    """Write the best plan found to the first of `room.ahead`; whether there is one."""
+    trial, best, speed_mps = room.trial, room.best, arena.uas[i].speed_mps
+    aim_ahead(arena.vehicles[i], x, room.ahead, room.aims_m)
+    best_s, used, way = _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room)
+    if best_s == np.inf:
+        return False
+    for _ in range(TRIES):
+        trial[:] = best
+        end = _change(trial, used, speed_mps, rng)
+        if rng.random() < _ANEW:
+            _aim(arena, around, i, x, reference, trial, end, way, 1.0, room)
+        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room)
+        if cost_s < best_s:
+            best_s, used = cost_s, steps
+            best[:] = trial
+    plan[:] = best
+    return True
+
+
+@allocating_kernel
+def plan_along(arena, around, i, x, reference, targets, n_targets, layers, plan, kept, rng, room):
+    """Write the plan whose first row is to be flown by UAS i.
+
+    Args:
+        arena: The arena.
+        around: The same with its obstacles raised, see `places`.
+        i: Index of the UAS.
+        x: (14,) its state.
+        reference: (2,) [m/s] of its inner loop.
+        targets: (AHEAD,) the next waypoints of its route.
+        n_targets: How many of them; after them comes home.
+        layers: `Layers`.
+        plan: (HORIZON, 3) velocity north and east [m/s] and altitude [m]; what is left of the plan
+            of the step before, written.
+        kept: Whether there is one.
+        rng: Of the changes.
+        room: `Room`.
+
+    Returns:
+        Whether there is one that is clear. Where not, the world's guidance knows better.
+    """
+    leg, needed_m, speed_mps = places_along(arena, around, i, x, targets, n_targets, room.places)
+    command = room.command[0]
+    has_base = leg != NO_WAY and steer_to(
+        arena, i, x, reference, room.places, needed_m, speed_mps, layers, 1, 0.0, command
+    )
+    room.base[:] = command.values[:3]
+    if n_targets > 0:
+        for k in range(AHEAD):
+            room.rows[k] = write_place(arena, i, targets, n_targets, k, room.ahead[k])
+        if _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room):
+            return True
+    plan[:] = room.base
+    return has_base

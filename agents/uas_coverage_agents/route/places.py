@@ -1,0 +1,129 @@
+"""The next places of a route: waypoints and home, with or without the corners on the way there.
+
+The world's routes fly over what is low and round what is tall. Where a climb takes longer than the
+way round, round is better even where over is possible; so everything is asked twice, the second
+time in an arena whose obstacles are raised (`mission.raised`).
+"""
+
+import math
+
+import numpy as np
+
+from uas_coverage_agents.route.leg_flight import (
+    AHEAD,
+    CORNER_M,
+    DOWN,
+    EAST,
+    IS_HOME,
+    NORTH,
+    RADIUS,
+    over_roofs,
+    places_ahead,
+)
+from uas_coverage_env.autopilot.guidance import LEAD_S
+from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, leg_from_corner, route
+
+
+@allocating_kernel
+def write_place(arena, i, targets, n_targets, k, place):
+    """Write the k-th of the next targets of UAS i, after the last one home; its row in `route`."""
+    place[:] = 0.0
+    if k < n_targets:
+        waypoint = arena.waypoints[targets[k]]
+        place[:3] = waypoint.position_m
+        place[RADIUS] = waypoint.radius_m
+        return targets[k]
+    place[:3] = arena.uas[i].home_m
+    place[IS_HOME] = 1.0
+    return arena.waypoints.shape[0] + i
+
+
+@allocating_kernel
+def _over_s(x, uas, to, way_m, needed_m):
+    """Time [s] of a way over roofs: flown, or climbed and descended, whichever is longer."""
+    rise_s = max(needed_m + x[Z], 0.0) / uas.climb_mps
+    sink_s = max(needed_m + to[DOWN] - to[RADIUS], 0.0) / uas.descent_mps
+    return max(way_m / uas.speed_mps, rise_s + sink_s)
+
+
+@allocating_kernel
+def detour_s(arena, around, i, row, x, to):
+    """How much longer the way of UAS i past obstacles takes than the straight one [s].
+
+    Args:
+        arena: The arena.
+        around: The same with its obstacles raised.
+        i: Index of the UAS.
+        row: Of the place in `route`.
+        x: (14,) state.
+        to: (5,) the place.
+    """
+    uas = arena.uas[i]
+    straight_m = math.hypot(to[NORTH] - x[X], to[EAST] - x[Y])
+    end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], to[NORTH], to[EAST], to[DOWN])
+    if leg == CLEAR:
+        return 0.0
+    needed_m, _ = over_roofs(arena, x, end_x, end_y, -to[DOWN], uas, leg)
+    seconds = _over_s(x, uas, to, way_m, needed_m)
+    if needed_m + x[Z] > 0.0:
+        _, _, way_m, leg = route(around, row, x[X], x[Y], x[Z], to[NORTH], to[EAST], to[DOWN])
+        if leg == ROUND_CORNER:
+            seconds = min(seconds, way_m / uas.speed_mps)
+    return seconds - straight_m / uas.speed_mps
+
+
+@allocating_kernel
+def _corner_to(arena, around, row, at, is_corner, to):
+    """(north, east, whether it is one) of the corner on the way from a place to the next."""
+    for known in (arena, around):
+        if is_corner:
+            north_m, east_m, leg = leg_from_corner(
+                known, row, at[NORTH], at[EAST], at[DOWN], to[NORTH], to[EAST], to[DOWN]
+            )
+        else:
+            north_m, east_m, _, leg = route(
+                known, row, at[NORTH], at[EAST], at[DOWN], to[NORTH], to[EAST], to[DOWN]
+            )
+        if leg == CLEAR:
+            return north_m, east_m, False
+    return north_m, east_m, leg == ROUND_CORNER
+
+
+@allocating_kernel
+def places_along(arena, around, i, x, targets, n_targets, ahead):
+    """`places_ahead`, round where that is sooner than over, and with the corners of later legs."""
+    uas = arena.uas[i]
+    leg, needed_m, speed_mps = places_ahead(arena, i, x, targets, n_targets, ahead)
+    to = np.empty(5)
+    row = write_place(arena, i, targets, n_targets, 0, to)
+    corner = leg == ROUND_CORNER
+    if needed_m > max(-x[Z], -to[DOWN]):
+        over_s = _over_s(x, uas, to, math.hypot(to[NORTH] - x[X], to[EAST] - x[Y]), needed_m)
+        north_m, east_m, way_m, round_leg = route(
+            around, row, x[X], x[Y], x[Z], to[NORTH], to[EAST], to[DOWN]
+        )
+        if round_leg == ROUND_CORNER and way_m / uas.speed_mps < over_s + LEAD_S:
+            corner, leg = True, ROUND_CORNER
+            ahead[0] = 0.0
+            ahead[0, NORTH], ahead[0, EAST], ahead[0, RADIUS] = north_m, east_m, CORNER_M
+            ahead[0, DOWN] = min(to[DOWN], x[Z]) if n_targets > 0 else x[Z]
+            needed_m, speed_mps = over_roofs(around, x, north_m, east_m, -to[DOWN], uas, leg)
+    k, j = (1, 0) if corner else (0, 0)
+    while k < AHEAD:
+        row = write_place(arena, i, targets, n_targets, j, to)
+        if k > 0:
+            north_m, east_m, there = _corner_to(
+                arena, around, row, ahead[k - 1], corner and k == 1, to
+            )
+            if there:
+                ahead[k] = 0.0
+                ahead[k, NORTH], ahead[k, EAST], ahead[k, RADIUS] = north_m, east_m, CORNER_M
+                ahead[k, DOWN] = ahead[k - 1, DOWN] if j >= n_targets else to[DOWN]
+                k += 1
+        if k < AHEAD:
+            ahead[k] = to
+            k += 1
+        j += 1
+    return leg, needed_m, speed_mps
