@@ -98,8 +98,9 @@ def understood(words):
         if not given["scenario"].endswith(".toml"):
             load_scenario(given["scenario"])
     if command.name == "compare":
-        shipped = [one for one in given["planners"].split(",") if "policy:" not in one]
-        planner_specs_of(",".join(shipped), given["option"] or ())
+        named = ",".join(given["planners"]).split(",")
+        shipped = [planner for planner in named if "policy:" not in planner]
+        planner_specs_of(shipped, given["option"] or ())
 
 
 def test_a_command_that_does_not_exist_would_be_noticed():
