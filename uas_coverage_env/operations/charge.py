@@ -16,7 +16,7 @@ _IDLE_SHARE = 0.1
 """Of what level flight takes, what motors take that idle while a UAS waits to take off."""
 
 _LEAST_HEADWAY_MPS = 0.1
-"""Over the ground: who cannot fly against a wind does not come home in it, by any battery."""
+"""Over the ground: a UAS that cannot fly against a wind comes home in it by no battery."""
 
 
 @dataclass(frozen=True)
