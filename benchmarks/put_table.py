@@ -47,7 +47,10 @@ def filled(text: str, content: str, mark: str) -> str:
 
 
 def short_table(data: dict[str, Any], mark: str = "leaderboard") -> str:
-    """Who, how often it worked, what it took, against whom; in wind how much was covered, too."""
+    """A row for each planner: missions accomplished, energy and steps beside the reference.
+
+    In wind, coverage takes the place of decision times and the bound.
+    """
     reference = data["reference"]
     columns = dict(_WIND if mark in WIND else _STILL)
     columns[f"Δ energy to {reference}, %"] = lambda one: _difference(one, reference, "energy")
