@@ -2,6 +2,7 @@
 
     python benchmarks/return_mode.py
     python benchmarks/return_mode.py --missions 300 --families overhangs --first-seed 90000
+    python benchmarks/return_mode.py --level strong
 
 The mission of a seed belongs to a family: generated towns (`towns`), eight UAS side by side
 (`crowd`), hexacopters, steps of half a second (`short_steps`), blocks close together (`clutter`),
@@ -14,7 +15,8 @@ tilted rocks (`overhangs`). Charge is scarce: every UAS begins with what hoverin
 - fast: at full speed, heading and altitude drawn anew every 5 to 25 s;
 - away: at full speed away from its start, at a drawn altitude, in a heading that turns slowly.
 
-Nothing else moves. A UAS is lost by any contact: `battery` is what return mode has to prevent. Each
+Nothing else moves; with `--level`, wind with turbulence and gusts, and vehicles other than believed,
+are drawn for each mission. A UAS is lost by any contact: `battery` is what return mode has to prevent. Each
 share stands beside a 95 % upper bound (Clopper and Pearson's, one-sided). Exits 0 where none was
 lost, 1 otherwise, 2 where the input is bad.
 """
@@ -36,7 +38,7 @@ from scipy.stats import beta
 
 from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import Scenario, generate_scenario
+from uas_coverage_env.scenario import LEVELS, Scenario, generate_scenario, with_disturbances
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NAMES
@@ -258,14 +260,25 @@ def _away(rng: Rng, dt_s: float, away_m: Vector) -> Iterator[Wish]:
 POLICIES = {"jitter": _jitter, "hold": _hold, "fast": _fast, "away": _away}
 
 
-def fly(family: str, policy: str, seed: int, wind_mps: float = 0.0) -> Counter[str]:
-    """One mission, the wind from a drawn direction: what there is to count."""
+def fly(
+    family: str, policy: str, seed: int, wind_mps: float = 0.0, level: str | None = None
+) -> Counter[str]:
+    """One mission, the wind from a drawn direction: what there is to count.
+
+    Args:
+        family: Of the mission.
+        policy: Which commands.
+        seed: Of everything.
+        wind_mps: Of a constant wind [m/s].
+        level: Of wind and wrong models, instead of that; None: no level.
+    """
     from_deg = float(np.random.default_rng([seed, 2]).uniform(0.0, 360.0))
     world = World(
-        mission(family, seed),
+        with_disturbances(mission(family, seed), level, seed),
         return_mode=True,
         safety_filter=True,
         disturbances=(constant_wind(wind_mps, from_deg),) if wind_mps else None,
+        seed=seed,
     )
     n_uas = len(world.names)
     commands = np.zeros(n_uas, COMMAND_DTYPE)
@@ -346,15 +359,19 @@ def main(
     ] = ",".join(POLICIES),
     first_seed: Annotated[int, typer.Option(min=0, help="Of the missions.")] = FIRST_SEED,
     wind_mps: Annotated[float, typer.Option(min=0.0, help="Constant, unknown to all.")] = 0.0,
+    level: Annotated[str, typer.Option(help=f"{', '.join(LEVELS)}; instead of --wind-mps.")] = "",
     verbose: Annotated[bool, typer.Option(help="Name the missions with losses.")] = False,
 ) -> None:
     """Fly random policies until all UAS are down, and print a table."""
+    if level and wind_mps:
+        raise InputError("--level brings its own wind; leave out --wind-mps")
+    chosen(level, LEVELS, "level")
     tallies: dict[tuple[str, str], Counter[str]] = {}
     for family in chosen(families, FAMILIES, "family"):
         for policy in chosen(policies, POLICIES, "policy"):
             tallies[family, policy] = Counter()
             for seed in range(first_seed, first_seed + missions):
-                tally = fly(family, policy, seed, wind_mps)
+                tally = fly(family, policy, seed, wind_mps, level or None)
                 tallies[family, policy].update(tally)
                 if verbose and _lost(tally):
                     sys.stderr.write(f"{family} {policy} {seed}: {dict(tally)}\n")

@@ -17,6 +17,9 @@ away at full speed, and half a turn more."""
 _FAR_FROM_EMPTY, _FAR_FROM_EMPTY_S = 2.0, 120.0
 """With so many times the way home left, and so many seconds, nothing more is looked at."""
 
+_AMPLE, _AMPLE_S = 2.0, 60.0
+"""With so many times the way home left, and so many seconds, what called a UAS home was a gust."""
+
 
 @kernel
 def seconds_home(arena, i, x):
@@ -52,11 +55,8 @@ def seconds_to_keep(arena, i, x, left_s, belief=None):
 
 
 @kernel
-def has_to_return(arena, state, i):
-    """Whether UAS i has to fly home now: nothing is left to do, or battery or clock demand it.
-
-    What other UAS alone can cover is nothing left to do.
-    """
+def _calls_home(arena, state, i, share, more_s):
+    """See `has_to_return`; of the way home so many times the time is asked for, and more_s."""
     left = 0
     for w in range(state.uncovered.shape[0]):
         left += state.uncovered[w]
@@ -69,7 +69,7 @@ def has_to_return(arena, state, i):
     x = state.x[i]
     rules = arena.rules[0]
     uas = arena.uas[i]
-    home_s = seconds_home(arena, i, x)
+    home_s = share * seconds_home(arena, i, x) + more_s
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
     if home_s + _CLOCK_RESERVE_S - RETURN_MODE.landing_s > time_left_s:
         return True
@@ -79,12 +79,24 @@ def has_to_return(arena, state, i):
     # never less than the model says: what is saved now may be needed on the way
     per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
     left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s)
-    return seconds_to_keep(arena, i, x, left_s, belief) >= left_s
+    return share * seconds_to_keep(arena, i, x, left_s, belief) + more_s >= left_s
+
+
+@kernel
+def has_to_return(arena, state, i):
+    """Whether UAS i has to fly home now: nothing is left to do, or battery or clock demand it.
+
+    What other UAS alone can cover is nothing left to do.
+    """
+    return _calls_home(arena, state, i, 1.0, 0.0)
 
 
 @kernel
 def call_home(arena, state, nonlinear, outcome):
     """Call those home that have to return; they fly home from then on.
+
+    In wind, home may be out of reach for as long as a gust blows. Who was called by one goes back
+    to work when it is over, with charge and time to spare.
 
     Args:
         arena: The arena.
@@ -93,5 +105,9 @@ def call_home(arena, state, nonlinear, outcome):
         outcome: Likewise.
     """
     for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING and not state.returning[i]:
+        if state.status[i] != FLYING:
+            continue
+        if not state.returning[i]:
             state.returning[i] = has_to_return(arena, state, i)
+        elif arena.rules[0].disturbed:
+            state.returning[i] = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)

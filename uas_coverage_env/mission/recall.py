@@ -13,7 +13,10 @@ BoolArray = NDArray[np.bool_]
 
 
 class Recall:
-    """The rule of return mode, which need not be on: a UAS that was called lands first.
+    """The rule of return mode, which need not be on: a UAS that it calls lands first.
+
+    Where return mode is on, it may also call for as long as a gust blows, which only the world
+    knows of.
 
     Args:
         n_uas: Size of the fleet.
@@ -32,8 +35,8 @@ class Recall:
         flies = swarm.status == FLYING
         self._called &= flies
         for u in np.flatnonzero(flies & ~self._called).tolist():
-            self._called[u] = swarm.returning[u] or has_to_return(view.arena, view.state, u)
-        return self._called
+            self._called[u] = has_to_return(view.arena, view.state, u)
+        return self._called | (swarm.returning & flies)
 
     def keep(self, called: BoolArray) -> None:
         """Forget others: what called them home no longer holds, as where there is more to cover.
