@@ -86,6 +86,7 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     length_m = math.hypot(x1 - x[X], y1 - x[Y])
     needed_m = -math.inf
     speed_mps = arena.uas[i].speed_mps
+    ceiling_m = arena.rules[0].ceiling_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
@@ -95,7 +96,9 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
         if not passes_over(obstacle, over, ends, leg, max(altitude_m, altitude1_m)):
             continue
         needed_m = max(needed_m, roof_m + HEADROOM_M)
-        rise_m = roof_m - altitude_m
+        # no higher than the ceiling: a UAS that is there waits for nothing
+        high_m = roof_m if roof_m <= ceiling_m else ceiling_m - HEADROOM_M
+        rise_m = high_m - altitude_m
         if rise_m > 0.0:
             climbing_s = rise_m / arena.uas[i].climb_mps + LEAD_S
             speed_mps = min(speed_mps, at * length_m / climbing_s)
