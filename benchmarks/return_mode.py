@@ -15,10 +15,10 @@ tilted rocks (`overhangs`). Charge is scarce: every UAS begins with what hoverin
 - fast: at full speed, heading and altitude drawn anew every 5 to 25 s;
 - away: at full speed away from its start, at a drawn altitude, in a heading that turns slowly.
 
-Nothing else moves; with `--level`, wind with turbulence and gusts, and vehicles other than believed,
-are drawn for each mission. A UAS is lost by any contact: `battery` is what return mode has to prevent. Each
-share stands beside a 95 % upper bound (Clopper and Pearson's, one-sided). Exits 0 where none was
-lost, 1 otherwise, 2 where the input is bad.
+Nothing else moves; with `--level`, wind with turbulence and gusts, and vehicles other than
+believed, are drawn for each mission. A UAS is lost by any contact: `battery` is what return mode
+has to prevent. Each share stands beside a 95 % upper bound (Clopper and Pearson's, one-sided).
+Exits 0 where none was lost, 1 otherwise, 2 where the input is bad.
 """
 
 from __future__ import annotations

@@ -50,5 +50,10 @@ def test_a_uas_that_the_world_calls_home_is_called(seen):
     assert seen(0.1, returning=np.array([False, True])) == [False, True]
 
 
+def test_a_uas_that_the_world_called_for_a_while_works_again(seen):
+    seen(0.1, returning=np.array([False, True]))
+    assert seen(0.1) == [False, False]
+
+
 def test_all_are_called_when_nothing_is_left_to_cover(seen):
     assert seen(0.1, uncovered=np.array([False])) == [True, True]

@@ -1,12 +1,14 @@
 """When a UAS has to turn home to arrive in time and with charge left."""
 
+import math
+
 from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.vehicle.range import RETURN_MODE, Speeds, flight_seconds
 from uas_coverage_env.world.coverage import can_cover
-from uas_coverage_env.world.state import CONSUMPTION, FLYING
+from uas_coverage_env.world.state import CONSUMPTION, FLYING, WIND
 
 _CLOCK_RESERVE_S = 30.0
 
@@ -16,6 +18,9 @@ away at full speed, and half a turn more."""
 
 _FAR_FROM_EMPTY, _FAR_FROM_EMPTY_S = 2.0, 120.0
 """With so many times the way home left, and so many seconds, nothing more is looked at."""
+
+_TOO_STRONG = 0.88
+"""Of the highest airspeed: a UAS leaves a wind against which it soon could not hold its place."""
 
 _AMPLE, _AMPLE_S = 2.0, 60.0
 """With so many times the way home left, and so many seconds, what called a UAS home was a gust."""
@@ -56,7 +61,7 @@ def seconds_to_keep(arena, i, x, left_s, belief=None):
 
 @kernel
 def _calls_home(arena, state, i, share, more_s):
-    """See `has_to_return`; of the way home so many times the time is asked for, and more_s."""
+    """See `has_to_return`: for a way home that takes `share` times as long, and more_s [s]."""
     left = 0
     for w in range(state.uncovered.shape[0]):
         left += state.uncovered[w]
@@ -76,6 +81,10 @@ def _calls_home(arena, state, i, share, more_s):
     if x[DOD] + home_s * uas.dod_per_s >= uas.dod_max:
         return True
     belief = state.belief[i]
+    if rules.disturbed:
+        wind_mps = math.hypot(belief[WIND], belief[WIND + 1])
+        if wind_mps > _TOO_STRONG * arena.vehicles[i].reference_max_mps:
+            return True
     # never less than the model says: what is saved now may be needed on the way
     per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
     left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s)
@@ -84,7 +93,7 @@ def _calls_home(arena, state, i, share, more_s):
 
 @kernel
 def has_to_return(arena, state, i):
-    """Whether UAS i has to fly home now: nothing is left to do, or battery or clock demand it.
+    """Whether UAS i has to fly home now: nothing is left to do, or battery, clock or wind say so.
 
     What other UAS alone can cover is nothing left to do.
     """
@@ -95,8 +104,8 @@ def has_to_return(arena, state, i):
 def call_home(arena, state, nonlinear, outcome):
     """Call those home that have to return; they fly home from then on.
 
-    In wind, home may be out of reach for as long as a gust blows. Who was called by one goes back
-    to work when it is over, with charge and time to spare.
+    In wind, home may be out of reach for as long as a gust blows, or as long as a UAS is high up.
+    It goes back to work when that is over, if charge and time are ample.
 
     Args:
         arena: The arena.

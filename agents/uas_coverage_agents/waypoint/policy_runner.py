@@ -136,7 +136,7 @@ class WaypointRunner:
 
     def _command(self, swarm: SwarmState, i: int) -> Command:
         # a UAS called by return mode is also sent home here: the world may fly without it
-        if self._returning[i] or self._targets[i] in (HOME, NO_TARGET):
+        if self._returning[i] or swarm.returning[i] or self._targets[i] in (HOME, NO_TARGET):
             return GoTo(None)
         target = int(self._targets[i])
         if target >= 0 and self._attempts.is_hard(i, target):
@@ -172,7 +172,9 @@ class WaypointRunner:
                 choices.legal,
             )  # fmt: skip
             choose(self._targets, choices.candidates, i, choice if follow < 0 else follow)
-        self._returning[:] = state.returning & (~silent | self._returning | swarm.returning)
+        # the world may call a UAS for a while; one that is called here lands first
+        self._returning[:] |= state.returning & ~silent & ~swarm.returning
+        self._returning &= swarm.status == FLYING
 
     def _look_ahead(self, state: WorldState) -> None:
         """Make the plan better; the observation in the workspace is lost."""

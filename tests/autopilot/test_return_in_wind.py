@@ -1,0 +1,74 @@
+"""Return mode in wind: a gust calls a UAS home for a while, a low charge for good."""
+
+import pytest
+from small_worlds import box, meadow, waypoint
+
+from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.scenario.air import Gust, Wind
+from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
+
+FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)
+
+
+def away_from_home(place_m, wind=None, return_mode=True, **options):
+    """A UAS at a place, in wind, that is brought home from there."""
+    scenario = meadow([(100.0, 30.0, -1.0)], waypoints=FAR, max_steps=900)
+    world = World(scenario.model_copy(update={"wind": wind}), return_mode=return_mode, **options)
+    world.state.departed[0] = True
+    world.state.x[0, :3] = place_m
+    return world
+
+
+def called(world, steps, altitude_m):
+    """Whether return mode has the UAS at each sample, as long as it flies."""
+    samples = []
+    for _ in range(steps):
+        world.step({name: Velocity(0.0, 0.0, altitude_m) for name in world.active})
+        samples.append(bool(world.state.returning[0]))
+    return samples
+
+
+def test_a_uas_that_a_gust_calls_home_goes_back_to_work_when_it_is_over():
+    gust = Gust(at_s=30.0, lasts_s=10.0, peak_mps=7.0, from_deg=180.0)
+    wind = Wind(mean_mps=6.0, from_deg=180.0, gusts=(gust,))
+    samples = called(away_from_home((150.0, 150.0, -20.0), wind), 80, 20.0)
+    assert not any(samples[:30])
+    assert any(samples[30:45])
+    assert not any(samples[60:])
+
+
+@pytest.mark.parametrize(("dod", "comes_home"), [(0.2, False), (0.71, True)])
+def test_a_uas_that_is_short_of_charge_is_called_until_it_lands(dod, comes_home):
+    world = away_from_home((150.0, 150.0, -20.0), Wind(mean_mps=6.0, from_deg=180.0))
+    world.state.x[0, DOD] = dod
+    samples = called(world, 60, 20.0)
+    assert samples == sorted(samples)
+    assert samples[-1] == comes_home
+    assert (world.state.status[0] == LANDED) == comes_home
+
+
+@pytest.mark.parametrize(("return_mode", "is_lost"), [(True, False), (False, True)])
+def test_a_wind_that_a_uas_cannot_hold_against_is_left_for_lower_air(return_mode, is_lost):
+    wind = Wind(mean_mps=11.6, from_deg=90.0, reference_height_m=40.0, roughness_m=0.05)
+    world = away_from_home((110.0, 20.0, -20.0), wind, return_mode, safety_filter=True)
+    world.state.x[0, DOD] = 0.05
+    called(world, 400, 48.0)
+    assert (world.state.status[0] == LOST) == is_lost
+
+
+@pytest.mark.parametrize("wind_mps", [0.0, 3.0])
+def test_home_is_found_from_above_a_roof_right_below_the_ceiling(wind_mps):
+    block = box("block", (60.0, 60.0, -46.3), (90.0, 90.0, 0.0))
+    world = World(
+        meadow([(100.0, 40.0, -1.0)], obstacles=(block,), waypoints=FAR),
+        disturbances=(constant_wind(wind_mps, 180.0),) if wind_mps else None,
+        safety_filter=True,
+    )
+    world.state.departed[0] = True
+    world.state.x[0, :3] = 75.0, 75.0, -49.4
+    while not world.done:
+        outcome = world.step({"uas_1": GoTo(None)})
+        assert outcome["breaches"][0] == 0
+    assert world.state.status[0] == LANDED
