@@ -102,7 +102,7 @@ def has_to_return(arena, state, i):
 
 @kernel
 def call_home(arena, state, nonlinear, outcome):
-    """Call those home that have to return; they fly home from then on.
+    """Call those home that have to return; in still air they fly home from then on.
 
     In wind, home may be out of reach for as long as a gust blows, or as long as a UAS is high up.
     It goes back to work when that is over, if charge and time are ample.

@@ -60,7 +60,7 @@ class WorldState(NamedTuple):
     departed: Annotated[NDArray[np.bool_], "U"]
     """Has been farther from its start than the landing distance."""
     returning: Annotated[NDArray[np.bool_], "U"]
-    """Return mode has taken over."""
+    """Return mode has it now."""
     filtered: Annotated[NDArray[np.bool_], "U"]
     """The safety filter replaced its last command."""
     uncovered: Annotated[NDArray[np.bool_], "W"]
@@ -167,7 +167,7 @@ class SwarmState:
         reference_mps: (U, 2) [m/s] velocities that the inner loops track, north and east.
         status: (U,) FLYING, LANDED or LOST; one that swaps packs has landed.
         departed: (U,) has been farther from its start than the landing distance.
-        returning: (U,) return mode has taken over: commands are replaced by the way home.
+        returning: (U,) return mode has it now: commands are replaced by the way home.
         uncovered: (W,) waypoint still to be covered.
         home_m: (U, 3) [m] the starts.
         moving_position_m: (M, 3) [m] centres of moving obstacles, now.

@@ -39,7 +39,7 @@ _FEATURES = (
     Feature("reference", 2, -2, 2, "velocity that the inner loop tracks, as `velocity`"),
     flag("flying", "1 while it flies, 0 once landed or lost"),
     flag("departed", "1 once it has left its start: it may land there"),
-    flag("returning", "1 once return mode has taken over"),
+    flag("returning", "1 while return mode flies it home"),
     flag("rank", "its place in the fleet, 0 the first, 1 the last"),
     flag("dod", "depth of discharge"),
     Feature("polarisation", 1, -1, 1, "polarisation voltage of the battery / 1 V"),
