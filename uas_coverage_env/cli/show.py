@@ -21,7 +21,6 @@ from uas_coverage_env.cli.figures_of_flight import (
     verdict,
 )
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.flight import Flight, accomplished
 
 
@@ -48,7 +47,7 @@ def show(
     flights = [Flight.load(source) for source in sources]
     bounds: list[dict[str, Any] | None] = [None] * len(flights)
     if bound:
-        with _stages() as say, compiling_for("the bound"):
+        with _stages() as say:
             bounds = [_bound(flight, say) for flight in flights]
     if as_json:
         _print_json(flights, sources, bounds)
