@@ -25,6 +25,7 @@ from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief, Relaunch
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
+from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
 from uas_coverage_env.world.packs import swaps_alone
 
@@ -176,7 +177,7 @@ def _make_ready(
 ) -> None:
     """Compile world and planner, then put both at the start: no decision pays for compilation."""
     state = world.swarm_state()
-    hover = {name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)}
+    hover = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
     packed = pack(hover, state.names, state.active, len(state.uncovered))
     meter.terms(packed, world.step(packed))
     world.reset()

@@ -187,7 +187,7 @@ def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
     """The name of each UAS beside its mark; where there is no free place within the frame, none."""
     figure.draw_without_rendering()  # lays out the axes, so that distances are known
     pt_per_px = _PT_PER_IN / figure.dpi
-    lowest_pt, highest_pt = pt_per_px * axes.bbox.intervaly
+    lowest_pt, highest_pt = (pt_per_px * edge for edge in axes.bbox.intervaly)
     taken: list[Box] = []
     many = len(flight.names) > MANY
     for i, whole in enumerate(flight.names):
