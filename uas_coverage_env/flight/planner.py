@@ -61,7 +61,7 @@ class Planner(Protocol):
     """
 
     def reset(self, brief: MissionBrief, seed: int, /) -> None:
-        """Start a new mission; a planner that draws lots draws them from the seed alone.
+        """Start a new mission; random numbers are drawn from the seed alone.
 
         Called again in flight when an event changes the scene (docs/faults.md), before the next
         `act`, with a brief of what is known then; the swarm goes on from where it is.
