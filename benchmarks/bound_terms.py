@@ -37,6 +37,9 @@ from uas_coverage_env.vehicle import PHI, THETA, VX, VY
 FloatArray = NDArray[np.float64]
 
 _SIDES = 24
+_STATES = 3  # of an axis
+_PLACE, _INPUTS = 2 * _STATES, 2 * _STATES + 2
+"""First variables of where the visit is and of what is put in; those of the states come before."""
 _J_PER_WH = 3600.0
 
 
@@ -67,7 +70,7 @@ def known_of(bound: MissionBound) -> Known:
 def at_prices(bound: MissionBound, flight: Flight) -> float:
     """What the flight costs at the prices of the bound [J]."""
     prices, trim = bound._prices, bound._vehicles[0].trim_tilt_rad_per_mps
-    x = flight.x[:-1, 0][flight.current_A[: len(flight.x) - 1, 0] > 0.0]
+    x = flight.x[:-1][flight.current_A[: len(flight.x) - 1] > 0.0]
     beyond = np.hypot(x[:, PHI] - trim * x[:, VY], x[:, THETA] + trim * x[:, VX])
     speed = np.hypot(x[:, VX], x[:, VY])
     return float((prices.step + prices.mps * speed + prices.rad * beyond).sum() - prices.once)
@@ -101,11 +104,11 @@ def in_a_row(
     before, after = legs.before[visits[0], sides_of[0]], legs.after[visits[-1], sides_of[1]]
     n = int(before + sum(between) + after)
     at = before + np.concatenate([[0], np.cumsum(between)]).astype(int)
-    size = 8 + 4 * n
-    beyond, speed = 8 + 2 * n, 8 + 3 * n
+    size = _INPUTS + 4 * n
+    beyond, speed = _INPUTS + 2 * n, _INPUTS + 3 * n
     x, place = np.zeros((2, 3, size)), np.zeros((2, size))
-    x[0, :, :3] = x[1, :, 3:6] = np.eye(3)
-    place[0, 6] = place[1, 7] = 1.0
+    x[0, :, :_STATES] = x[1, :, _STATES:_PLACE] = np.eye(_STATES)
+    place[:, _PLACE:_INPUTS] = np.eye(2)
     angles = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
     sides = np.vstack([np.stack([np.cos(angles), np.sin(angles)], axis=1), into, out])
     cost, rows, bounds = np.zeros(size), [], []

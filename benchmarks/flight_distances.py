@@ -48,8 +48,14 @@ def hull_distance(vertices_m: Any) -> Distance:
     """The largest signed distance from the faces of the hull of some points, outside positive."""
     points = np.array(vertices_m, float)
     centre = points.mean(axis=0)
-    faces = ConvexHull(points - centre).equations
-    return lambda p: ((p - centre) @ faces[:, :3].T + faces[:, 3]).max(axis=-1)
+    normals, offsets = faces(points - centre)
+    return lambda p: ((p - centre) @ normals.T + offsets).max(axis=-1)
+
+
+def faces(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(F, 3) outward normals of the hull of some points, and (F,) offsets: 0 on a face."""
+    equations = ConvexHull(points).equations
+    return equations[:, :-1], equations[:, -1]
 
 
 def cylinder_distance(radius_m: float, half_height_m: float) -> Distance:
@@ -133,9 +139,9 @@ def too_low(scenario: dict[str, Any], track: Track) -> NDArray[np.int64]:
     for obstacle in scenario["obstacles"] if least else ():
         points = np.array(obstacle["vertices_m"], float)
         centre = points.mean(axis=0)
-        faces = ConvexHull(points - centre).equations
-        pushed_up = faces[:, 3] - least * np.maximum(0.0, -faces[:, 2])
-        low |= ((position - centre) @ faces[:, :3].T + pushed_up).max(axis=1) < -1e-9
+        normals, offsets = faces(points - centre)
+        pushed_up = offsets - least * np.maximum(0.0, -normals[:, 2])
+        low |= ((position - centre) @ normals.T + pushed_up).max(axis=1) < -1e-9
     away = np.hypot(*(position - np.array(track.entry["start_m"]))[:, :2].T)
     return np.flatnonzero(low & (away > scenario["landing_distance_m"] + 2.0 * least))
 

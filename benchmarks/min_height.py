@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env import Flight, Scenario, generate_scenario, load_planner, rollout
 from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.vehicle import Z
 
 PLANNERS = ("nearest-waypoint", "lawnmower", "tour", "milp-mpc", "milp-mpc-guided")
 OPTIONS = {
@@ -59,7 +60,7 @@ def low_percent(flight: Flight, scenario: Scenario) -> float:
     """Share of the samples in flight that are too low by the scenario's rule, roofs aside [%]."""
     starts_m = np.array([uas.start_m for uas in scenario.uas])
     away_m = np.linalg.norm(flight.x[:, :, :2] - starts_m[:, :2], axis=2)
-    low: NDArray[np.bool_] = -flight.x[:, :, 2] < scenario.min_height_m
+    low: NDArray[np.bool_] = -flight.x[:, :, Z] < scenario.min_height_m
     flying = np.arange(len(flight.x))[:, None] < flight.last_sample
     return 100.0 * float((low & (away_m > scenario.landing_zone_m) & flying).sum() / flying.sum())
 

@@ -21,7 +21,7 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
-from solver_watch import Watched, watch
+from solver_watch import SECONDS, Watched, watch
 from uas_coverage_baselines.milp_mpc import MilpMpc
 from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
@@ -170,7 +170,7 @@ def _draw_gaps(runs: dict[str, dict[str, Watched]], path: Path) -> None:
     for axis, (stage, row) in zip(axes[0], runs.items(), strict=True):
         for name, watched in row.items():
             gap = np.where(watched.gaps(0.0) < 10.0, watched.gaps(0.0), np.nan)
-            axis.step(watched.history[:, 0], np.maximum(gap, 1e-2), where="post", label=name)
+            axis.step(watched.history[:, SECONDS], np.maximum(gap, 1e-2), where="post", label=name)
         axis.set(title=stage, xlabel="processor time [s]", yscale="log", ylim=(8e-3, 12.0))
         axis.set_xlim(left=0.0)
         axis.grid(alpha=0.3)

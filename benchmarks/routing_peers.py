@@ -41,6 +41,7 @@ from uas_coverage_env.mission import first_sight
 
 console = Console(width=130)
 _MS = 1000.0
+SECONDS, COST = range(2)
 _FIRST_MOVES, _MOST_MOVES = 5_000, 20_000_000
 _GAPS = 0.01, 0.05
 _PER_BATTERY = 25  # waypoints
@@ -54,7 +55,7 @@ class Found(NamedTuple):
     """What a solver has found.
 
     Attributes:
-        trace: (K, 2) processor seconds and cost [s], of better and better orders.
+        trace: (K, 2) processor `SECONDS` and `COST` [s], of better and better orders.
         routes: Of the last one.
     """
 
@@ -207,7 +208,7 @@ def measure(table: Table, n_uas: int, n_waypoints: int, seconds: float, weight: 
         seeds = range(1 if solver is or_tools else 3)
         runs = [solver(arcs_only, weight, seconds, seed) for seed in seeds]
         found[name] = [run for run in runs if run is not None]
-    best = min(run.trace[:, 1].min() for runs in found.values() for run in runs)
+    best = min(run.trace[:, COST].min() for runs in found.values() for run in runs)
     effort = SearchEffort(2_000_000, total_weight=weight, by_pieces=True)
     turning = improve_routes(task, empty_routes(n_uas), effort, 0).cost_s
     for name, runs in found.items():
@@ -215,15 +216,15 @@ def measure(table: Table, n_uas: int, n_waypoints: int, seconds: float, weight: 
             table.add_row(f"{n_uas} x {n_waypoints}", name, *["-"] * 4)
             continue
         cells = [_median([_time_to(run, best * (1.0 + gap)) for run in runs]) for gap in _GAPS]
-        last = [100.0 * (run.trace[:, 1].min() / best - 1.0) for run in runs]
+        last = [100.0 * (run.trace[:, COST].min() / best - 1.0) for run in runs]
         flown = [100.0 * (flown_cost_s(task, run.routes, weight) / turning - 1.0) for run in runs]
         cells += [f"{np.median(last):.2f}", f"{np.median(flown):+.1f}"]
         table.add_row(f"{n_uas} x {n_waypoints}", name, *cells)
 
 
 def _time_to(run: Found, cost: float) -> float:
-    good = run.trace[run.trace[:, 1] <= cost]
-    return float(good[:, 0].min()) if len(good) else np.inf
+    good = run.trace[run.trace[:, COST] <= cost]
+    return float(good[:, SECONDS].min()) if len(good) else np.inf
 
 
 def _median(seconds: list[float]) -> str:

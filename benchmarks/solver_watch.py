@@ -13,6 +13,7 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 
 ONE_PERCENT = 0.01
+SECONDS, OBJECTIVE, BOUND = range(3)
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Watched:
         optimal: whether the gap was closed.
         objective: of the best solution; inf without one.
         bound: proven lower bound.
-        history: (T, 3) seconds, best objective, bound, as HiGHS told them.
+        history: (T, 3) `SECONDS`, best `OBJECTIVE`, `BOUND`, as HiGHS told them.
         violation: of the solution, by our own arithmetic.
     """
 
@@ -37,13 +38,13 @@ class Watched:
 
     def first_s(self) -> float | None:
         """When the first solution was there; None: not within the cap."""
-        found = np.flatnonzero(np.isfinite(self.history[:, 1]))
-        return float(self.history[found[0], 0]) if len(found) else None
+        found = np.flatnonzero(np.isfinite(self.history[:, OBJECTIVE]))
+        return float(self.history[found[0], SECONDS]) if len(found) else None
 
     def within_one_percent_s(self, offset: float) -> float | None:
         """When the gap relative to objective + offset was at most 1 %; None: not within the cap."""
         found = np.flatnonzero(self.gaps(offset) <= ONE_PERCENT)
-        return float(self.history[found[0], 0]) if len(found) else None
+        return float(self.history[found[0], SECONDS]) if len(found) else None
 
     def gaps(self, offset: float) -> np.ndarray:
         """(T,) gap over time, relative to objective + offset; inf without solution or bound."""
@@ -101,8 +102,8 @@ def watch(milp: BuiltMilp, cap_s: float, relative_gap: float = 1e-4) -> Watched:
     history.append((took_s, objective, bound))
     rows = np.array(history)
     rows[np.abs(rows) >= 1e30] = np.nan
-    rows[:, 1] = np.where(np.isnan(rows[:, 1]), np.inf, rows[:, 1])
-    rows[:, 2] = np.where(np.isnan(rows[:, 2]), -np.inf, rows[:, 2])
+    rows[:, OBJECTIVE] = np.where(np.isnan(rows[:, OBJECTIVE]), np.inf, rows[:, OBJECTIVE])
+    rows[:, BOUND] = np.where(np.isnan(rows[:, BOUND]), -np.inf, rows[:, BOUND])
     return Watched(took_s, optimal, objective, bound, rows, violation)
 
 

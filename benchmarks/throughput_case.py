@@ -81,7 +81,7 @@ def _vector(env: Any, count: Callable[[dict[str, Any]], float]) -> Steps:
         infos = []
         for step in range(n_steps):
             infos.append(latest)
-            latest = env.step(drawn[step % N_DRAWN])[4]
+            *_, latest = env.step(drawn[step % N_DRAWN])
         return lambda: (sum(map(count, infos)), n_steps * env.num_envs * N_AGENTS)
 
     return steps
@@ -229,7 +229,8 @@ def _peak_mb() -> float:
 
 def main() -> None:
     """Make the environment, then step as often as asked."""
-    case, num_envs, threads = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    _, case, *numbers = sys.argv
+    num_envs, threads = map(int, numbers)
     # what libraries print must not come between the answers
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())

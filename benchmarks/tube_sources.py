@@ -29,6 +29,7 @@ from uas_coverage_env import generate_scenario
 from uas_coverage_env.scenario import LEVELS
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED
 from uas_coverage_env.vehicle.tube import belief_gain, tube_of
 
 FloatArray = NDArray[np.float64]
@@ -37,17 +38,28 @@ SECONDS = (1, 2, 3, 5, 8, 14)
 _FEET = 0.3048
 _LONG = 400
 
+_BELIEF, _WIND, _FIRST_BELIEF, _ALL = range(RATE + 1, RATE + 5)
+"""What follows the states of an axis in that of an error: the belief of the wind beyond the first
+one, the wind, the first belief; and how many there are."""
+
 
 def loop(vehicle: VehicleParams, dt_s: float) -> tuple[FloatArray, FloatArray]:
-    """Map (5, 5) of an error and the belief, and what a wind of 1 m/s does to them (5,)."""
+    """Map of an error and the belief, and what a wind of 1 m/s does to them (see `_BELIEF`)."""
     A, B = horizontal_axis(vehicle, dt_s)
     _, k_tilt, _ = gain = design_velocity_loop(vehicle, dt_s).gain
-    closed = np.zeros((5, 5))
-    closed[:4, :4] = A - np.outer(B, [0.0, *gain])
-    closed[:4, 4] = -B * k_tilt * vehicle.trim_tilt_rad_per_mps
-    closed[4, 4] = 1.0 - belief_gain(dt_s)
-    by_wind = [dt_s - A[0, 1], 1.0 - A[1, 1], -A[2, 1], -A[3, 1], belief_gain(dt_s)]
-    return closed, np.array(by_wind)
+    closed = np.zeros((_WIND, _WIND))
+    closed[:_BELIEF, :_BELIEF] = A - np.outer(B, [0.0, *gain])
+    closed[:_BELIEF, _BELIEF] = -B * k_tilt * vehicle.trim_tilt_rad_per_mps
+    closed[_BELIEF, _BELIEF] = 1.0 - belief_gain(dt_s)
+    return closed, np.append(_by_wind(A, dt_s), belief_gain(dt_s))
+
+
+def _by_wind(A: FloatArray, dt_s: float) -> FloatArray:
+    """What a wind of 1 m/s, which nobody knows, does to the states of an axis in a step."""
+    carried = -A[:, SPEED]
+    carried[POSITION] += dt_s
+    carried[SPEED] += 1.0
+    return carried
 
 
 def off_m(vehicle: VehicleParams, dt_s: float, wind_mps: FloatArray, steps: int) -> FloatArray:
@@ -55,10 +67,10 @@ def off_m(vehicle: VehicleParams, dt_s: float, wind_mps: FloatArray, steps: int)
     closed, by_wind = loop(vehicle, dt_s)
     most_m, belief = np.zeros(steps + 1), 0.0
     for start in range(len(wind_mps) - steps):
-        error = np.zeros(5)
+        error = np.zeros(_WIND)
         for k in range(steps):
             error = closed @ error + by_wind * (wind_mps[start + k] - belief)
-            most_m[k + 1] = max(most_m[k + 1], abs(error[0]))
+            most_m[k + 1] = max(most_m[k + 1], abs(error[POSITION]))
         belief += belief_gain(dt_s) * (wind_mps[start] - belief)
     return most_m
 
@@ -88,16 +100,17 @@ def turbulence_m(vehicle: VehicleParams, dt_s: float, scale_s: float, steps: int
     for _ in range(_LONG):
         both = ahead @ both @ ahead.T + drawn
     # error and belief of it (5), wind, and the belief with which the prediction begins
-    step = np.zeros((7, 7))
-    step[:5, :5], step[:5, 5], step[:5, 6] = closed, by_wind, -by_wind
-    step[5, 5], step[6, 6] = kept, 1.0
-    noise = np.zeros((7, 7))
-    noise[5, 5] = drawn[0, 0]
-    covariance, result = np.zeros((7, 7)), [0.0]
-    covariance[5:, 5:] = both
+    step = np.zeros((_ALL, _ALL))
+    step[:_WIND, :_WIND] = closed
+    step[:_WIND, _WIND], step[:_WIND, _FIRST_BELIEF] = by_wind, -by_wind
+    step[_WIND, _WIND], step[_FIRST_BELIEF, _FIRST_BELIEF] = kept, 1.0
+    noise = np.zeros((_ALL, _ALL))
+    noise[_WIND, _WIND] = drawn[0, 0]
+    covariance, result = np.zeros((_ALL, _ALL)), [0.0]
+    covariance[_WIND:, _WIND:] = both
     for _ in range(steps):
         covariance = step @ covariance @ step.T + noise
-        result.append(2.0 * math.sqrt(covariance[0, 0]))
+        result.append(2.0 * math.sqrt(covariance[POSITION, POSITION]))
     return np.array(result)
 
 
@@ -105,7 +118,7 @@ def held(vehicle: VehicleParams, dt_s: float, steps: int) -> tuple[FloatArray, f
     """The tube (steps + 1,) with the position fed back, and its angular acceleration, per m/s."""
     A, B = horizontal_axis(vehicle, dt_s)
     gain = position_gain(vehicle, dt_s)
-    response = np.array([dt_s - A[0, 1], 1.0 - A[1, 1], -A[2, 1], -A[3, 1]])
+    response = _by_wind(A, dt_s)
     total, alpha, result = 0.0, 0.0, [0.0]
     for _ in range(_LONG):
         total, alpha = total + abs(response[0]), alpha + abs(float(gain @ response))

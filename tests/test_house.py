@@ -70,9 +70,9 @@ def _package(module: str) -> str:
     return ".".join(module.split(".")[:2])
 
 
-def _nodes() -> Iterator[tuple[Path, ast.AST]]:
-    """All syntax nodes of the packages, with their files."""
-    for folder in PACKAGES.values():
+def _nodes(*folders: Path) -> Iterator[tuple[Path, ast.AST]]:
+    """All syntax nodes of some folders, of the packages by default, with their files."""
+    for folder in folders or PACKAGES.values():
         for path in folder.rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 yield path, node
@@ -101,13 +101,55 @@ def _is_command(node: ast.AST) -> bool:
 
 
 def test_no_column_with_a_meaning_is_addressed_by_its_number():
-    # up to 2 they are coordinates, ends and pairs mostly; beyond, a number says nothing to a reader
+    # up to 2 they are coordinates, ends and pairs; beyond, and in records, a number says nothing
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}"
-        for path, node in _nodes()
-        if isinstance(node, ast.Subscript) and _is_numbered(node)
+        for path, node in _nodes(*PACKAGES.values(), ROOT / "benchmarks")
+        if isinstance(node, ast.Subscript) and (_is_numbered(node) or _is_field(node))
     ]
     assert not found, "name these columns where their array is declared"
+
+
+@pytest.mark.parametrize(
+    ("text", "numbered"),
+    [
+        ("swarm.x[i, 2]", True),
+        ("flight.x[:, :, 0]", True),
+        ("packs[r, 1]", True),
+        ("row[3]", True),
+        ("noise[5, 5]", True),
+        ("swarm.x[i, Z]", False),
+        ("swarm.x[0, Z]", False),
+        ("swarm.x[i, :3]", False),
+        ("places_m[:, 2]", False),
+    ],
+)
+def test_a_column_by_its_number_is_told_from_coordinates(text, numbered):
+    node = ast.parse(text, mode="eval").body
+    assert isinstance(node, ast.Subscript)
+    assert (_is_numbered(node) or _is_field(node)) is numbered
+
+
+RECORDS = {
+    "x": "states of the UAS: `vehicle/layout.py`",
+    "packs": "flights with fresh packs: `routing/task.py`",
+    "history": "what a solver told: `benchmarks/solver_watch.py`",
+    "trace": "better and better orders: `benchmarks/routing_peers.py`",
+    "_DEFLECTIONS": "commands to try instead: `autopilot/safety.py`",
+}
+"""Arrays whose columns mean different things from the first on, as names and as attributes; of a
+plain `x`, which may be anything, nothing is asked."""
+
+
+def _is_field(node: ast.Subscript) -> bool:
+    """Whether a number says which column of a record is meant."""
+    named = node.value.attr if isinstance(node.value, ast.Attribute) else ""
+    if isinstance(node.value, ast.Name) and node.value.id != "x":
+        named = node.value.id
+    if named not in RECORDS or not isinstance(node.slice, ast.Tuple):
+        return False
+    column = node.slice.elts[-1]
+    return isinstance(column, ast.Constant) and isinstance(column.value, int)
 
 
 NOT_COLUMNS = {

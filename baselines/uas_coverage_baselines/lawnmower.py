@@ -38,11 +38,11 @@ class Lawnmower:
         waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         self._runs: list[list[int]] = [[] for _ in brief.uas]
         kinds = np.unique(brief.can_cover, axis=1)
-        for who in kinds.T:
+        for able in kinds.T:
             # waypoints that the same UAS can cover, cut among these
-            what = np.flatnonzero((brief.can_cover == who[:, None]).all(axis=0))
+            what = np.flatnonzero((brief.can_cover == able[:, None]).all(axis=0))
             order = what[back_and_forth(waypoints_m[what])].tolist()
-            team = np.flatnonzero(who).tolist()
+            team = np.flatnonzero(able).tolist()
             if team:
                 for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
                     self._runs[u] += run

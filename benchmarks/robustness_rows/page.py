@@ -54,7 +54,7 @@ def page(stores: Mapping[str, Store], quick: bool, before: str = "") -> tuple[st
         summary.append((name, row.title, counted, f"{finding.failures:,}", bound))
         parts.append(_section(row, store, finding, quick))
     summary.sort(key=lambda line: int(line[0][1:]))
-    parts.sort(key=lambda part: int(part[4 : part.index(":")]))
+    parts.sort(key=lambda part: int(part.removeprefix("## R").partition(":")[0]))
     headings = ("row", "what", "tried", "failed", "share at most")
     head = _HEAD.format(version=version("uas-coverage-env"))
     return "\n".join([head, _left(markdown(headings, summary)), "", *parts]), failed

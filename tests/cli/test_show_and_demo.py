@@ -79,7 +79,8 @@ def test_show_puts_the_least_energy_beside_a_flight_that_has_one(elsewhere, caps
     assert good["above"] > 0.0
     assert bad["above"] is None, "of a mission that is not accomplished"
     assert main(["show", "good", "bad", "--bound"]) == 0
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
+    assert f"computing the least energy of {scenario.name} in {flight.steps} steps ..." in err
     assert row(out, "least energy, Wh")[0] == f"{least_Wh:.2f}"
     assert row(out, "above it")[0] == f"{good['above']:.1%}"
 

@@ -11,6 +11,7 @@ from uas_coverage_env.flight import (
     load_planner,
     planner_names,
     registry,
+    rollout,
 )
 
 
@@ -123,3 +124,100 @@ def test_a_planner_whose_package_is_missing_is_refused_in_one_line():
 def test_a_planner_that_was_not_announced_goes_by_the_name_of_its_class():
     assert registry.name_of(Tuned(TunedOptions())) == "Tuned"
     assert registry.options_of(object()) == {}
+
+
+OWN = """
+from pydantic import Field
+
+from uas_coverage_env import GoTo
+from uas_coverage_env.flight import PlannerOptions
+
+
+class Plain:
+    \"\"\"Everybody to the first waypoint.\"\"\"
+
+    def reset(self, brief, seed):
+        pass
+
+    def act(self, swarm):
+        return {name: GoTo(0) for name in swarm.active}
+
+
+class Settings(PlannerOptions):
+    waypoint: int = Field(default=1, description="flown to")
+
+
+class Set(Plain):
+    Options = Settings
+
+    def __init__(self, options):
+        self.options = options
+
+
+class Sized(Plain):
+    def __init__(self, size_m):
+        pass
+
+
+class Mute:
+    def reset(self, brief, seed):
+        pass
+
+
+def function(swarm):
+    return {}
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A user's folder with modules, one of them broken."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_own_planners.py").write_text(OWN, encoding="utf-8")
+    (tmp_path / "my_broken_planners.py").write_text("import nothing_at_all\n", encoding="utf-8")
+
+
+@pytest.mark.usefixtures("own")
+def test_a_class_beside_the_command_is_a_planner_with_or_without_options():
+    flight = rollout("open_field", "my_own_planners:Plain", max_steps=2)
+    assert (flight.planner, flight.steps) == ("Plain", 2)
+    planner = load_planner("my_own_planners:Set", {"waypoint": "3"})
+    assert registry.options_of(planner) == {"waypoint": 3}
+    described = registry.describe_planner("my_own_planners:Set")
+    assert described.name == "my_own_planners:Set"
+    assert [option.name for option in described.options] == ["waypoint"]
+    assert registry.describe_planner("my_own_planners:Plain").summary.startswith("Everybody")
+
+
+@pytest.mark.usefixtures("own")
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("my_own_planner:Plain", {}, "there is no module 'my_own_planner'"),
+        ("polcy:mine", {}, "did you mean policy:mine?"),
+        ("my_own_planners:Plane", {}, "has no 'Plane'"),
+        ("my_own_planners:", {}, "or MODULE:CLASS"),
+        ("my_own_planners:function", {}, "is no class"),
+        ("my_own_planners:Sized", {}, "size_m"),
+        ("my_own_planners:Mute", {}, "has no method act"),
+        ("my_own_planners:Plain", {"speed": "3"}, "has no option 'speed'; allowed: none"),
+        ("my_own_planners:Set", {"waypoint": "no"}, "default 1"),
+        ("my_broken_planners:Plain", {}, "nothing_at_all"),
+    ],
+)
+def test_a_class_that_makes_no_planner_is_refused_in_one_line(name, options, said):
+    with pytest.raises(InputError) as error:
+        load_planner(name, options)
+    assert said in str(error.value)
+    assert name in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_what_is_no_planner_is_refused_before_it_flies():
+    def choose(swarm):
+        return {}
+
+    with pytest.raises(InputError, match=r"'choose' has no method reset\(brief, seed\)"):
+        rollout("open_field", choose)
+    with pytest.raises(InputError, match=r"'Tuned' is a class; make one, as in Tuned\(\)"):
+        rollout("open_field", Tuned)

@@ -19,7 +19,7 @@ from uas_coverage_env.leaderboard import (
     scenarios_of,
     source_of,
 )
-from uas_coverage_env.leaderboard.hashing import content_hash
+from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.sweep import difference
 from uas_coverage_env.scenario import load_scenario
@@ -183,3 +183,14 @@ def test_a_flight_is_kept_where_that_is_asked_for(tmp_path):
     assert kept_as(entry) == kept_as(row) == "corridor-hover-7"
     kept = Flight.load(tmp_path / "corridor-hover-7")
     assert (kept.x == rollout(short, "hover", seed=7).x).all()
+
+
+def test_the_source_of_a_single_module_counts_as_that_of_a_package_does(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    module = tmp_path / "my_single_planner.py"
+    hashes = set()
+    for text in ("SPEED = 1\n", "SPEED = 2\n", "SPEED = 2\n"):
+        module.write_text(text, encoding="utf-8")
+        hashes.add(source_hash(["my_single_planner"]))
+    assert len(hashes) == 2
+    assert source_hash(["my_single_planner"]) != source_hash(["no_such_planner_at_all"])

@@ -236,6 +236,25 @@ def test_of_many_uas_no_name_lies_on_another_on_the_map(swarm):
         assert not any(box.overlaps(other) for other in boxes[:i]), names[i].get_text()
 
 
+@pytest.mark.parametrize("edge", ["upper", "lower"])
+def test_of_many_uas_no_name_stands_outside_the_frame(swarm, edge):
+    """Three rows of them along an edge of the fence, where names would fit outside only."""
+    north_m = swarm.scenario.fence.vertices_m[:, 0]
+    x = swarm.x.copy()
+    rows_m = np.linspace(0.0, 10.0, x.shape[1])
+    x[:, :, 0] = north_m.max() - rows_m if edge == "upper" else north_m.min() + rows_m
+    figure = map_figure(dataclasses.replace(swarm, x=x))
+    figure.draw_without_rendering()
+    frame = figure.axes[0].get_window_extent()
+    names = [text for text in figure.axes[0].texts if text.get_text().isdigit()]
+    assert names
+    for name in names:
+        box = name.get_window_extent()
+        halo = 2.0
+        assert box.y0 > frame.y0 - halo, name.get_text()
+        assert box.y1 < frame.y1 + halo, name.get_text()
+
+
 def test_the_published_curves_are_drawn_beside_the_village_alone(flight):
     elsewhere = dataclasses.replace(
         flight, scenario=flight.scenario.model_copy(update={"name": "meadow"})

@@ -8,8 +8,19 @@ import urllib.request
 from urllib.parse import urlsplit
 
 import pytest
-from chromium import SMALL, complaints, emulate, needs_chromium, opened, pixels, settled, time_s
+from chromium import (
+    SMALL,
+    complaints,
+    emulate,
+    needs_chromium,
+    opened,
+    pixels,
+    pressed,
+    settled,
+    time_s,
+)
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env.cli import main
@@ -147,6 +158,25 @@ def test_a_browser_goes_on_with_the_flight_until_it_ends(browser, plain):
     page.close(plain)
     wait.until(lambda _: browser.find_elements(By.CSS_SELECTOR, "body.ended"))
     assert time_s(browser) == plain.steps
+    assert complaints(browser) == []
+
+
+@needs_chromium
+def test_a_page_opened_late_begins_now_and_can_go_back(browser, plain):
+    page = LivePage(until(plain, 31))
+    browser.get("about:blank")
+    browser.get(page.address)
+    wait = WebDriverWait(browser, 30)
+    wait.until(lambda _: page_time_is(browser, 30.0))
+    page.update(until(plain, 41))
+    wait.until(lambda _: time_s(browser) == 40.0)
+    pressed(browser, Keys.HOME)
+    assert time_s(browser) == 0.0
+    page.update(until(plain, 51))
+    slider = browser.find_element(By.CSS_SELECTOR, "input[type=range]")
+    wait.until(lambda _: float(slider.get_attribute("max")) == 50.0)
+    assert time_s(browser) == 0.0, "who looks at the past stays there"
+    page.close(plain)
     assert complaints(browser) == []
 
 

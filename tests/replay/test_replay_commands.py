@@ -40,8 +40,19 @@ def test_replay_writes_a_page_into_the_flight_and_again(directory, capsys):
         assert capsys.readouterr().out.startswith("page in flown/replay.html (")
     first = (directory / "replay.html").read_text(encoding="utf-8")
     assert "village, nearest-waypoint" in first
-    assert main(["replay", "flown", "flown"]) == 0
-    assert len((directory / "replay.html").read_text(encoding="utf-8")) > len(first)
+
+
+def test_a_page_of_two_flights_leaves_the_pages_of_each_alone(directory, flight, tmp_path, capsys):
+    flight.save(tmp_path / "other")
+    for name in ("flown", "other"):
+        assert main(["replay", name]) == 0
+    alone = {page: page.read_bytes() for page in tmp_path.glob("*/replay.html")}
+    assert len(alone) == 2
+    capsys.readouterr()
+    assert main(["replay", "flown", "other"]) == 0
+    assert capsys.readouterr().out.startswith("page in flown/replay_with_other.html (")
+    assert len((directory / "replay_with_other.html").read_bytes()) > max(map(len, alone.values()))
+    assert {page: page.read_bytes() for page in alone} == alone
 
 
 def test_replay_writes_a_film_but_not_over_another(directory, capsys):

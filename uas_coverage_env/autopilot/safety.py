@@ -32,11 +32,12 @@ from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 _LEAST_SPEED_MPS = 3.0
 _AS_WISHED, _CLIMBING, _SINKING, _LEVEL = range(4)
+_TURN_RAD, _SPEED_SHARE, _HEIGHT = range(3)
 _NOTICEABLE_M = 1e-3
 
 
 def _deflections() -> np.ndarray:
-    """(D, 3) turn [rad], share of the speed, and one of the four heights: nearest first.
+    """(D, 3) columns `_TURN_RAD`, `_SPEED_SHARE` and one of the four heights: nearest first.
 
     Instead of braking, last, come level flight, straight up or down, and creeping: a UAS wedged in
     between others may have room for no more.
@@ -102,9 +103,9 @@ def _deflect(arena, i, wish_mps, d, command):
     """Write the d-th nearest alternative to a velocity (north, east, down)."""
     uas = arena.uas[i]
     speed_mps = math.hypot(wish_mps[0], wish_mps[1])
-    heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, 0]
-    share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, 1]
-    height = _DEFLECTIONS[d, 2]
+    heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, _TURN_RAD]
+    share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, _SPEED_SHARE]
+    height = _DEFLECTIONS[d, _HEIGHT]
     down_mps = wish_mps[2]
     if height == _CLIMBING:
         down_mps = -uas.climb_mps

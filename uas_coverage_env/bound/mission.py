@@ -21,6 +21,7 @@ from uas_coverage_env.bound.passing import Costs, Passing
 from uas_coverage_env.bound.prices import STEPS, Ends, cheapest, energy_prices
 from uas_coverage_env.bound.program import Cut, least_routes
 from uas_coverage_env.bound.turning import Turning, motion_of, turning_of_fleet
+from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
@@ -105,7 +106,8 @@ class MissionBound:
         ]
         routes_J = least_routes(self._cost(self._prices_turning), step_J, cuts=cuts)
         if self._carried is not None:
-            routes_J = max(routes_J, self._carried.least_routes(step_J, cuts))
+            with compiling_for("lower bounds"):
+                routes_J = max(routes_J, self._carried.least_routes(step_J, cuts))
         return max(idle_J + routes_J * (1.0 - _ROUNDING), 0.0)
 
     def _needed(self, steps: int) -> tuple[int, ...]:

@@ -40,10 +40,10 @@ def demo(
     check_directory(directory, overwrite=overwrite)
     screen.print(f"{_PLANNER} flies the {_SCENARIO}", markup=False)
     mission = loaded(_SCENARIO)
-    player = load_planner(_PLANNER)
-    with compiling_for_flight(player):
+    planner = load_planner(_PLANNER)
+    with compiling_for_flight(planner):
         with shown(screen, mission) as on_step:
-            flight = rollout(mission, player, 0, on_step=on_step)
+            flight = rollout(mission, planner, 0, on_step=on_step)
         keep_flight(flight, directory, overwrite=overwrite)
         page = write_replay([flight], directory / "replay.html", sources=[str(directory)])
     report_flight(screen, flight, directory)

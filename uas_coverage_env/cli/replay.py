@@ -10,8 +10,6 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay import write_gif, write_replay, write_video
 
-_PAGE = "replay.html"
-
 
 def replay(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
@@ -31,7 +29,8 @@ def replay(
 ) -> None:
     """Write DIR/replay.html, a page that opens from disk and needs no network.
 
-    It is written anew each time. With two flights, both are played side by side.
+    It is written anew each time. With two flights, both are played side by side, in a page of its
+    own, DIR/replay_with_DIR2.html.
     """
     for path, suffix in ((video, ".mp4"), (gif, ".gif")):
         if path is not None:
@@ -43,7 +42,8 @@ def replay(
         if path is not None:
             write(flights, path, fps=fps)
             out.print(f"film in {path} ({path.stat().st_size / 1e3:.0f} kB)", markup=False)
-    page = write_replay(flights, directory / _PAGE, sources=sources)
+    page = directory / (f"replay_with_{other.resolve().name}.html" if other else "replay.html")
+    write_replay(flights, page, sources=sources)
     out.print(f"page in {page} ({page.stat().st_size / 1e3:.0f} kB)", markup=False)
 
 

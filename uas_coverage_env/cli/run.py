@@ -44,7 +44,8 @@ def run(
     planner: Annotated[
         str,
         typer.Option(
-            help="Name of the planner, see `planners`.", autocompletion=completion.planners
+            help="Name (see `planners`), or MODULE:CLASS of your own.",
+            autocompletion=completion.planners,
         ),
     ] = "milp-mpc",
     option: Annotated[

@@ -2,10 +2,14 @@
 
 import json
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from uas_coverage_env.cli.figures_of_flight import (
@@ -28,7 +32,8 @@ def show(
     bound: Annotated[
         bool,
         typer.Option(
-            "--bound", help="Beside the least energy that the mission takes (some 10 seconds)."
+            "--bound",
+            help="Beside the least energy that the mission takes (10 to 30 s of processor time).",
         ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")] = False,
@@ -40,7 +45,10 @@ def show(
     """
     sources = [str(path) for path in (directory, other) if path is not None]
     flights = [Flight.load(source) for source in sources]
-    bounds = [_bound(flight) if bound else None for flight in flights]
+    bounds: list[dict[str, Any] | None] = [None] * len(flights)
+    if bound:
+        with _stages() as say:
+            bounds = [_bound(flight, say) for flight in flights]
     if as_json:
         _print_json(flights, sources, bounds)
         return
@@ -79,7 +87,20 @@ def _print_json(
     typer.echo(json.dumps(entries[0] if len(entries) == 1 else entries, indent=2))
 
 
-def _bound(flight: Flight) -> dict[str, Any]:
+@contextmanager
+def _stages() -> Iterator[Callable[[str], object]]:
+    """Say on stderr what is computed: a line with a clock; without a terminal, plain lines."""
+    screen = Console(stderr=True, highlight=False)
+    if not screen.is_terminal:
+        yield lambda stage: screen.print(f"computing {stage} ...", markup=False)
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=screen, transient=True) as line:
+        task = line.add_task("", total=None)
+        yield lambda stage: line.update(task, description=f"computing {stage}")
+
+
+def _bound(flight: Flight, say: Callable[[str], object]) -> dict[str, Any]:
     """The lower bound of the mission, and how far above it the flight is, where there is one."""
     from uas_coverage_env.bound import MissionBound  # a second that other flights need not wait
 
@@ -91,8 +112,13 @@ def _bound(flight: Flight) -> dict[str, Any]:
         of_mission = MissionBound(flight.scenario)
     except ValueError as error:
         return least | {"why_not": str(error)}
-    least |= {"energy_Wh": of_mission.energy_Wh(), "steps": of_mission.steps}
+    name = flight.scenario.name
+    say(f"the fewest steps of {name}")
+    least["steps"] = of_mission.steps
+    say(f"the least energy of {name}")
+    least["energy_Wh"] = of_mission.energy_Wh()
     if accomplished(flight):
+        say(f"the least energy of {name} in {flight.steps} steps")
         flown_Wh = data(flight, "")["energy_Wh"]
         in_steps_Wh = of_mission.energy_Wh(flight.steps)
         least |= {"energy_Wh": in_steps_Wh, "above": flown_Wh / in_steps_Wh - 1.0}

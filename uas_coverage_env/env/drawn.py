@@ -167,7 +167,7 @@ class DrawnPool:
             if rng is not None and not self.drawn_from[lane].any():
                 raise ValueError(
                     f"the mission of lane {lane} was given to reset(): only missions that were "
-                    f"drawn can be put aside"
+                    f"drawn can be kept in a checkpoint"
                 )
 
     def redrawn(

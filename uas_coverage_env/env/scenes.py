@@ -127,14 +127,14 @@ def _laid_out(pool: ScenarioPool | DrawnPool, scene: int, known: Scenario) -> tu
 def scenes_in(
     state: Mapping[str, NDArray[Any]], missions: Mapping[int, Scenario]
 ) -> dict[int, Scenario]:
-    """The scenes of a batch that was put aside, where they have changed.
+    """The scenes of a checkpoint of a batch, where they have changed.
 
     Args:
         state: The arrays of the batch by name.
         missions: Lane -> the scenario that it flies, as it was at t = 0.
 
     Returns:
-        Lane -> the scenario as it was when the batch was put aside.
+        Lane -> the scenario as it was at the checkpoint.
 
     Raises:
         ValueError: No mission can have changed like this.

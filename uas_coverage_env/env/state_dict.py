@@ -1,4 +1,4 @@
-"""Arrays that were put aside and come back: checked, since kernels check no index."""
+"""Arrays of a checkpoint that are loaded: checked, since kernels check no index."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from uas_coverage_env.files.strict_toml import StrictModel
+from uas_coverage_env.files.strict_toml import InputError, StrictModel
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
 
@@ -57,11 +57,11 @@ class Planner(Protocol):
 
     A planner that is found by name (entry-point group `uas_coverage.planners`) is a class with an
     attribute `Options` (see `PlannerOptions`), made as `PlannerClass(options)`; for KIND:ARGUMENT
-    see `registry`.
+    and MODULE:CLASS see `registry`.
     """
 
     def reset(self, brief: MissionBrief, seed: int, /) -> None:
-        """Start a new mission; a planner that draws lots draws them from the seed alone.
+        """Start a new mission; random numbers are drawn from the seed alone.
 
         Called again in flight when an event changes the scene (docs/faults.md), before the next
         `act`, with a brief of what is known then; the swarm goes on from where it is.
@@ -76,6 +76,27 @@ class Planner(Protocol):
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Give each active UAS its command for the coming step."""
         ...
+
+
+def check_planner(planner: object, name: str = "") -> None:
+    """Refuse what is no planner, before it is asked for anything.
+
+    Args:
+        planner: What is to fly.
+        name: What to call it in the error.
+
+    Raises:
+        InputError: It has no `reset` and `act`, or is a class; one line.
+    """
+    name = name or getattr(planner, "__name__", type(planner).__name__)
+    if isinstance(planner, type):
+        raise InputError(f"planner {name!r} is a class; make one, as in {name}()")
+    for method in ("reset(brief, seed)", "act(swarm)"):
+        if not callable(getattr(planner, method.partition("(")[0], None)):
+            raise InputError(
+                f"planner {name!r} has no method {method}; a planner has reset(brief, seed) and "
+                "act(swarm), see docs/how_to_planner.md"
+            )
 
 
 class PlannerOptions(StrictModel):

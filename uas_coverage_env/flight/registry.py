@@ -1,4 +1,4 @@
-"""Planners by name: whatever announces itself in one of two entry-point groups.
+"""Planners by name: whatever announces itself in one of two entry-point groups, or MODULE:CLASS.
 
 `uas_coverage.planners`: a name is one planner, a class made as `PlannerClass(options)`.
 `uas_coverage.planner_kinds`: a name is a kind of which there are many, flown as `KIND:ARGUMENT`;
@@ -19,9 +19,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from uas_coverage_env.files.installed import entry_points
+from uas_coverage_env.files.named_objects import object_named
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.files.suggestions import did_you_mean
-from uas_coverage_env.flight.planner import Planner
+from uas_coverage_env.files.suggestions import did_you_mean, meant
+from uas_coverage_env.flight.planner import Planner, PlannerOptions, check_planner
 
 GROUP = "uas_coverage.planners"
 KINDS = "uas_coverage.planner_kinds"
@@ -67,15 +68,19 @@ def load_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner
     """Make a planner by name.
 
     Args:
-        name: One of `planner_names()`, or KIND:ARGUMENT.
+        name: One of `planner_names()`, KIND:ARGUMENT, or MODULE:CLASS with a module that is
+            installed or lies in the current folder; a class without `Options` is made without
+            arguments.
         options: Option -> value; text is read as the type of the option.
 
     Raises:
-        InputError: Unknown name, unknown option, a value that does not fit, or an argument that
-            the kind refuses; one line.
+        InputError: Unknown name, unknown option, a value that does not fit, an argument that the
+            kind refuses, or a class that makes no planner; one line.
     """
     kind, colon, argument = name.partition(":")
     installed = _installed(KINDS if colon else GROUP)
+    if kind not in installed and argument:
+        return _own_planner(name, options or {})
     if kind not in installed or (colon and not argument):
         raise _unknown(name)
     try:
@@ -99,16 +104,18 @@ def describe_planner(name: str) -> PlannerDescription:
     """One planner with its options.
 
     Args:
-        name: One of `planner_names()`, or a kind with or without its argument.
+        name: One of `planner_names()`, a kind with or without its argument, or MODULE:CLASS.
 
     Raises:
         InputError: Unknown name; one line.
     """
-    kind, _, _ = name.partition(":")
+    kind, _, argument = name.partition(":")
     for group in (GROUP, KINDS):
         entry = _installed(group).get(kind)
         if entry is not None and (group == KINDS or kind == name):
             return _description(kind, entry)
+    if argument:
+        return _described(name, _own_class(name))
     raise _unknown(name)
 
 
@@ -128,10 +135,43 @@ def options_of(planner: Planner) -> dict[str, Any]:
     return options.model_dump(mode="json") if isinstance(options, BaseModel) else {}
 
 
+def _own_planner(name: str, options: Mapping[str, Any]) -> Planner:
+    planner_class = _own_class(name)
+    model = getattr(planner_class, "Options", None)
+    checked = _checked_options(name, model or PlannerOptions, options)
+    try:
+        planner = planner_class(checked) if model else planner_class()
+    except Exception as error:  # whatever a user's class raises is one line
+        raise _not_made(name, error) from error
+    check_planner(planner, name)
+    return planner
+
+
+def _own_class(name: str) -> Any:
+    """The class that MODULE:CLASS stands for."""
+    module, _, attribute = name.partition(":")
+    try:
+        found = object_named("planner", name)
+    except InputError as error:
+        if close := meant(module, _installed(KINDS)):
+            raise InputError(f"{error}; did you mean {close}:{attribute}?") from error
+        raise
+    except Exception as error:  # whatever a user's module raises is one line
+        raise _not_made(name, error) from error
+    if not isinstance(found, type):
+        raise InputError(f"planner {name!r}: {attribute!r} is no class; name the planner's class")
+    return found
+
+
+def _not_made(name: str, error: Exception) -> InputError:
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    return InputError(f"planner {name!r} cannot be made: {reason}")
+
+
 def _unknown(name: str) -> InputError:
     argument = name.partition(":")[2][:80] or "..."
     known = (*planner_names(), *(f"{kind}:{argument}" for kind in sorted(_installed(KINDS))))
-    instead = did_you_mean(name, known, f"allowed: {', '.join(known)}")
+    instead = did_you_mean(name, known, f"allowed: {', '.join(known)}, or MODULE:CLASS")
     return InputError(f"unknown planner {name!r}; {instead}")
 
 
@@ -165,13 +205,16 @@ def _description(name: str, entry: EntryPoint) -> PlannerDescription:
         planner_class = entry.load()
     except (ImportError, AttributeError) as error:
         return PlannerDescription(name, "", missing=" ".join(str(error).split()))
-    if entry.group == KINDS:
-        name = f"{name}:{planner_class.argument}"
+    return _described(
+        f"{name}:{planner_class.argument}" if entry.group == KINDS else name, planner_class
+    )
+
+
+def _described(name: str, planner_class: Any) -> PlannerDescription:
+    model = getattr(planner_class, "Options", PlannerOptions)
     summary, _, rest = (inspect.getdoc(planner_class) or "").partition("\n")
     text = _SECTION.split(rest)[0].strip()
-    options = tuple(
-        _option(key, field) for key, field in planner_class.Options.model_fields.items()
-    )
+    options = tuple(_option(key, field) for key, field in model.model_fields.items())
     return PlannerDescription(name, summary, options, text=text)
 
 

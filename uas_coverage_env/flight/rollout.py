@@ -20,11 +20,12 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.log import FlightLog
-from uas_coverage_env.flight.planner import Assistants, Planner
+from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief, Relaunch
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
+from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
 from uas_coverage_env.world.packs import swaps_alone
 
@@ -92,7 +93,7 @@ def rollout(
         should_stop: Asked before every decision.
 
     Raises:
-        InputError: Unknown scenario or planner, or the planner refuses the scenario.
+        InputError: Unknown scenario or planner, no planner, or it refuses the scenario.
         ValueError: Unknown dynamics, a number of steps below one, or a wrong reward.
         PlannerError: The planner gave commands that cannot be flown.
     """
@@ -100,6 +101,7 @@ def rollout(
         scenario = load_scenario(scenario)
     if isinstance(planner, str):
         planner = load_planner(planner)
+    check_planner(planner)
     if max_steps is not None and max_steps < 1:
         raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
     assistants: Assistants = getattr(planner, "assistants", Assistants())
@@ -175,7 +177,7 @@ def _make_ready(
 ) -> None:
     """Compile world and planner, then put both at the start: no decision pays for compilation."""
     state = world.swarm_state()
-    hover = {name: Velocity(0.0, 0.0, -state.x[i, 2]) for i, name in enumerate(state.names)}
+    hover = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
     packed = pack(hover, state.names, state.active, len(state.uncovered))
     meter.terms(packed, world.step(packed))
     world.reset()

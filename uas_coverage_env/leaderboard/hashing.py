@@ -23,16 +23,20 @@ def content_hash(data: Any) -> str:
 def source_hash(packages: Iterable[str]) -> str:
     """SHA-256 of all Python and TOML files of some packages, with their relative paths."""
     total = hashlib.sha256()
-    for folder in sorted(folder for name in set(packages) for folder in _folders(name)):
-        paths = sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".toml"))
-        for path in paths:
-            total.update(f"{folder.name}/{path.relative_to(folder).as_posix()}\0".encode())
+    for place in sorted(place for name in set(packages) for place in _places(name)):
+        paths = [place] if place.is_file() else sorted(place.rglob("*"))
+        for path in (path for path in paths if path.suffix in (".py", ".toml")):
+            relative = path.relative_to(place.parent).as_posix()
+            total.update(f"{relative}\0".encode())
             total.update(hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()
 
 
-def _folders(package: str) -> list[Path]:
-    """Where a package lies; nowhere where it is a single module."""
+def _places(package: str) -> list[Path]:
+    """Where a package lies: its folders, or the file of a single module."""
     spec = find_spec(package)
-    places = spec.submodule_search_locations if spec else None
-    return [Path(place) for place in places or ()]
+    if spec is None:
+        return []
+    if spec.submodule_search_locations is None:
+        return [Path(spec.origin)] if spec.has_location and spec.origin else []
+    return [Path(place) for place in spec.submodule_search_locations]

@@ -100,14 +100,14 @@ def _spare(
     """The lowest charge at a landing, and whether all can always come home."""
     named = list(zip(fleet, charges, strict=True))
     lands, lowest = min(named, key=lambda pair: pair[1]["soc_landed"] - pair[0]["soc_reserve"])
-    who, tightest = min(named, key=lambda pair: pair[1]["least_spare"]["spare"])
+    uas, tightest = min(named, key=lambda pair: pair[1]["least_spare"]["spare"])
     least = tightest["least_spare"]
     lost = tightest["point_of_no_return"]
     home = (
         f"the way home can begin at any time: the least is {least['spare']:.0%} to spare "
-        f"({escape(who['name'])} at {_clock(least['time_s'])})."
+        f"({escape(uas['name'])} at {_clock(least['time_s'])})."
         if lost is None
-        else f"{escape(who['name'])} has a point of no return at {_clock(lost['time_s'])}."
+        else f"{escape(uas['name'])} has a point of no return at {_clock(lost['time_s'])}."
     )
     landing = (
         f"In {air}, the lowest charge at a landing is {_share(lowest['soc_landed'])} "

@@ -62,12 +62,12 @@ def back_and_forth(scenario: UncheckedScenario, spare: float = 0.0) -> RoughPlan
         return _shared_among_all(scenario, spare)
     n_uas = len(scenario.uas)
     flight_s, air_time_s, complete = np.zeros(n_uas), np.zeros(n_uas), True
-    for who in np.unique(scenario.can_cover, axis=1).T:
-        what = np.flatnonzero((scenario.can_cover == who[:, None]).all(axis=0))
-        if who.any():  # the others are warned of elsewhere
-            plan = _shared_among_all(_part_of(scenario, np.flatnonzero(who), what), spare)
-            flight_s[who] += plan.flight_s
-            air_time_s[who] = plan.air_time_s
+    for team in np.unique(scenario.can_cover, axis=1).T:
+        what = np.flatnonzero((scenario.can_cover == team[:, None]).all(axis=0))
+        if team.any():  # the others are warned of elsewhere
+            plan = _shared_among_all(_part_of(scenario, np.flatnonzero(team), what), spare)
+            flight_s[team] += plan.flight_s
+            air_time_s[team] = plan.air_time_s
             complete = complete and plan.complete
     complete = complete and bool((flight_s <= air_time_s * (1.0 - spare)).all())
     return RoughPlan(flight_s, air_time_s, complete)

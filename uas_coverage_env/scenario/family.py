@@ -46,9 +46,9 @@ def sample_scenario(
     Raises:
         ValueError: See `generate_scenario`.
     """
-    lots = np.random.default_rng([seed, *n_waypoints, *n_obstacles])
+    rng = np.random.default_rng([seed, *n_waypoints, *n_obstacles])
     uas, waypoints, obstacles = (
-        int(lots.integers(least, most + 1)) for least, most in (n_uas, n_waypoints, n_obstacles)
+        int(rng.integers(least, most + 1)) for least, most in (n_uas, n_waypoints, n_obstacles)
     )
     return generate_scenario(
         seed,

@@ -20,5 +20,8 @@ pushes along it and the rate of this tilt (`governor.horizontal_axis`)."""
 LIFT, TAU_X, TAU_Y, TAU_Z, DELTA_THRUST = range(5)
 """Lift in excess of the weight [N], torques [N m], corrected thrust deviation [N]."""
 
+SOC, VOLTAGE, CURRENT = range(3)
+"""Outputs of the model: state of charge, terminal voltage [V], current [A]."""
+
 N_STATES = 14
 N_INPUTS = 5

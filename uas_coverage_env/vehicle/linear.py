@@ -39,7 +39,7 @@ FloatArray = NDArray[np.float64]
 class LinearModel(NamedTuple):
     """x(k+1) = A x(k) + B u(k) + E and (soc, voltage_V, current_A) = C x(k) + D u(k) + F.
 
-    States and inputs in the order of `layout`.
+    States, inputs and outputs in the order of `layout`.
     """
 
     A: FloatArray

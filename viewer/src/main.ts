@@ -10,7 +10,7 @@ const live = source.dataset.live;
 // a flight that is still flown stands alone
 const opener = live ? null : new Opener(put);
 const open = opener && (() => opener.ask());
-let page = new Page(JSON.parse(source.textContent!), open);
+let page = new Page(JSON.parse(source.textContent!), open, live !== undefined);
 
 /** One flight that was opened stands beside the first; two take the place of what is there. */
 function put(flights: FlightData[]): void {

@@ -30,8 +30,9 @@ export class Page {
   /**
    * @param data of one or two flights
    * @param open asks for files with other flights; null: nothing can be opened here
+   * @param fromEnd begin at the end, unless the address names a moment
    */
-  constructor(data: FlightData[], open: (() => void) | null) {
+  constructor(data: FlightData[], open: (() => void) | null, fromEnd = false) {
     this.data = data;
     this.flights = data.map((each) => new Flight(each));
     this.clock = new Clock(this.longest(), () => this.invalidate());
@@ -69,6 +70,7 @@ export class Page {
       this.invalidate();
     }, signal);
     addEventListener("hashchange", () => this.readAddress(), { signal });
+    if (fromEnd) this.clock.seek(this.clock.duration);
     this.readAddress();
     requestAnimationFrame((now) => this.loop(now));
   }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
-from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
+from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z, Z
 from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, Wrench
 
 
@@ -26,5 +26,5 @@ def first_inputs(plan: Plan, swarm: SwarmState, mode: Callable[[str], Mode]) -> 
 
 def hovering(swarm: SwarmState, mode: Callable[[str], Mode]) -> dict[str, Command]:
     """Brake and hold the height with the vehicle's inner loop, for every active UAS."""
-    z_m = {name: float(swarm.x[swarm.names.index(name), 2]) for name in swarm.active}
+    z_m = {name: float(swarm.x[swarm.names.index(name), Z]) for name in swarm.active}
     return {name: Velocity(0.0, 0.0, -z, mode=mode(name)) for name, z in z_m.items()}

@@ -16,6 +16,7 @@ from uas_coverage_baselines.routing.route_time import (
     sum_up,
     sums_of,
 )
+from uas_coverage_baselines.routing.task import FLOWN_BY, GROUND_S, IDLE_COST_S
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
 
 _SAME_TEMPERATURE = 64  # moves
@@ -59,16 +60,16 @@ def _waiting_s(packs, idle_s, seconds):
     longest, last, home, for_nothing = 0.0, 0.0, 0.0, 0.0
     for r in range(len(seconds)):
         longest = max(longest, seconds[r])
-        if r == 0 or packs[r, 0] != packs[r - 1, 0]:
+        if r == 0 or packs[r, FLOWN_BY] != packs[r - 1, FLOWN_BY]:
             home, for_nothing = 0.0, 0.0
         elif seconds[r] > 0.0:
             home += for_nothing
             for_nothing = 0.0
         if seconds[r] > 0.0:
-            home += packs[r, 1] + seconds[r]
+            home += packs[r, GROUND_S] + seconds[r]
             last = max(last, home)
         if seconds[r] == idle_s[r]:
-            for_nothing += packs[r, 2]
+            for_nothing += packs[r, IDLE_COST_S]
     return last - longest
 
 

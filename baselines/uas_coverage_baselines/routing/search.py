@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.annealing import State, anneal, insert_missing
 from uas_coverage_baselines.routing.route_time import RoutingArrays
-from uas_coverage_baselines.routing.task import RoutingTask
+from uas_coverage_baselines.routing.task import FLOWN_BY, RoutingTask
 
 FloatArray = NDArray[np.float64]
 
@@ -197,7 +197,7 @@ def _opens_s(task: RoutingTask) -> FloatArray:
     """(U, W) from when on each UAS may visit, beyond every budget where it must not at all."""
     opens_s = np.tile(task.not_before_s, (task.n_uas, 1))
     if task.packs is not None:  # when a later flight takes off, everything is taken to be open
-        uas = task.packs[:, 0]
+        uas = task.packs[:, FLOWN_BY]
         opens_s[1:][uas[1:] == uas[:-1]] = 0.0
     if task.barred is not None:
         opens_s[task.barred] = _BARRED_S

@@ -14,6 +14,9 @@ from uas_coverage_env.vehicle import VX, VY
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+FLOWN_BY, GROUND_S, IDLE_COST_S = range(3)
+"""Columns of `RoutingTask.packs`."""
+
 
 @dataclass(frozen=True)
 class RoutingTask:
@@ -41,9 +44,9 @@ class RoutingTask:
             that cut through waypoints.
         barred: (U, W) which UAS must not visit which waypoint; None: any may visit any.
         packs: (U, 3) where a UAS flies more than once: U counts flights then, those of a UAS in
-            their order, and the columns say which UAS flies each, how long it is on the ground
-            before, and what it costs to fly again after this flight without a visit, after which no
-            UAS is sent out. None: each UAS flies once.
+            their order. Columns: `FLOWN_BY`, which UAS flies it; `GROUND_S`, how long it is on the
+            ground before; `IDLE_COST_S`, what it costs to fly again after this flight without a
+            visit, after which no UAS is sent out. None: each UAS flies once.
     """
 
     open_waypoints: NDArray[np.int64]

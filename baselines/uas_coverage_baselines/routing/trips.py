@@ -21,7 +21,7 @@ from uas_coverage_baselines.routing.search import (
     empty_routes,
     improve_routes,
 )
-from uas_coverage_baselines.routing.task import RoutingTask
+from uas_coverage_baselines.routing.task import GROUND_S, RoutingTask
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import initial_state
 from uas_coverage_env.world import FLYING, SwarmState
@@ -220,7 +220,7 @@ def _with_trips(
         trips_of.append((*trips,))
     # as long as they take, and as long as the UAS is on the ground before
     assert flights.packs is not None
-    ground_s = np.where(found.seconds > 0.0, flights.packs[:, 1], 0.0)
+    ground_s = np.where(found.seconds > 0.0, flights.packs[:, GROUND_S], 0.0)
     home_s = np.bincount(uas, found.seconds + ground_s)
     return replace(
         found,

@@ -184,9 +184,10 @@ def _moving_obstacles(axes: Axes, scenario: Scenario, moving_m: NDArray[np.float
 
 
 def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
-    """The name of each UAS beside its mark; where there is no free place, none."""
+    """The name of each UAS beside its mark; where there is no free place within the frame, none."""
     figure.draw_without_rendering()  # lays out the axes, so that distances are known
     pt_per_px = _PT_PER_IN / figure.dpi
+    lowest_pt, highest_pt = (pt_per_px * edge for edge in axes.bbox.intervaly)
     taken: list[Box] = []
     many = len(flight.names) > MANY
     for i, whole in enumerate(flight.names):
@@ -201,7 +202,8 @@ def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
         for row in _NAME_ROWS:
             up = 6.0 + 1.2 * _NAME_PT * row
             box = (left, y_pt + up, width, _NAME_PT)
-            if any(overlap(box, it) for it in taken):
+            outside = y_pt + up < lowest_pt or y_pt + up + _NAME_PT > highest_pt
+            if outside or any(overlap(box, it) for it in taken):
                 continue
             taken.append(box)
             axes.annotate(

@@ -1,14 +1,10 @@
 """Blocks from outside the package: by the name of an entry point, or as MODULE:CLASS."""
 
-import importlib
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from uas_coverage_baselines.milp_mpc.model.ocp import Block
 from uas_coverage_env.files.installed import entry_points
+from uas_coverage_env.files.named_objects import object_named
 from uas_coverage_env.files.strict_toml import InputError
 
 GROUP = "uas_coverage.blocks"
@@ -64,29 +60,4 @@ def _loaded(name: str) -> Any:
         raise InputError(f"unknown block {name!r}; give MODULE:CLASS or a name ({known})")
     if not module_name or not attribute:
         raise InputError(f"block {name!r}: should be MODULE:CLASS, as in my_module:Ceiling")
-    with _current_folder():
-        try:
-            module = importlib.import_module(module_name)
-        except ModuleNotFoundError as error:
-            if error.name != module_name:
-                raise
-            raise InputError(
-                f"block {name!r}: there is no module {module_name!r}, neither installed nor in "
-                "the current folder"
-            ) from error
-    try:
-        return getattr(module, attribute)
-    except AttributeError as error:
-        raise InputError(f"block {name!r}: {module_name!r} has no {attribute!r}") from error
-
-
-@contextmanager
-def _current_folder() -> Iterator[None]:
-    """Modules of the current folder can be imported, after those that are installed."""
-    folder = os.getcwd()
-    importlib.invalidate_caches()
-    sys.path.append(folder)
-    try:
-        yield
-    finally:
-        sys.path.remove(folder)
+    return object_named("block", name)

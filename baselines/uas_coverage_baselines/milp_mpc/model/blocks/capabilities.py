@@ -24,6 +24,7 @@ from uas_coverage_env.vehicle import (
     VZ,
     WZ,
 )
+from uas_coverage_env.vehicle.layout import CURRENT, VOLTAGE
 
 
 class Capabilities:
@@ -126,14 +127,14 @@ class Capabilities:
         current_max = np.array([x.battery.current_max_A for x in problem.vehicles])
         milp.subject_to(
             "capabilities.voltage",
-            (C[:, None, 1], states),
-            (D[:, None, 1], thrust),
-            lower=(voltage_min - F[:, 1])[:, None],
+            (C[:, None, VOLTAGE], states),
+            (D[:, None, VOLTAGE], thrust),
+            lower=(voltage_min - F[:, VOLTAGE])[:, None],
         )
         milp.subject_to(
             "capabilities.current",
-            (C[:, None, 2], states),
-            (D[:, None, 2], thrust),
-            lower=-F[:, 2][:, None],
-            upper=(current_max - F[:, 2])[:, None],
+            (C[:, None, CURRENT], states),
+            (D[:, None, CURRENT], thrust),
+            lower=-F[:, CURRENT][:, None],
+            upper=(current_max - F[:, CURRENT])[:, None],
         )
