@@ -12,8 +12,7 @@ from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, no_record, route_workspace
 from uas_coverage_env.mission import (
-    Approach,
-    Attempts,
+    GuidedFlight,
     Handover,
     MissionBrief,
     Recall,
@@ -49,8 +48,7 @@ class FleetRoutes:
     ) -> None:
         self._score, self._home_score, self._samples = score, home_score, samples
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
-        self._attempts, self._approach = Attempts(brief), Approach(brief)
-        self._handover = Handover(brief)
+        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._workspace, self._record = route_workspace(), no_record()
         self._routes = np.full((n_uas, n_waypoints), -1)
@@ -65,7 +63,7 @@ class FleetRoutes:
         """Go on to this sample; build the routes again where they are no longer right."""
         self._blocked = self._renew(swarm)
         flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
-        self._attempts.update(swarm, flown_to, self._blocked)
+        self._onwards = self._guided.commands(swarm, flown_to, self._blocked)
 
     def take(self, routes: Sequence[NDArray[np.int64]]) -> None:
         """Fly these routes, one for each UAS, until others have to be built."""
@@ -84,9 +82,9 @@ class FleetRoutes:
         if self._lengths[u] == 0:
             return None if swarm.departed[u] else GoTo(None)
         target = int(self._routes[u, 0])
-        if self._attempts.is_hard(u, target):
-            return self._approach.command(swarm, u, target)
-        return GoTo(target, mode="covering") if self._blocked[target] else None
+        if self._guided.is_hard(u, target) or self._blocked[target]:
+            return self._onwards[swarm.names[u]]
+        return None
 
     def onwards(self, u: int) -> GoTo:
         """Guidance along the route, where nothing else knows a way."""
@@ -99,7 +97,7 @@ class FleetRoutes:
     def _renew(self, swarm: SwarmState) -> BoolArray:
         self.view.update(swarm)
         blocked = self.view.blocked()
-        wanted = self._attempts.wanted(swarm.uncovered)
+        wanted = self._guided.wanted(swarm.uncovered)
         if swarm.uncovered.any():
             # the rule of return mode, which need not be on
             self._returns = self._recall.update(swarm, self.view)
