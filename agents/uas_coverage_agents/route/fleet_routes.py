@@ -25,6 +25,10 @@ BoolArray = NDArray[np.bool_]
 SAMPLES = 64
 """Routes that are built before the best are flown; the first without noise."""
 
+LEARNED_UP_TO_MPS = 4.0
+"""In a stated mean wind above this, guidance flies along the routes [m/s]. What is weighed and
+learned as in still air is the better flight up to it."""
+
 _NOISE = 1.0
 _AGAIN_STEPS = 10
 
@@ -41,6 +45,7 @@ class FleetRoutes:
 
     Attributes:
         view: The world as the planner sees it, at the latest update.
+        by_guidance: Whether guidance flies all of the routes, as in much wind.
     """
 
     def __init__(
@@ -49,6 +54,8 @@ class FleetRoutes:
         self._score, self._home_score, self._samples = score, home_score, samples
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
         self._guided, self._handover = GuidedFlight(brief), Handover(brief)
+        said = brief.conditions
+        self.by_guidance = said is not None and said.mean_mps > LEARNED_UP_TO_MPS
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._workspace, self._record = route_workspace(), no_record()
         self._routes = np.full((n_uas, n_waypoints), -1)
@@ -76,13 +83,13 @@ class FleetRoutes:
         return self._routes[u, : self._lengths[u]]
 
     def guided(self, swarm: SwarmState, u: int) -> Command | None:
-        """The command where guidance flies a UAS: home, to what is hard to reach or blocked."""
+        """The command where guidance flies a UAS: home, to what is hard or blocked, or in wind."""
         if swarm.returning[u] or self._returns[u]:
             return GoTo(None)
         if self._lengths[u] == 0:
-            return None if swarm.departed[u] else GoTo(None)
+            return GoTo(None) if self.by_guidance or not swarm.departed[u] else None
         target = int(self._routes[u, 0])
-        if self._guided.is_hard(u, target) or self._blocked[target]:
+        if self.by_guidance or self._guided.is_hard(u, target) or self._blocked[target]:
             return self._onwards[swarm.names[u]]
         return None
 

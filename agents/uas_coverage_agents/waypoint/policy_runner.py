@@ -35,7 +35,6 @@ from uas_coverage_env.mission import (
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     FLYING,
-    HOME,
     OUTCOME_DTYPE,
     Command,
     GoTo,
