@@ -69,4 +69,4 @@ def test_what_is_to_be_learned_is_flown_in_any_wind(town):
         np.random.default_rng(0),
     )
     rollout(with_disturbances(town, "strong", 1), runner, return_mode=False, max_steps=10)
-    assert len(runner.lessons) == 10
+    assert len(runner.lessons) >= 10
