@@ -25,7 +25,7 @@ from uas_coverage_env.tasks import LEVELS, Score, score, scored
 from uas_coverage_env.tasks.scoring import MissionScore
 
 PAGE = Path(__file__).parents[1] / "docs" / "levels.md"
-FIRST, LAST = "<!-- reference learners -->\n", "<!-- end of reference learners -->"
+FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
 HEAD = (
     "learner", "steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
     "lost or not home", "energy, %", "return", "missions",
@@ -57,7 +57,7 @@ def main() -> int:
     given = parser.parse_args()
     if given.seeds < 1 or not 0.0 < given.share <= 100.0 or not 1 <= given.missions <= 50:
         parser.error("--seeds: 1 or more; --share: above 0, at most 100; --missions: 1 to 50")
-    levels, parts = given.levels.split(","), []
+    levels, parts = given.levels.split(","), {}
     try:
         learners = {Path(n).stem: reference_named(n) for n in given.learners.split(",")}
         for level in levels:
@@ -67,19 +67,26 @@ def main() -> int:
                 result_of(name, shortened(each, given.share), level, given)
                 for name, each in learners.items()
             ]
-            parts.append(f"`{LEVELS[level].id}`\n\n{table(results)}")
+            run = command(given, level)
+            parts[level] = f"\n`{LEVELS[level].id}`: `{run}`\n\n{table(results)}\n\n"
     except InputError as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
-    text = f"\n`{command(given)}`\n\n" + "\n\n".join(parts) + "\n\n"
-    sys.stdout.write(text)
-    if given.publish:
-        before, first, rest = PAGE.read_text("utf-8").partition(FIRST)
-        _, last, after = rest.partition(LAST)
-        if not first or not last:
-            raise SystemExit(f"{PAGE}: has no {FIRST.strip()} ... {LAST}")
-        PAGE.write_text(before + first + text + last + after, encoding="utf-8")
+    for level, text in parts.items():
+        sys.stdout.write(text)
+        if given.publish:
+            publish(level, text)
     return 0
+
+
+def publish(level: str, text: str) -> None:
+    """Write the table of a level into the page."""
+    first, last = FIRST.format(level), LAST.format(level)
+    before, there, rest = PAGE.read_text("utf-8").partition(first)
+    _, end, after = rest.partition(last)
+    if not there or not end:
+        raise SystemExit(f"{PAGE}: has no {first.strip()} ... {last}")
+    PAGE.write_text(before + first + text + last + after, encoding="utf-8")
 
 
 def shortened(reference: Reference, share: float) -> Reference:
@@ -145,12 +152,15 @@ def table(results: list[Result]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def command(given: argparse.Namespace) -> str:
-    """The line that makes the table again."""
+def command(given: argparse.Namespace, level: str) -> str:
+    """The line that makes the table of a level again."""
     parts = ["python benchmarks/reference_learners.py"]
-    for name, usual in (("levels", "easy"), ("seeds", 1), ("share", 1.0), ("missions", 20)):
-        if getattr(given, name) != usual:
-            parts.append(f"--{name} {getattr(given, name)}")
+    asked = {**vars(given), "levels": level}
+    usual = {
+        "levels": "easy", "learners": ",".join(reference_names()), "seeds": 1, "share": 1.0,
+        "missions": 20,
+    }  # fmt: skip
+    parts += [f"--{name} {asked[name]}" for name in usual if asked[name] != usual[name]]
     return " ".join([*parts, "--out reference --publish"])
 
 

@@ -45,6 +45,10 @@ class GuidedFlight:
         """
         return self._attempts.wanted_of(uncovered, mine)
 
+    def is_hard(self, uas: int, waypoint: int) -> bool:
+        """Whether a waypoint is flown to with care."""
+        return self._attempts.is_hard(uas, waypoint)
+
     def commands(
         self, swarm: SwarmState, targets: Mapping[str, int], blocked: BoolArray | None = None
     ) -> dict[str, Command]:
@@ -60,6 +64,6 @@ class GuidedFlight:
 
     def _command(self, swarm: SwarmState, name: str, target: int) -> Command:
         uas = swarm.names.index(name)
-        if self._attempts.is_hard(uas, target):
+        if self.is_hard(uas, target):
             return self._approach.command(swarm, uas, target)
         return GoTo(target, mode="covering")

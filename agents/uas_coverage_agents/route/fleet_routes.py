@@ -12,8 +12,7 @@ from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, no_record, route_workspace
 from uas_coverage_env.mission import (
-    Approach,
-    Attempts,
+    GuidedFlight,
     Handover,
     MissionBrief,
     Recall,
@@ -25,6 +24,10 @@ from uas_coverage_env.world import LANDED, Command, GoTo, SwarmState
 BoolArray = NDArray[np.bool_]
 SAMPLES = 64
 """Routes that are built before the best are flown; the first without noise."""
+
+LEARNED_UP_TO_MPS = 4.0
+"""In a stated mean wind above this, guidance flies along the routes [m/s]. What is weighed and
+learned as in still air is the better flight up to it."""
 
 _NOISE = 1.0
 _AGAIN_STEPS = 10
@@ -42,6 +45,7 @@ class FleetRoutes:
 
     Attributes:
         view: The world as the planner sees it, at the latest update.
+        by_guidance: Whether guidance flies all of the routes, as in much wind.
     """
 
     def __init__(
@@ -49,8 +53,9 @@ class FleetRoutes:
     ) -> None:
         self._score, self._home_score, self._samples = score, home_score, samples
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
-        self._attempts, self._approach = Attempts(brief), Approach(brief)
-        self._handover = Handover(brief)
+        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
+        said = brief.conditions
+        self.by_guidance = said is not None and said.mean_mps > LEARNED_UP_TO_MPS
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._workspace, self._record = route_workspace(), no_record()
         self._routes = np.full((n_uas, n_waypoints), -1)
@@ -65,7 +70,7 @@ class FleetRoutes:
         """Go on to this sample; build the routes again where they are no longer right."""
         self._blocked = self._renew(swarm)
         flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
-        self._attempts.update(swarm, flown_to, self._blocked)
+        self._onwards = self._guided.commands(swarm, flown_to, self._blocked)
 
     def take(self, routes: Sequence[NDArray[np.int64]]) -> None:
         """Fly these routes, one for each UAS, until others have to be built."""
@@ -78,15 +83,15 @@ class FleetRoutes:
         return self._routes[u, : self._lengths[u]]
 
     def guided(self, swarm: SwarmState, u: int) -> Command | None:
-        """The command where guidance flies a UAS: home, to what is hard to reach or blocked."""
+        """The command where guidance flies a UAS: home, to what is hard or blocked, or in wind."""
         if swarm.returning[u] or self._returns[u]:
             return GoTo(None)
         if self._lengths[u] == 0:
-            return None if swarm.departed[u] else GoTo(None)
+            return GoTo(None) if self.by_guidance or not swarm.departed[u] else None
         target = int(self._routes[u, 0])
-        if self._attempts.is_hard(u, target):
-            return self._approach.command(swarm, u, target)
-        return GoTo(target, mode="covering") if self._blocked[target] else None
+        if self.by_guidance or self._guided.is_hard(u, target) or self._blocked[target]:
+            return self._onwards[swarm.names[u]]
+        return None
 
     def onwards(self, u: int) -> GoTo:
         """Guidance along the route, where nothing else knows a way."""
@@ -99,7 +104,7 @@ class FleetRoutes:
     def _renew(self, swarm: SwarmState) -> BoolArray:
         self.view.update(swarm)
         blocked = self.view.blocked()
-        wanted = self._attempts.wanted(swarm.uncovered)
+        wanted = self._guided.wanted(swarm.uncovered)
         if swarm.uncovered.any():
             # the rule of return mode, which need not be on
             self._returns = self._recall.update(swarm, self.view)

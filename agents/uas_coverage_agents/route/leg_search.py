@@ -173,8 +173,13 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, room):
         )
         cost_s += value_of(layers, room.row)
     else:
-        away_m = math.hypot(ahead[0, NORTH] - there[X], ahead[0, EAST] - there[Y])
-        cost_s += _MISSED_S + away_m / uas.speed_mps
+        # with the places after it, as in the time of a plan that covers it
+        way_m = math.hypot(ahead[0, NORTH] - there[X], ahead[0, EAST] - there[Y])
+        for k in range(1, AHEAD):
+            way_m += math.hypot(
+                ahead[k, NORTH] - ahead[k - 1, NORTH], ahead[k, EAST] - ahead[k - 1, EAST]
+            )
+        cost_s += _MISSED_S + way_m / uas.speed_mps
     if cost_s >= best_s:
         return np.inf, steps
     k = 1 if covered else 0

@@ -26,8 +26,7 @@ from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, flight_co
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import (
-    Approach,
-    Attempts,
+    GuidedFlight,
     Handover,
     MissionBrief,
     WorldView,
@@ -36,7 +35,6 @@ from uas_coverage_env.mission import (
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     FLYING,
-    HOME,
     OUTCOME_DTYPE,
     Command,
     GoTo,
@@ -105,8 +103,7 @@ class WaypointRunner:
             moving_velocity_mps=_NOWHERE,
         )
         self._legs = legs_of(self._still)
-        self._attempts, self._approach = Attempts(brief), Approach(brief)
-        self._handover = Handover(brief)
+        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
@@ -129,25 +126,19 @@ class WaypointRunner:
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Keep the targets that are still good, and choose those that are missing."""
         self._decide(swarm)
-        targets = {name: int(self._targets[swarm.names.index(name)]) for name in swarm.active}
-        flown_to = {name: target for name, target in targets.items() if target >= 0}
-        self._attempts.update(swarm, flown_to, self._blocked)
-        return {name: self._command(swarm, swarm.names.index(name)) for name in swarm.active}
-
-    def _command(self, swarm: SwarmState, i: int) -> Command:
+        uas = {name: swarm.names.index(name) for name in swarm.active}
+        targets = {name: int(self._targets[i]) for name, i in uas.items() if self._targets[i] >= 0}
+        commands = self._guided.commands(swarm, targets, self._blocked)
         # a UAS called by return mode is also sent home here: the world may fly without it
-        if self._returning[i] or swarm.returning[i] or self._targets[i] in (HOME, NO_TARGET):
-            return GoTo(None)
-        target = int(self._targets[i])
-        if target >= 0 and self._attempts.is_hard(i, target):
-            return self._approach.command(swarm, i, target)
-        return GoTo(target, mode="covering")
+        called = self._returning | swarm.returning
+        home = [n for n, i in uas.items() if n not in targets or called[i]]
+        return {**commands, **dict.fromkeys(home, GoTo(None))}
 
     def _decide(self, swarm: SwarmState) -> None:
         """Choose a target for every UAS that needs one now."""
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
-        state.uncovered[:] = self._attempts.wanted(swarm.uncovered)
+        state.uncovered[:] = self._guided.wanted(swarm.uncovered)
         silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
         self._targets[silent] = NO_TARGET
         # one that takes no commands is as one on its way home, to the others and in simulations
