@@ -40,7 +40,7 @@ SEES_CONSUMPTION_S = 30.0
 MOST_WIND = 0.95
 """Of the highest speed: a UAS believes in no wind in which it could not hover."""
 
-_GUSTS = 0.1
+GUSTS = 0.1
 """What is kept of the speed limit for gusts, of the wind believed in."""
 
 _SHEAR_S = 0.7
@@ -73,6 +73,17 @@ def speed_along(most_mps, wind_north_mps, wind_east_mps, north, east):
 
 
 @inlined_kernel
+def ground_speed(most_mps, kept, wind_north_mps, wind_east_mps, north, east):
+    """The highest ground speed that is flown along a direction [m/s]; arguments as above.
+
+    Over ground a gust must not lead far beyond the limit either: `kept` of the wind is kept of it.
+    """
+    within_mps = most_mps - kept * math.sqrt(wind_north_mps**2 + wind_east_mps**2)
+    along_mps = speed_along(most_mps, wind_north_mps, wind_east_mps, north, east)
+    return min(within_mps, max(along_mps, 0.0))
+
+
+@inlined_kernel
 def vertical_margin_mps(belief):
     """By how much slower than its limits a UAS climbs and descends in the wind believed in."""
     return _VERTICAL_GUSTS * math.sqrt(belief[WIND] ** 2 + belief[WIND + 1] ** 2)
@@ -92,15 +103,12 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
         speed_mps = math.sqrt(first * first + second * second)
         share = 0.0
         if speed_mps > 0.0:
-            most_mps = speed_along(
-                vehicle.reference_max_mps, wind_north_mps, wind_east_mps,
-                first / speed_mps, second / speed_mps,
-            )  # fmt: skip
-            # over ground a gust must not lead far beyond the limit either
-            wind_mps = math.sqrt(wind_north_mps**2 + wind_east_mps**2)
             growth = _SHEAR_S * max(-x[VZ], 0.0) / max(-x[Z], 1.0)
-            within_mps = vehicle.reference_max_mps - (_GUSTS + min(growth, 0.5)) * wind_mps
-            share = min(speed_mps, within_mps, max(most_mps, 0.0)) / speed_mps
+            most_mps = ground_speed(
+                vehicle.reference_max_mps, GUSTS + min(growth, 0.5),
+                wind_north_mps, wind_east_mps, first / speed_mps, second / speed_mps,
+            )  # fmt: skip
+            share = min(speed_mps, most_mps) / speed_mps
         command.values[0] = share * first - wind_north_mps
         command.values[1] = share * second - wind_east_mps
     x[VX] = north_mps - wind_north_mps

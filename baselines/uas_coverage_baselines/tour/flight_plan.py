@@ -73,7 +73,9 @@ def _copy(plan, other, first):
 
 
 @allocating_kernel
-def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_changes, rng, command):
+def improve(
+    arena, i, task, x, reference, others_m, plan, trial, n_kept, n_changes, rng, command, belief=None
+):
     """Plan the coming seconds of a UAS.
 
     Args:
@@ -89,6 +91,7 @@ def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_chang
         n_changes: How many changes are tried.
         rng: Source of random numbers.
         command: A record of COMMAND_DTYPE, written.
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
 
     Returns:
         Estimated flight time to the end [s]; above SAFE_BELOW_S where the plan is not safe.
@@ -103,17 +106,17 @@ def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_chang
             aim(arena, i, task, plan, leg)
     trial.push[:] = 0.0
     trial.share[:] = 1.0
-    best = cost_s(arena, i, task, trial, 0, around, command, math.inf)
-    cost = cost_s(arena, i, task, plan, 0, around, command, math.inf)
+    best = cost_s(arena, i, task, trial, 0, around, command, math.inf, belief)
+    cost = cost_s(arena, i, task, plan, 0, around, command, math.inf, belief)
     if cost >= SAFE_BELOW_S:  # what is new is its last step: brake there
         plan.share[-1] = 0.0
-        cost = cost_s(arena, i, task, plan, 0, around, command, math.inf)
+        cost = cost_s(arena, i, task, plan, 0, around, command, math.inf, belief)
     if cost < best:
         best = cost
         _copy(trial, plan, 0)
     _copy(plan, trial, 0)
-    push_to_guidance(arena, i, task, trial, command)
-    cost = cost_s(arena, i, task, trial, 0, around, command, best)
+    push_to_guidance(arena, i, task, trial, command, belief)
+    cost = cost_s(arena, i, task, trial, 0, around, command, best, belief)
     if cost < best:
         best = cost
         _copy(plan, trial, 0)
@@ -123,7 +126,7 @@ def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_chang
         first = _change(arena, i, task, trial, rng, spread)
         # steps before the change are known to be clear, unless the plan so far is unflyable
         since = first if best < SAFE_BELOW_S else 0
-        cost = cost_s(arena, i, task, trial, since, around, command, best)
+        cost = cost_s(arena, i, task, trial, since, around, command, best, belief)
         if cost < best - 1e-9:
             best = cost
             _copy(plan, trial, since)

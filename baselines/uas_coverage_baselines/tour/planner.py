@@ -20,6 +20,7 @@ from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
     GuidedFlight,
     Handover,
+    LearntWind,
     MissionBrief,
     Recall,
     Repeats,
@@ -45,6 +46,7 @@ _OFF_MPS = 0.6  # a mean deviation with which no plan comes true
 _OFF_SHARE = 0.1  # of the last step in that mean
 
 
+DEBUG=None
 class TourOptions(AssistedOptions):
     """Options of `tour`."""
 
@@ -103,7 +105,11 @@ class Tour:
             self._by_legs = LegMission(brief, _LEG_SEARCHES, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
-        self._arena = self._world.arena
+        self._arena, self._learnt = self._world.arena, None
+        if brief.conditions is not None:
+            self._learnt, rules = LearntWind(brief), self._arena.rules.copy()
+            rules["disturbed"] = True
+            self._arena = self._arena._replace(rules=rules)
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
@@ -135,6 +141,8 @@ class Tour:
         if self._by_legs is not None:
             self.last_decision = None
             return self._by_legs.commands(swarm)
+        if self._learnt is not None:
+            self._learnt.see(swarm)
         view = self._view(replace(swarm, uncovered=self._guided.wanted(swarm.uncovered)))
         if not self._has_order:
             self._go_on(view, swarm.step)
@@ -144,7 +152,7 @@ class Tour:
         predicted_m: dict[str, FloatArray] = {}
         for i in np.flatnonzero(view.flies).tolist():
             name = swarm.names[i]
-            commands[name] = self._fly(i, view, others_m)
+            commands[name] = self._fly(i, view, others_m, swarm)
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
         commands |= self._guided.commands(swarm, self._guided_to(swarm), _closed(view))
@@ -177,19 +185,22 @@ class Tour:
         else:
             self._find_order(self._view(first_sight(self._brief)), self._seed)
 
-    def _fly(self, i: int, view: View, others_m: FloatArray) -> Command:
+    def _fly(self, i: int, view: View, others_m: FloatArray, swarm: SwarmState) -> Command:
         task = self._task(i, view)
         plan, x = self._plans[i], view.x[i]
-        n_kept = self._catch_up(i, x, task.route)
+        n_kept = self._catch_up(i, x, task.route, swarm)
+        belief = None if self._learnt is None else self._learnt.belief[i]
         is_guided = self._is_guided[i]
         changes = 0 if is_guided else self.options.changes
         seconds = improve(
             self._arena, i, task, x, self._reference_mps[i], others_m, plan, self._trial,
-            n_kept, changes, self._rng, self._command,
+            n_kept, changes, self._rng, self._command, belief,
         )  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
-        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided
+        # the first step of a mission in wind is a first look at it
+        looks = self._learnt is not None and swarm.step == 0
+        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided and not looks
         if not self._is_flown[i]:
             return GoTo(int(task.route[0]) if len(task.route) else None, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
@@ -212,14 +223,22 @@ class Tour:
             _MOVING_MARGIN_M,
         )
 
-    def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64]) -> int:
+    def _catch_up(
+        self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState
+    ) -> int:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
         off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
-        if self._is_flown[i]:
+        filtered = self._learnt is not None and bool(swarm.filtered[i])
+        if self._is_flown[i] and not filtered:
             self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
         as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
-        self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
+        if self._learnt is not None:
+            as_planned = self._is_flown[i] and not filtered
+            self._reference_mps[i] = swarm.reference_mps[i]
+        else:
+            self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
+        if DEBUG is not None: DEBUG.append((swarm.step, i, self._is_flown[i], filtered, off_mps, self._off_mps[i]))
         plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
         plan.push[-1], plan.share[-1] = 0.0, 1.0
         if not as_planned:
