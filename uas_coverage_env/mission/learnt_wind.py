@@ -8,6 +8,8 @@ known from the rates, is the wind's.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,7 @@ from uas_coverage_env.world.state import N_BELIEF, WIND
 
 FloatArray = NDArray[np.float64]
 
+_MEAN_S = 30.0
 # north and east: state of the axis, and what of it is negative forward
 _STATES = ((X, VX, THETA, WY), (Y, VY, PHI, WX))
 _FORWARD = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, 1.0, 1.0, 1.0]])
@@ -40,6 +43,7 @@ class LearntWind:
 
     Attributes:
         belief: (U, N_BELIEF) as the world's kernels take it, the wind alone.
+        mean_mps: (2,) of all UAS and the last half minute, north and east [m/s].
     """
 
     def __init__(self, brief: MissionBrief) -> None:
@@ -50,6 +54,8 @@ class LearntWind:
         self.belief = np.zeros((len(brief.uas), N_BELIEF))
         self._before: SwarmState | None = None
         self._seen = np.zeros(len(brief.uas), np.int64)
+        self.mean_mps, self._samples = np.zeros(2), 0
+        self._mean_gain = 1.0 - math.exp(-brief.dt_s / _MEAN_S)
 
     @property
     def wind_mps(self) -> FloatArray:
@@ -60,8 +66,13 @@ class LearntWind:
         """Learn from one more sample."""
         before, self._before = self._before, swarm
         if before is not None and swarm.step == before.step + 1:
-            for i in np.flatnonzero((before.status == FLYING) & (swarm.status == FLYING)).tolist():
+            flying = np.flatnonzero((before.status == FLYING) & (swarm.status == FLYING)).tolist()
+            for i in flying:
                 self._learn(i, axes(before.x[i]), axes(swarm.x[i]))
+            if flying:
+                self._samples += 1
+                gain = max(self._mean_gain, 1.0 / self._samples)
+                self.mean_mps += gain * (self.wind_mps[flying].mean(axis=0) - self.mean_mps)
 
     def _learn(self, i: int, before: FloatArray, now: FloatArray) -> None:
         A, B = self._axis[i]

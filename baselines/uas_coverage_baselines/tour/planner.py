@@ -229,7 +229,7 @@ class Tour:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
         off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
-        filtered = self._learnt is not None and bool(swarm.filtered[i])
+        filtered = self._learnt is not None and bool(swarm.filtered[i] or swarm.returning[i])
         if self._is_flown[i] and not filtered:
             self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
         as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
@@ -287,6 +287,7 @@ class Tour:
             time_s=swarm.time_s,
             swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
             asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
+            wind_mps=None if self._learnt is None else self._learnt.mean_mps,
         )
 
 

@@ -37,6 +37,8 @@ _OPENS_AFTER_S = 10.0  # and at least so long
 _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 400_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
+_WIND_KNOWN_S = 5.0  # after take-off
+_OTHER_WIND_MPS = 1.0  # from which legs take other times by more than their flights differ from them
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class View:
         time_s: since the start.
         swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
         asked_in_s: (W,) from now until a waypoint is asked for; None: all are.
+        wind_mps: (2,) north and east, learnt so far; None: still air.
     """
 
     x: FloatArray
@@ -62,6 +65,7 @@ class View:
     time_s: float
     swarm: SwarmState | None = None
     asked_in_s: FloatArray | None = None
+    wind_mps: FloatArray | None = None
 
 
 class Schedule:
@@ -69,6 +73,7 @@ class Schedule:
 
     def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
         self.legs, self._packs = Legs(brief), Packs.of(brief)
+        self._wind_mps, self._knows_wind = np.zeros(2), False
         self._arena, self._can_cover = arena, brief.can_cover
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         self._moves = moves
@@ -114,11 +119,32 @@ class Schedule:
     def update(self, view: View) -> None:
         """Drop what is covered, and search again where something has happened."""
         self._drop_covered(view)
+        if self._is_other_wind(view):
+            self._fly_in(view)
+            return
         self._time_legs(view)
         if self._has_changed(view) or self._is_asked_for_more(view):
-            kept, better = self._searched_again(view)
-            worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
-            self.take(better if worthwhile else kept, view)
+            self.take(self._better(view), view)
+
+    def _better(self, view: View) -> Routes:
+        """The present order, or one that is better by more than a change costs."""
+        kept, better = self._searched_again(view)
+        return better if better.cost_s < kept.cost_s - _WORTH_CHANGING_S else kept
+
+    def _is_other_wind(self, view: View) -> bool:
+        if view.wind_mps is None or view.time_s < _WIND_KNOWN_S:
+            return False
+        return float(np.hypot(*(view.wind_mps - self._wind_mps))) > _OTHER_WIND_MPS
+
+    def _fly_in(self, view: View) -> None:
+        """Time the legs in the wind of a moment: the first time, all orders are searched."""
+        assert view.wind_mps is not None
+        self.legs, self._wind_mps = self.legs.in_wind(*view.wind_mps.tolist()), view.wind_mps.copy()
+        if not self._knows_wind:
+            self._knows_wind = True
+            self.begin(view, round(view.time_s))
+        else:
+            self.take(self._better(view), view)
 
     def _drop_covered(self, view: View) -> None:
         open_ = view.uncovered
@@ -233,10 +259,10 @@ class Schedule:
         route = self.order.routes[uas]
         if not len(route):
             return self.legs.way_home_s(uas, position_m)
-        first_m = self.legs.waypoints_m[route[0]] - position_m
-        return float(
-            np.linalg.norm(first_m[:2]) / self.legs.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
-        )
+        first_m = self.legs.waypoints_m[route[0]]
+        speed_mps = self.legs.ground_mps(uas, position_m, first_m)
+        first_s = np.linalg.norm((first_m - position_m)[:2]) / speed_mps
+        return float(first_s + self.rest_s(uas, 1.0, 0.0)[0])
 
     def _fresh_packs(self, view: View) -> FreshPacks | None:
         """What is there for later flights."""
