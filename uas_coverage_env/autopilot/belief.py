@@ -48,6 +48,10 @@ _SHEAR_S = 0.7
 believed in over the height. By the logarithmic law wind grows over a metre by a fifth of that, and
 the belief and the vehicle together take 3.5 s to follow."""
 
+_GROWTH = 0.2
+"""Of a wind, what it grows by while the height grows by a factor of e: by the logarithmic law, at
+some metres above open country."""
+
 _VERTICAL_GUSTS = 0.04
 """What is kept of the limits of climb and descent for gusts, of the wind believed in."""
 
@@ -70,6 +74,12 @@ def speed_along(most_mps, wind_north_mps, wind_east_mps, north, east):
     along = wind_north_mps * north + wind_east_mps * east
     across2 = wind_north_mps**2 + wind_east_mps**2 - along * along
     return along + math.sqrt(max(most_mps * most_mps - across2, 0.0))
+
+
+@kernel
+def wind_growth(height_m, from_m):
+    """The wind at a height over that at another; below a metre it is that of a metre."""
+    return 1.0 + _GROWTH * math.log(max(height_m, 1.0) / max(from_m, 1.0))
 
 
 @inlined_kernel

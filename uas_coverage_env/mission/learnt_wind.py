@@ -13,9 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot.belief import MOST_WIND
+from uas_coverage_env.autopilot.belief import MOST_WIND, wind_growth
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY, WX, WY, X, Y
+from uas_coverage_env.vehicle import PHI, THETA, VX, VY, WX, WY, X, Y, Z
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import RATE, SPEED
 from uas_coverage_env.vehicle.tube import belief_gain
@@ -23,6 +23,9 @@ from uas_coverage_env.world import FLYING, SwarmState
 from uas_coverage_env.world.state import N_BELIEF, WIND
 
 FloatArray = NDArray[np.float64]
+
+MEAN_HEIGHT_M = 20.0
+"""The height of the mean wind of a fleet."""
 
 _MEAN_S = 30.0
 # north and east: state of the axis, and what of it is negative forward
@@ -43,7 +46,7 @@ class LearntWind:
 
     Attributes:
         belief: (U, N_BELIEF) as the world's kernels take it, the wind alone.
-        mean_mps: (2,) of all UAS and the last half minute, north and east [m/s].
+        mean_mps: (2,) at 20 m, of all UAS and the last half minute, north and east [m/s].
     """
 
     def __init__(self, brief: MissionBrief) -> None:
@@ -72,7 +75,9 @@ class LearntWind:
             if flying:
                 self._samples += 1
                 gain = max(self._mean_gain, 1.0 / self._samples)
-                self.mean_mps += gain * (self.wind_mps[flying].mean(axis=0) - self.mean_mps)
+                grown = [wind_growth(-swarm.x[i, Z], MEAN_HEIGHT_M) for i in flying]
+                wind_mps = (self.wind_mps[flying] / np.array(grown)[:, None]).mean(axis=0)
+                self.mean_mps += gain * (wind_mps - self.mean_mps)
 
     def _learn(self, i: int, before: FloatArray, now: FloatArray) -> None:
         A, B = self._axis[i]

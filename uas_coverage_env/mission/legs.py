@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.autopilot.belief import GUSTS, ground_speed
+from uas_coverage_env.autopilot.belief import GUSTS, ground_speed, wind_growth
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.leg_model import Autopilot
@@ -98,18 +98,19 @@ class Legs:
         self.neighbours = _without_self(np.reshape(found, (n, nearest + 1)))
         self._carried = np.array([covers for _, covers in kinds])
         self.starts_m = np.array([uas.start_m for uas in brief.uas], float)
-        self._wind_mps: tuple[float, float] | None = None
+        self._wind: tuple[float, float, float] | None = None
         self._time()
 
-    def in_wind(self, north_mps: float, east_mps: float) -> Self:
-        """The same legs in a wind, slower than every UAS.
+    def in_wind(self, north_mps: float, east_mps: float, height_m: float) -> Self:
+        """The same legs in a wind.
 
         Args:
-            north_mps: The wind, the same everywhere [m/s].
+            north_mps: The wind [m/s].
             east_mps: Likewise.
+            height_m: At which it blows like that; from there on it grows with height.
         """
         legs = copy(self)
-        legs._wind_mps = north_mps, east_mps
+        legs._wind = north_mps, east_mps, height_m
         legs._time()
         return legs
 
@@ -132,9 +133,12 @@ class Legs:
 
     def _level_mps(self, speeds: Speeds, start_m: FloatArray, end_m: FloatArray) -> FloatArray:
         """(N,) level speeds over ground from N places to others."""
-        if self._wind_mps is None:
+        if self._wind is None:
             return np.full(len(start_m), speeds.level_mps)
-        return np.asarray(_ground_mps(speeds.level_mps, *self._wind_mps, end_m - start_m))
+        altitude_m = -0.5 * (start_m[:, 2] + end_m[:, 2])
+        return np.asarray(
+            _ground_mps(speeds.level_mps, *self._wind, end_m - start_m, altitude_m)
+        )
 
     def from_here_s(self, uas: int, position_m: FloatArray) -> FloatArray:
         """(W,) leg times from a position to every waypoint; to near ones past obstacles."""
@@ -228,13 +232,16 @@ def _straight_s(
 
 
 @allocating_kernel
-def _ground_mps(level_mps, north_mps, east_mps, way_m):
-    """Ground speeds (N,) along ways (N, 2) in a wind."""
+def _ground_mps(level_mps, north_mps, east_mps, height_m, way_m, altitude_m):
+    """Ground speeds (N,) along ways (N, 3) at altitudes (N,), in a wind at a height."""
     result = np.empty(len(way_m))
     for i in range(len(way_m)):
         length_m = math.hypot(way_m[i, 0], way_m[i, 1]) + 1e-9
         along = way_m[i, 0] / length_m, way_m[i, 1] / length_m
-        flown_mps = ground_speed(level_mps, GUSTS, north_mps, east_mps, along[0], along[1])
+        share = wind_growth(altitude_m[i], height_m)
+        flown_mps = ground_speed(
+            level_mps, GUSTS, share * north_mps, share * east_mps, along[0], along[1]
+        )
         result[i] = max(flown_mps, _LEAST_MPS)
     return result
 

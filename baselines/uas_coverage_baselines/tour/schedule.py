@@ -17,7 +17,7 @@ from uas_coverage_baselines.routing import (
     improve_routes,
     improve_trips,
 )
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.mission import MEAN_HEIGHT_M, Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.vehicle.range import TOUR
 from uas_coverage_env.world import Arena, SwarmState
@@ -38,6 +38,7 @@ _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 400_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
 _WIND_KNOWN_S = 5.0  # after take-off
+_FAR_SHARE = 0.5  # of what charge lasts for: a longer way home is for the end
 _OTHER_WIND_MPS = 1.0  # from which legs take other times by more than their flights differ from them
 
 
@@ -54,7 +55,7 @@ class View:
         time_s: since the start.
         swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
         asked_in_s: (W,) from now until a waypoint is asked for; None: all are.
-        wind_mps: (2,) north and east, learnt so far; None: still air.
+        wind_mps: (2,) north and east at MEAN_HEIGHT_M, learnt so far; None: still air.
     """
 
     x: FloatArray
@@ -76,7 +77,8 @@ class Schedule:
         self._wind_mps, self._knows_wind = np.zeros(2), False
         self._arena, self._can_cover = arena, brief.can_cover
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
-        self._moves = moves
+        self._unknown_mps = 0.0 if brief.conditions is None else brief.conditions.unknown_mps
+        self._moves, self._worst_home_s = moves, self.legs.home_s
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
@@ -139,7 +141,11 @@ class Schedule:
     def _fly_in(self, view: View) -> None:
         """Time the legs in the wind of a moment: the first time, all orders are searched."""
         assert view.wind_mps is not None
-        self.legs, self._wind_mps = self.legs.in_wind(*view.wind_mps.tolist()), view.wind_mps.copy()
+        wind_mps = self._wind_mps = view.wind_mps.copy()
+        self.legs = self.legs.in_wind(*wind_mps.tolist(), MEAN_HEIGHT_M)
+        # on the way back it may blow stronger for a while, and return mode reckons with that
+        worst_mps = wind_mps * (1.0 + self._unknown_mps / float(np.hypot(*wind_mps)))
+        self._worst_home_s = self.legs.in_wind(*worst_mps.tolist(), MEAN_HEIGHT_M).home_s
         if not self._knows_wind:
             self._knows_wind = True
             self.begin(view, round(view.time_s))
@@ -282,6 +288,13 @@ class Schedule:
 
         return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, task)
 
+    def _may_strand(self, view: View) -> NDArray[np.bool_]:
+        """(W,) from where the way home may become too long; visited late: all is over then."""
+        if not self._knows_wind or not view.may_work.any():
+            return np.zeros(len(view.uncovered), np.bool_)
+        home_s = self._worst_home_s[view.may_work].min(axis=0)
+        return np.asarray(home_s > _FAR_SHARE * self._budget_s(view)[view.may_work].max())
+
     def task(self, view: View) -> RoutingTask:
         """The routing problem of a moment."""
         # it is unknown when a blocked waypoint opens: late enough to do other work before, and soon
@@ -291,7 +304,7 @@ class Schedule:
         open_ = view.uncovered.copy()
         if view.may_work.any():  # what no UAS can cover is no reason to search again
             open_ &= self._can_cover[view.may_work].any(axis=0)
-        not_before_s = np.where(view.blocked, opens_s, 0.0)
+        not_before_s = np.where(view.blocked | self._may_strand(view), opens_s, 0.0)
         if view.asked_in_s is not None:
             not_before_s = np.maximum(not_before_s, view.asked_in_s)
         return RoutingTask.of(
