@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
@@ -45,7 +46,7 @@ def view_of(scenario, **changes):
 
 
 def schedule_of(scenario, view, moves=20_000):
-    schedule = Schedule(MissionBrief.of(scenario), build_arena(scenario), moves)
+    schedule = Schedule(MissionBrief.of(scenario), build_arena(scenario), SearchEffort(moves))
     schedule.begin(view, 0)
     return schedule
 

@@ -135,10 +135,8 @@ class Legs:
         """(N,) level speeds over ground from N places to others."""
         if self._wind is None:
             return np.full(len(start_m), speeds.level_mps)
-        altitude_m = -0.5 * (start_m[:, 2] + end_m[:, 2])
-        return np.asarray(
-            _ground_mps(speeds.level_mps, *self._wind, end_m - start_m, altitude_m)
-        )
+        altitude_m = -np.minimum(start_m[:, 2], end_m[:, 2])
+        return np.asarray(_ground_mps(speeds.level_mps, *self._wind, end_m - start_m, altitude_m))
 
     def from_here_s(self, uas: int, position_m: FloatArray) -> FloatArray:
         """(W,) leg times from a position to every waypoint; to near ones past obstacles."""

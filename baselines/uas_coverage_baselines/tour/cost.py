@@ -17,8 +17,8 @@ from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.vehicle.range import ROUTED, Speeds, flight_seconds
 from uas_coverage_env.world.height import in_landing_zone
-from uas_coverage_env.world.state import WIND
 from uas_coverage_env.world.routes import box_apart, route
+from uas_coverage_env.world.state import WIND
 
 FloatArray = NDArray[np.float64]
 

@@ -74,7 +74,19 @@ def _copy(plan, other, first):
 
 @allocating_kernel
 def improve(
-    arena, i, task, x, reference, others_m, plan, trial, n_kept, n_changes, rng, command, belief=None
+    arena,
+    i,
+    task,
+    x,
+    reference,
+    others_m,
+    plan,
+    trial,
+    n_kept,
+    n_changes,
+    rng,
+    command,
+    belief=None,
 ):
     """Plan the coming seconds of a UAS.
 

@@ -46,7 +46,6 @@ _OFF_MPS = 0.6  # a mean deviation with which no plan comes true
 _OFF_SHARE = 0.1  # of the last step in that mean
 
 
-DEBUG=None
 class TourOptions(AssistedOptions):
     """Options of `tour`."""
 
@@ -67,16 +66,24 @@ class Tour:
 
     Before take-off simulated annealing gives every UAS a route (`schedule`); on events the order
     is searched again. At every step each UAS's commands for the coming seconds are improved in
-    simulation (`flight_plan`), and the first is flown. In a wind in which the plans of a UAS do not
-    come true, it flies along its route under the world's guidance. There is no clock in any of it:
-    the same seed flies the same mission.
+    simulation (`flight_plan`), and the first is flown. Where wind or wrong models are stated, order
+    and plans are made in the wind that is learnt; a UAS whose plans do not come true nevertheless
+    flies along its route under the world's guidance. There is no clock in any of it: the same seed
+    flies the same mission.
+
+    Args:
+        options: See `TourOptions`.
+        effort: Of the order's searches; None: by the options.
     """
 
     Options = TourOptions
     comes_home_by_legs = True
 
-    def __init__(self, options: TourOptions | None = None) -> None:
+    def __init__(
+        self, options: TourOptions | None = None, effort: SearchEffort | None = None
+    ) -> None:
         self.options = options or TourOptions()
+        self._effort = effort or SearchEffort(self.options.moves)
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
         self._has_acted = False
@@ -101,14 +108,14 @@ class Tour:
         self._has_acted, self._seed = False, seed
         self._by_legs: LegMission | None = None
         if brief.execution is not None:
-            effort = SearchEffort(self.options.moves)
-            self._by_legs = LegMission(brief, _LEG_SEARCHES, effort, seed)
+            self._by_legs = LegMission(brief, _LEG_SEARCHES, self._effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
-        self._arena, self._learnt = self._world.arena, None
+        self._arena = self._world.arena
+        self._learnt: LearntWind | None = None
         if brief.conditions is not None:
             self._learnt, rules = LearntWind(brief), self._arena.rules.copy()
-            rules["disturbed"] = True
+            rules["disturbed"] = True  # else kernels fly as in still air
             self._arena = self._arena._replace(rules=rules)
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
@@ -125,7 +132,7 @@ class Tour:
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self._schedule = Schedule(brief, self._arena, self.options.moves)
+        self._schedule = Schedule(brief, self._arena, self._effort)
         self._brief, self._has_order = brief, not may_go_on
         if self._has_order:
             self._find_order(self._view(first_sight(brief)), seed)
@@ -171,8 +178,8 @@ class Tour:
 
     @property
     def _is_guided(self) -> NDArray[np.bool_]:
-        """(U,) whose plans do not come true, where that has to be expected."""
-        return self._off_mps > (_OFF_MPS if self._brief.conditions is not None else np.inf)
+        """(U,) whose plans do not come true, in spite of what is learnt of the wind."""
+        return self._off_mps > _OFF_MPS
 
     def _find_order(self, view: View, seed: int) -> None:
         self._schedule.begin(view, seed)
@@ -198,7 +205,7 @@ class Tour:
         )  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
-        # the first step of a mission in wind is a first look at it
+        # in wind the first step is a hover, for a first look at it
         looks = self._learnt is not None and swarm.step == 0
         self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided and not looks
         if not self._is_flown[i]:
@@ -223,22 +230,19 @@ class Tour:
             _MOVING_MARGIN_M,
         )
 
-    def _catch_up(
-        self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState
-    ) -> int:
+    def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState) -> int:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
         off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
-        filtered = self._learnt is not None and bool(swarm.filtered[i] or swarm.returning[i])
-        if self._is_flown[i] and not filtered:
-            self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
-        as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
-        if self._learnt is not None:
-            as_planned = self._is_flown[i] and not filtered
-            self._reference_mps[i] = swarm.reference_mps[i]
-        else:
+        if self._learnt is None:
+            as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
             self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
-        if DEBUG is not None: DEBUG.append((swarm.step, i, self._is_flown[i], filtered, off_mps, self._off_mps[i]))
+        else:
+            filtered = len(swarm.filtered) > 0 and swarm.filtered[i]
+            as_planned = self._is_flown[i] and not filtered and not swarm.returning[i]
+            self._reference_mps[i] = swarm.reference_mps[i]
+            if as_planned:
+                self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
         plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
         plan.push[-1], plan.share[-1] = 0.0, 1.0
         if not as_planned:

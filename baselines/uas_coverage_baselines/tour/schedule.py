@@ -38,8 +38,7 @@ _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 400_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
 _WIND_KNOWN_S = 5.0  # after take-off
-_FAR_SHARE = 0.5  # of what charge lasts for: a longer way home is for the end
-_OTHER_WIND_MPS = 1.0  # from which legs take other times by more than their flights differ from them
+_OTHER_WIND_MPS = 1.0  # by so much another: legs are timed anew
 
 
 @dataclass(frozen=True)
@@ -72,13 +71,12 @@ class View:
 class Schedule:
     """The order of the swarm, kept up to date."""
 
-    def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
+    def __init__(self, brief: MissionBrief, arena: Arena, effort: SearchEffort) -> None:
         self.legs, self._packs = Legs(brief), Packs.of(brief)
         self._wind_mps, self._knows_wind = np.zeros(2), False
         self._arena, self._can_cover = arena, brief.can_cover
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
-        self._unknown_mps = 0.0 if brief.conditions is None else brief.conditions.unknown_mps
-        self._moves, self._worst_home_s = moves, self.legs.home_s
+        self._effort = effort
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
@@ -89,9 +87,7 @@ class Schedule:
     def begin(self, view: View, seed: int) -> None:
         """Search long, before take-off."""
         if (view.blocked & view.uncovered).any():  # how late is late, is known with an order
-            self.take(
-                improve_routes(self.task(view), self.order, SearchEffort(self._moves), seed), view
-            )
+            self.take(improve_routes(self.task(view), self.order, self._effort, seed), view)
         order = self._searched(view, seed)
         if len(order.left_out):
             self._keep_less()
@@ -100,9 +96,9 @@ class Schedule:
 
     def _searched(self, view: View, seed: int) -> Routes:
         """The best of several long searches that begin with nothing."""
-        task, fresh, effort = self.task(view), self._fresh_packs(view), SearchEffort(self._moves)
+        task, fresh = self.task(view), self._fresh_packs(view)
         orders = [
-            improve_trips(task, empty_routes(task.n_uas), effort, seed + attempt, fresh)
+            improve_trips(task, empty_routes(task.n_uas), self._effort, seed + attempt, fresh)
             for attempt in range(_FIRST_SEARCHES)
         ]
         return min(orders, key=lambda order: order.cost_s)
@@ -143,9 +139,6 @@ class Schedule:
         assert view.wind_mps is not None
         wind_mps = self._wind_mps = view.wind_mps.copy()
         self.legs = self.legs.in_wind(*wind_mps.tolist(), MEAN_HEIGHT_M)
-        # on the way back it may blow stronger for a while, and return mode reckons with that
-        worst_mps = wind_mps * (1.0 + self._unknown_mps / float(np.hypot(*wind_mps)))
-        self._worst_home_s = self.legs.in_wind(*worst_mps.tolist(), MEAN_HEIGHT_M).home_s
         if not self._knows_wind:
             self._knows_wind = True
             self.begin(view, round(view.time_s))
@@ -162,8 +155,9 @@ class Schedule:
     def _searched_again(self, view: View) -> tuple[Routes, Routes]:
         """The present order with all that is open, and the best that was found from it."""
         task, fresh = self.task(view), self._fresh_packs(view)
-        kept = improve_trips(task, self.order, SearchEffort(0), 0, fresh)
-        efforts = (SearchEffort(_MOVES_AGAIN, hottest_s=1.5), SearchEffort(_MOVES_AGAIN))
+        again = replace(self._effort, moves=_MOVES_AGAIN)
+        kept = improve_trips(task, self.order, replace(again, moves=0), 0, fresh)
+        efforts = (replace(again, hottest_s=1.5), again)
         found = [improve_trips(task, kept, effort, round(view.time_s), fresh) for effort in efforts]
         return kept, min(found, key=lambda order: order.cost_s)
 
@@ -288,13 +282,6 @@ class Schedule:
 
         return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, task)
 
-    def _may_strand(self, view: View) -> NDArray[np.bool_]:
-        """(W,) from where the way home may become too long; visited late: all is over then."""
-        if not self._knows_wind or not view.may_work.any():
-            return np.zeros(len(view.uncovered), np.bool_)
-        home_s = self._worst_home_s[view.may_work].min(axis=0)
-        return np.asarray(home_s > _FAR_SHARE * self._budget_s(view)[view.may_work].max())
-
     def task(self, view: View) -> RoutingTask:
         """The routing problem of a moment."""
         # it is unknown when a blocked waypoint opens: late enough to do other work before, and soon
@@ -304,7 +291,7 @@ class Schedule:
         open_ = view.uncovered.copy()
         if view.may_work.any():  # what no UAS can cover is no reason to search again
             open_ &= self._can_cover[view.may_work].any(axis=0)
-        not_before_s = np.where(view.blocked | self._may_strand(view), opens_s, 0.0)
+        not_before_s = np.where(view.blocked, opens_s, 0.0)
         if view.asked_in_s is not None:
             not_before_s = np.maximum(not_before_s, view.asked_in_s)
         return RoutingTask.of(

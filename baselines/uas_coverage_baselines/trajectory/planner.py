@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
 from uas_coverage_baselines.routing import SearchEffort
+from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
@@ -69,10 +70,14 @@ class Trajectory:
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
         self._has_acted = False
+        self._in_wind: Tour | None = None
         self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
+        if _blows(brief):
+            Tour().warm_up(brief)
+            return
         quick = Trajectory(TrajectoryOptions(orders=1, moves=10, programs=3))
         quick.reset(brief, 0)
         swarm = first_sight(brief)
@@ -83,6 +88,14 @@ class Trajectory:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts; one that may be under way, when it goes on."""
+        if _blows(brief):
+            if self._in_wind is None or len(self._brief.uas) != len(brief.uas):
+                self._brief = brief
+                self._in_wind = self._pursuit()
+            self._has_acted = False
+            self._in_wind.reset(brief, seed)
+            return
+        self._in_wind = None
         repeats = self._repeats if self._has_acted and seed == self._seed else None
         if repeats is not None and repeats.goes_on(brief):
             return
@@ -137,11 +150,13 @@ class Trajectory:
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)
         self._make_plan(swarm, Movers.seen(self._brief, swarm, self._silent))
-        if (said := self._brief.conditions) is not None and said.mean_mps > 0.0:
-            self.steering = self._steer()  # no flight that is planned in still air is flown
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
+        if self._in_wind is not None:
+            commands = self._in_wind.act(swarm)
+            self.last_decision = self._in_wind.last_decision
+            return commands
         if self._repeats is not None:
             if self._has_acted and swarm.step == 0:  # the same mission once more
                 self._has_acted = False
@@ -183,6 +198,11 @@ class Trajectory:
         staying = [u for u in idle if self._stays(u, swarm)]
         chosen = self._safeguard.chosen(swarm, courses, movers, staying)
         return {**self._commands(swarm, flying, chosen, reason), **home}
+
+    def _pursuit(self) -> Tour:
+        """What flies in wind, in which no flight that is planned in still air comes true."""
+        effort = SearchEffort(self.options.moves, total_weight=self.total_weight)
+        return Tour(effort=effort)
 
     def _steer(self) -> Steering:
         assert self.mission_plan is not None
@@ -436,3 +456,8 @@ class Trajectory:
             self.mission_plan = replace(better, order=order)
             self._planned |= better.planned
             self._ends |= {u: p.course.end for u, p in better.planned.items()}
+
+
+def _blows(brief: MissionBrief) -> bool:
+    """Whether a mean wind is stated."""
+    return brief.conditions is not None and brief.conditions.mean_mps > 0.0
