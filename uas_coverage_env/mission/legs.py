@@ -101,16 +101,16 @@ class Legs:
         self._wind: tuple[float, float, float] | None = None
         self._time()
 
-    def in_wind(self, north_mps: float, east_mps: float, height_m: float) -> Self:
+    def in_wind(self, wind_mps: FloatArray, height_m: float) -> Self:
         """The same legs in a wind.
 
         Args:
-            north_mps: The wind [m/s].
-            east_mps: Likewise.
-            height_m: At which it blows like that; from there on it grows with height.
+            wind_mps: (2,) north and east [m/s].
+            height_m: At which it blows like that [m]; higher up it blows harder. A leg is flown at
+                the higher one of its ends.
         """
         legs = copy(self)
-        legs._wind = north_mps, east_mps, height_m
+        legs._wind = float(wind_mps[0]), float(wind_mps[1]), height_m
         legs._time()
         return legs
 

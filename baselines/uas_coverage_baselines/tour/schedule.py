@@ -85,7 +85,7 @@ class Schedule:
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
     def begin(self, view: View, seed: int) -> None:
-        """Search long, before take-off."""
+        """Search long: before take-off, and when the wind is known."""
         if (view.blocked & view.uncovered).any():  # how late is late, is known with an order
             self.take(improve_routes(self.task(view), self.order, self._effort, seed), view)
         order = self._searched(view, seed)
@@ -135,10 +135,10 @@ class Schedule:
         return float(np.hypot(*(view.wind_mps - self._wind_mps))) > _OTHER_WIND_MPS
 
     def _fly_in(self, view: View) -> None:
-        """Time the legs in the wind of a moment: the first time, all orders are searched."""
+        """Time the legs in the wind of a moment, the first time for an order that is made for it."""
         assert view.wind_mps is not None
-        wind_mps = self._wind_mps = view.wind_mps.copy()
-        self.legs = self.legs.in_wind(*wind_mps.tolist(), MEAN_HEIGHT_M)
+        self._wind_mps = view.wind_mps.copy()
+        self.legs = self.legs.in_wind(self._wind_mps, MEAN_HEIGHT_M)
         if not self._knows_wind:
             self._knows_wind = True
             self.begin(view, round(view.time_s))
