@@ -135,7 +135,7 @@ class Schedule:
         return float(np.hypot(*(view.wind_mps - self._wind_mps))) > _OTHER_WIND_MPS
 
     def _fly_in(self, view: View) -> None:
-        """Time the legs in the wind of a moment, the first time for an order that is made for it."""
+        """Time the legs in the wind of a moment; the first time, search anew."""
         assert view.wind_mps is not None
         self._wind_mps = view.wind_mps.copy()
         self.legs = self.legs.in_wind(self._wind_mps, MEAN_HEIGHT_M)
