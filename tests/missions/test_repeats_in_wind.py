@@ -1,4 +1,4 @@
-"""Waypoints that are asked for again, in a wind in which planners send UAS by guidance."""
+"""Waypoints that are asked for again, in wind, by planners that send UAS by guidance."""
 
 import pytest
 
