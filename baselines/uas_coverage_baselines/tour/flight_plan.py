@@ -73,31 +73,16 @@ def _copy(plan, other, first):
 
 
 @allocating_kernel
-def improve(
-    arena,
-    i,
-    task,
-    x,
-    reference,
-    others_m,
-    plan,
-    trial,
-    n_kept,
-    n_changes,
-    rng,
-    command,
-    belief=None,
-):
+def improve(arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, command, belief=None):
     """Plan the coming seconds of a UAS.
 
     Args:
         arena: The arena; its moving obstacles are where they are now, in row 0.
         i: Index of the UAS.
         task: What it has to do.
-        x: (14,) its state.
-        reference: (2,) [m/s] of its inner loop.
         others_m: (U, N+1, 3) [m] where the others are going; NaN where none is flying.
-        plan: What is left of the plan before is tried; written.
+        plan: What is left of the plan before is tried; written. Its first state, and reference of
+            the inner loop, are those of now.
         trial: Another plan of the same size, written.
         n_kept: How many legs of the plan before are left; the others are aimed anew.
         n_changes: How many changes are tried.
@@ -108,6 +93,7 @@ def improve(
     Returns:
         Estimated flight time to the end [s]; above SAFE_BELOW_S where the plan is not safe.
     """
+    x, reference = plan.x[0], plan.reference[0]
     around = look_around(arena, i, x, others_m)
     n_legs = min(len(task.route), LEGS)
     begin(plan, x, reference)

@@ -128,7 +128,6 @@ class Tour:
         self._is_flown = np.zeros(n_uas, np.bool_)
         self._guided, self._off_mps = GuidedFlight(brief), np.zeros(n_uas)
         self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
-        self._reference_mps = np.zeros((n_uas, 2))
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
@@ -200,8 +199,8 @@ class Tour:
         is_guided = self._is_guided[i]
         changes = 0 if is_guided else self.options.changes
         seconds = improve(
-            self._arena, i, task, x, self._reference_mps[i], others_m, plan, self._trial,
-            n_kept, changes, self._rng, self._command, belief,
+            self._arena, i, task, others_m, plan, self._trial, n_kept, changes, self._rng,
+            self._command, belief,
         )  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
@@ -236,13 +235,14 @@ class Tour:
         off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
         if self._learnt is None:
             as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
-            self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
+            plan.reference[0] = plan.reference[1] if as_planned else x[VX : VY + 1]
         else:
             filtered = len(swarm.filtered) > 0 and swarm.filtered[i]
             as_planned = self._is_flown[i] and not filtered and not swarm.returning[i]
-            self._reference_mps[i] = swarm.reference_mps[i]
+            plan.reference[0] = swarm.reference_mps[i]
             if as_planned:
                 self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
+        plan.x[0] = x
         plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
         plan.push[-1], plan.share[-1] = 0.0, 1.0
         if not as_planned:
