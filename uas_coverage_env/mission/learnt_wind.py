@@ -25,9 +25,9 @@ from uas_coverage_env.world.state import N_BELIEF, WIND
 FloatArray = NDArray[np.float64]
 
 MEAN_HEIGHT_M = 20.0
-"""The height of the mean wind of a fleet."""
+"""The height of the mean wind of a fleet [m]."""
 
-_MEAN_S = 30.0
+_MEAN_S = 30.0  # most turbulence is over sooner
 # north and east: state of the axis, and what of it is negative forward
 _STATES = ((X, VX, THETA, WY), (Y, VY, PHI, WX))
 _FORWARD = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, 1.0, 1.0, 1.0]])
@@ -39,14 +39,14 @@ def axes(x: FloatArray) -> FloatArray:
 
 
 class LearntWind:
-    """Finds out the wind of each UAS.
+    """Finds out the wind of each UAS, and the mean wind of the fleet.
 
     Args:
         brief: The mission.
 
     Attributes:
         belief: (U, N_BELIEF) as the world's kernels take it, the wind alone.
-        mean_mps: (2,) at 20 m, of all UAS and the last half minute, north and east [m/s].
+        mean_mps: (2,) at MEAN_HEIGHT_M, of all UAS and the last half minute, north and east [m/s].
     """
 
     def __init__(self, brief: MissionBrief) -> None:

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.mission import LearntWind, MissionBrief, axes
+from uas_coverage_env.mission import LearntWind, MissionBrief
+from uas_coverage_env.mission.learnt_wind import axes
 from uas_coverage_env.vehicle import (
     LIFT,
     PHI,
@@ -46,7 +47,7 @@ from uas_coverage_env.world import Mode, SwarmState, Velocity
 FloatArray = NDArray[np.float64]
 
 _HOLDING_COST = 10.0
-# north and east
+# of the angular acceleration north and east
 _TORQUES = ((TAU_Y, -1.0, 1), (TAU_X, 1.0, 0))
 
 
