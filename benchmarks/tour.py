@@ -65,7 +65,7 @@ def problem(scenario: Scenario) -> RoutingTask:
         blocked=np.zeros_like(swarm.uncovered),
         time_s=0.0,
     )
-    return Schedule(MissionBrief.of(scenario), build_arena(scenario), 0).task(view)
+    return Schedule(MissionBrief.of(scenario), build_arena(scenario), SearchEffort(0)).task(view)
 
 
 def annealed(task: RoutingTask, seconds: float) -> Routes:

@@ -2,16 +2,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.flight import Assistants, accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, generate_scenario, sample_scenario
+from uas_coverage_env.scenario import Scenario, Wind, generate_scenario, sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import LOST, build_arena
+from uas_coverage_env.world import LOST, GoTo, Velocity, build_arena
 
 QUICK = {"moves": 20_000, "changes": 60}
 
@@ -45,7 +46,7 @@ def view_of(scenario, **changes):
 
 
 def schedule_of(scenario, view, moves=20_000):
-    schedule = Schedule(MissionBrief.of(scenario), build_arena(scenario), moves)
+    schedule = Schedule(MissionBrief.of(scenario), build_arena(scenario), SearchEffort(moves))
     schedule.begin(view, 0)
     return schedule
 
@@ -171,6 +172,44 @@ def test_a_predicted_flight_begins_where_the_uas_is_and_comes_true(small_town):
 
 def test_it_flies_with_the_filter_and_brings_every_uas_home_itself():
     assert Tour().assistants == Assistants(return_mode=False, safety_filter=True)
+
+
+@pytest.mark.parametrize("mean_mps", [3.0, 6.0])
+def test_its_plans_come_true_in_a_wind_that_nobody_told_it(mean_mps, small_town):
+    wind = Wind(mean_mps=mean_mps, from_deg=240.0, turbulence=1.0, roughness_m=0.05)
+    tour = Tour(TourOptions(**QUICK))
+    flight = rollout(small_town.model_copy(update={"wind": wind}), tour)
+    assert accomplished(flight)
+    assert flight.violations == ()
+    assert flight.breaches == 0
+    assert 0.0 < tour._off_mps.max() < 0.35  # of 0.6 m/s at which it would be guided
+
+
+def test_it_is_guided_where_its_plans_do_not_come_true(small_town, monkeypatch):
+    monkeypatch.setattr("uas_coverage_baselines.tour.planner._OFF_MPS", 0.01)
+    tour, kinds = Tour(TourOptions(**QUICK)), []
+    act = tour.act
+
+    def noted(swarm):
+        commands = act(swarm)
+        kinds.append({type(command) for command in commands.values()})
+        return commands
+
+    monkeypatch.setattr(tour, "act", noted)
+    wind = Wind(mean_mps=5.0, from_deg=240.0, turbulence=1.0)
+    assert accomplished(rollout(small_town.model_copy(update={"wind": wind}), tour))
+    assert all(GoTo in made and Velocity not in made for made in kinds[8:])
+
+
+def test_an_order_in_wind_is_timed_in_the_wind_that_was_learnt(small_town):
+    view = view_of(small_town, time_s=10.0)
+    schedule = schedule_of(small_town, view)
+    still_s = schedule.order.seconds.max()
+    schedule.update(replace(view, wind_mps=np.array([0.5, 0.5])))  # too little to matter
+    assert schedule.order.seconds.max() == still_s
+    schedule.update(replace(view, wind_mps=np.array([6.0, 6.0])))
+    assert schedule.order.seconds.max() > 1.2 * still_s
+    assert sorted(np.concatenate(schedule.order.routes)) == list(range(12))
 
 
 @pytest.mark.slow

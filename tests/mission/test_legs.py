@@ -129,3 +129,33 @@ def test_every_kind_of_vehicle_has_its_own_times():
         climb_s = 48.0 / vehicle.limits.v_up_max_mps
         assert legs.between_s[row, 0, 1] == pytest.approx(climb_s)
     assert legs.home_s[0].tolist() != legs.home_s[1].tolist()
+
+
+def legs_in_wind(waypoints_m, wind_mps):
+    """Leg times (W, W) in still air and in a wind at the height of the first waypoint; its legs."""
+    legs = Legs(MissionBrief.of(scenario(waypoints_m)))
+    still_s = legs.between_s.copy()
+    blown = legs.in_wind(np.array(wind_mps), -waypoints_m[0][2])
+    np.testing.assert_array_equal(legs.between_s, still_s)
+    return still_s[0], blown.between_s[0], blown
+
+
+def test_a_leg_in_wind_takes_as_long_as_airspeed_and_wind_allow():
+    places_m = ((50.0, 100.0, -30.0), (150.0, 100.0, -30.0), (50.0, 180.0, -30.0))
+    still_s, blown_s, blown = legs_in_wind(places_m, (-6.0, 0.0))
+    most_mps = 100.0 / still_s[0, 1]
+    across_mps = math.sqrt(most_mps**2 - 36.0)
+    assert blown_s[0, 1] == pytest.approx(100.0 / (most_mps - 6.0))
+    # over ground a UAS stays a tenth of the wind below its highest speed
+    assert blown_s[1, 0] == pytest.approx(100.0 / (most_mps - 0.6))
+    assert blown_s[0, 2] == pytest.approx(80.0 / across_mps)
+    ground_mps = blown.ground_mps(0, np.array(places_m[0]), np.array(places_m[2]))
+    assert ground_mps == pytest.approx(across_mps)
+
+
+def test_the_wind_of_a_leg_is_that_at_the_higher_one_of_its_ends():
+    places_m = ((50.0, 100.0, -10.0), (250.0, 100.0, -10.0), (250.0, 100.0, -30.0))
+    still_s, blown_s, _ = legs_in_wind(places_m, (-6.0, 0.0))
+    slower = blown_s[0, 1:] / still_s[0, 1:]
+    assert slower[0] == pytest.approx(12.0 / (12.0 - 6.0))
+    assert slower[1] == pytest.approx(12.0 / (12.0 - 6.0 * (1.0 + 0.2 * math.log(3.0))))

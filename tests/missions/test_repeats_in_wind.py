@@ -1,4 +1,4 @@
-"""Waypoints that are asked for again, in a wind in which planners send UAS by guidance."""
+"""Waypoints that are asked for again, in wind, by planners that send UAS by guidance."""
 
 import pytest
 
@@ -15,6 +15,7 @@ def test_what_is_asked_for_again_is_flown_to_as_the_waypoint_that_it_is_now(name
     town = generate_scenario(3, n_uas=1, n_waypoints=N_WAYPOINTS, n_obstacles=0)
     waypoints = tuple(w.model_copy(update={"again_after_s": (15.0,)}) for w in town.waypoints)
     windy = with_disturbances(town.model_copy(update={"waypoints": waypoints}), "moderate", 0)
+    monkeypatch.setattr("uas_coverage_baselines.tour.planner._OFF_MPS", -1.0)  # guided
     planner, targets = load_planner(name), set()
     act = planner.act
 

@@ -1,4 +1,4 @@
-"""In wind no flight goes as planned: `trajectory` then sends its UAS along their order."""
+"""In wind no flight goes as planned: `trajectory` then pursues its order, or steers along it."""
 
 import numpy as np
 import pytest

@@ -40,13 +40,17 @@ SEES_CONSUMPTION_S = 30.0
 MOST_WIND = 0.95
 """Of the highest speed: a UAS believes in no wind in which it could not hover."""
 
-_GUSTS = 0.1
+GUSTS = 0.1
 """What is kept of the speed limit for gusts, of the wind believed in."""
 
 _SHEAR_S = 0.7
 """What is kept of it while climbing, for wind that grows with height: so long a climb at the wind
 believed in over the height. By the logarithmic law wind grows over a metre by a fifth of that, and
 the belief and the vehicle together take 3.5 s to follow."""
+
+_GROWTH = 0.2
+"""Of a wind, what it grows by while the height grows by a factor of e: by the logarithmic law, at
+some metres above open country."""
 
 _VERTICAL_GUSTS = 0.04
 """What is kept of the limits of climb and descent for gusts, of the wind believed in."""
@@ -72,6 +76,23 @@ def speed_along(most_mps, wind_north_mps, wind_east_mps, north, east):
     return along + math.sqrt(max(most_mps * most_mps - across2, 0.0))
 
 
+@kernel
+def wind_growth(height_m, from_m):
+    """The wind at a height over that at another; below a metre it is that of a metre."""
+    return 1.0 + _GROWTH * math.log(max(height_m, 1.0) / max(from_m, 1.0))
+
+
+@inlined_kernel
+def ground_speed(most_mps, kept, wind_north_mps, wind_east_mps, north, east):
+    """The highest ground speed that is flown along a direction [m/s]; arguments as above.
+
+    Over ground a gust must not lead far beyond the limit either: `kept` of the wind is kept of it.
+    """
+    within_mps = most_mps - kept * math.sqrt(wind_north_mps**2 + wind_east_mps**2)
+    along_mps = speed_along(most_mps, wind_north_mps, wind_east_mps, north, east)
+    return min(within_mps, max(along_mps, 0.0))
+
+
 @inlined_kernel
 def vertical_margin_mps(belief):
     """By how much slower than its limits a UAS climbs and descends in the wind believed in."""
@@ -92,15 +113,12 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
         speed_mps = math.sqrt(first * first + second * second)
         share = 0.0
         if speed_mps > 0.0:
-            most_mps = speed_along(
-                vehicle.reference_max_mps, wind_north_mps, wind_east_mps,
-                first / speed_mps, second / speed_mps,
-            )  # fmt: skip
-            # over ground a gust must not lead far beyond the limit either
-            wind_mps = math.sqrt(wind_north_mps**2 + wind_east_mps**2)
             growth = _SHEAR_S * max(-x[VZ], 0.0) / max(-x[Z], 1.0)
-            within_mps = vehicle.reference_max_mps - (_GUSTS + min(growth, 0.5)) * wind_mps
-            share = min(speed_mps, within_mps, max(most_mps, 0.0)) / speed_mps
+            most_mps = ground_speed(
+                vehicle.reference_max_mps, GUSTS + min(growth, 0.5),
+                wind_north_mps, wind_east_mps, first / speed_mps, second / speed_mps,
+            )  # fmt: skip
+            share = min(speed_mps, most_mps) / speed_mps
         command.values[0] = share * first - wind_north_mps
         command.values[1] = share * second - wind_east_mps
     x[VX] = north_mps - wind_north_mps

@@ -61,7 +61,7 @@ def _kept_m(required_m, now_m):
 
 
 @kernel
-def _fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
+def fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
     """Fly a command for a step in the disturbances believed in."""
     believed_wrench(vehicle, belief, x, governed, command, u)
     believed_kinematics(vehicle, belief, nonlinear, x, u)
@@ -118,7 +118,7 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
         # one call: what is flown becomes part of this function
         flown = command if k < n_held else arena.rules[0].brake
         if belief is not None and arena.rules[0].disturbed:
-            _fly_as_believed(vehicle, belief, x, governed, flown, nonlinear, u)
+            fly_as_believed(vehicle, belief, x, governed, flown, nonlinear, u)
         else:
             command_wrench(vehicle, x, governed, flown, u)
             if nonlinear:

@@ -7,7 +7,7 @@ descends, and passes beside the roofs that would hold it up.
 
 import math
 
-from uas_coverage_env.autopilot.belief import speed_along
+from uas_coverage_env.autopilot.belief import speed_along, wind_growth
 from uas_coverage_env.compiled.kernels import kernel, stack_array
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import X, Y, Z
@@ -17,10 +17,6 @@ from uas_coverage_env.world.state import WIND
 
 LITTLE_MPS = 2.0
 """Headway below which a UAS flies low: of a wind that is known to about a metre per second."""
-
-_GROWTH = 0.2
-"""Of the wind here, what it grows by while the height grows by a factor of e: by the logarithmic
-law, at some metres above open country."""
 
 _LEAST_MPS = 0.2
 _HERE_M = 2.0
@@ -53,8 +49,7 @@ def makes_little_headway(arena, i, x, belief, x1, y1, altitude_m):
     north_m, east_m = x1 - x[X], y1 - x[Y]
     if math.hypot(north_m, east_m) < _HERE_M:
         return False
-    higher = max(altitude_m, 1.0) / max(-x[Z], 1.0)
-    share = 1.0 + _GROWTH * math.log(max(higher, 1.0))
+    share = wind_growth(max(altitude_m, -x[Z]), -x[Z])
     return _headway_mps(arena, i, belief, north_m, east_m, share) < LITTLE_MPS
 
 

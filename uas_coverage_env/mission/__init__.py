@@ -6,6 +6,7 @@ from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.recall import Recall
@@ -16,10 +17,12 @@ from uas_coverage_env.mission.views import WorldView, first_sight
 from uas_coverage_env.mission.ways import Way, Ways
 
 __all__ = [
+    "MEAN_HEIGHT_M",
     "Approach",
     "Attempts",
     "GuidedFlight",
     "Handover",
+    "LearntWind",
     "Legs",
     "MissionBrief",
     "MovingObstacleBrief",

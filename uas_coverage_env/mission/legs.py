@@ -3,16 +3,21 @@
 A leg goes straight where the way is free, round tall obstacles along the corners that the world's
 routes turn at, and over low ones. It takes as long as the slower of its horizontal and its
 vertical part. Where an autopilot flies the mission, what a corner costs is the time to stop at it.
+In a wind, a leg takes as long as at the ground speed that the wind leaves from its start to its
+end.
 """
 
 from __future__ import annotations
 
 import math
+from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from uas_coverage_env.autopilot.belief import GUSTS, ground_speed, wind_growth
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.leg_model import Autopilot
@@ -33,6 +38,7 @@ _NEIGHBOURS = 24
 _FROM_HERE = 64
 """Likewise from where a UAS is."""
 _AT_ONCE = 2**20  # straight legs: more than so many are computed in parts, for the memory
+_LEAST_MPS = 0.2
 _STOP_DEG = np.array([0.0, 10.0, 25.0, 90.0, 180.0])
 _STOP_SHARE = np.array([0.0, 0.0, 0.6, 1.0, 1.1])
 """What an autopilot loses in a corner, in corners of 90 degrees; a few degrees are no corner."""
@@ -90,23 +96,54 @@ class Legs:
         nearest = min(_NEIGHBOURS, n - 1)
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]
         self.neighbours = _without_self(np.reshape(found, (n, nearest + 1)))
+        self._carried = np.array([covers for _, covers in kinds])
+        self.starts_m = np.array([uas.start_m for uas in brief.uas], float)
+        self._wind: tuple[float, float, float] | None = None
+        self._time()
+
+    def in_wind(self, wind_mps: FloatArray, height_m: float) -> Self:
+        """The same legs in a wind.
+
+        Args:
+            wind_mps: (2,) north and east [m/s].
+            height_m: At which it blows like that [m]; higher up it blows harder. A leg is flown at
+                the higher one of its ends.
+        """
+        legs = copy(self)
+        legs._wind = float(wind_mps[0]), float(wind_mps[1]), height_m
+        legs._time()
+        return legs
+
+    def _time(self) -> None:
+        """Write `between_s` and `home_s`."""
         between_s = {speeds: self._between(speeds) for speeds in dict.fromkeys(self._speeds)}
         self.between_s = np.array(
             [
                 np.where(covers, between_s[speeds], np.inf)
-                for speeds, (_, covers) in zip(self._speeds, kinds, strict=True)
+                for speeds, covers in zip(self._speeds, self._carried, strict=True)
             ]
         )
-        self.starts_m = np.array([uas.start_m for uas in brief.uas], float)
         self.home_s = np.array(
             [self._towards_home(u, start) for u, start in enumerate(self.starts_m)]
         )
+
+    def ground_mps(self, uas: int, start_m: FloatArray, end_m: FloatArray) -> float:
+        """The level speed of a UAS over ground, straight from a place to another [m/s]."""
+        return float(self._level_mps(self._speeds[self.kind[uas]], start_m[None], end_m[None])[0])
+
+    def _level_mps(self, speeds: Speeds, start_m: FloatArray, end_m: FloatArray) -> FloatArray:
+        """(N,) level speeds over ground from N places to others."""
+        if self._wind is None:
+            return np.full(len(start_m), speeds.level_mps)
+        altitude_m = -np.minimum(start_m[:, 2], end_m[:, 2])
+        return np.asarray(_ground_mps(speeds.level_mps, *self._wind, end_m - start_m, altitude_m))
 
     def from_here_s(self, uas: int, position_m: FloatArray) -> FloatArray:
         """(W,) leg times from a position to every waypoint; to near ones past obstacles."""
         speeds = self._speeds[self.kind[uas]]
         here = np.broadcast_to(position_m, self.waypoints_m.shape)
-        result = _straight_s(here, self.waypoints_m, self._credit_m, speeds)
+        level_mps = self._level_mps(speeds, here, self.waypoints_m)
+        result = _straight_s(here, self.waypoints_m, self._credit_m, speeds, level_mps)
         near = np.argpartition(result, min(_FROM_HERE, len(result)) - 1)[:_FROM_HERE]
         result[near] = _legs_s(
             self.arena,
@@ -115,6 +152,7 @@ class Legs:
             self.waypoints_m[near],
             self._credit_m[near],
             speeds,
+            level_mps[near],
             _OCTAGON,
         )
         return np.where(self._can_cover[uas], result, np.inf)
@@ -125,24 +163,31 @@ class Legs:
         start = self.starts_m[[uas]]
         here = np.asarray(position_m, float)[None]
         speeds = self._speeds[self.kind[uas]]
-        return float(_legs_s(self.arena, target, here, start, np.zeros(1), speeds, _OCTAGON)[0])
+        level_mps, no_credit = self._level_mps(speeds, here, start), np.zeros(1)
+        return float(
+            _legs_s(self.arena, target, here, start, no_credit, speeds, level_mps, _OCTAGON)[0]
+        )
 
     def _between(self, speeds: Speeds) -> FloatArray:
         n = len(self.waypoints_m)
         straight = np.empty((n, n))
         for rows in np.array_split(np.arange(n), max(n * n // _AT_ONCE, 1)):
             first, second = np.repeat(rows, n), np.tile(np.arange(n), len(rows))
+            start_m, end_m = self.waypoints_m[first], self.waypoints_m[second]
+            level_mps = self._level_mps(speeds, start_m, end_m)
             straight[rows] = _straight_s(
-                self.waypoints_m[first], self.waypoints_m[second], self._credit_m[second], speeds
+                start_m, end_m, self._credit_m[second], speeds, level_mps
             ).reshape(-1, n)
         near = np.repeat(np.arange(n), self.neighbours.shape[1]), self.neighbours.ravel()
+        start_m, end_m = self.waypoints_m[near[0]], self.waypoints_m[near[1]]
         straight[near] = _legs_s(
             self.arena,
             near[1],
-            self.waypoints_m[near[0]],
-            self.waypoints_m[near[1]],
+            start_m,
+            end_m,
             self._credit_m[near[1]],
             speeds,
+            self._level_mps(speeds, start_m, end_m),
             _OCTAGON,
         )
         np.fill_diagonal(straight, 0.0)
@@ -150,13 +195,15 @@ class Legs:
 
     def _towards_home(self, uas: int, start_m: FloatArray) -> FloatArray:
         n = len(self.waypoints_m)
+        speeds, end_m = self._speeds[self.kind[uas]], np.broadcast_to(start_m, (n, 3))
         return _legs_s(
             self.arena,
             np.full(n, n + uas),
             self.waypoints_m,
-            np.broadcast_to(start_m, (n, 3)),
+            end_m,
             np.zeros(n),
-            self._speeds[self.kind[uas]],
+            speeds,
+            self._level_mps(speeds, self.waypoints_m, end_m),
             _OCTAGON,
         )
 
@@ -168,17 +215,37 @@ def _without_self(found: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _straight_s(
-    start_m: FloatArray, end_m: FloatArray, credit_m: FloatArray, speeds: Speeds
+    start_m: FloatArray,
+    end_m: FloatArray,
+    credit_m: FloatArray,
+    speeds: Speeds,
+    level_mps: FloatArray,
 ) -> FloatArray:
     away = end_m - start_m
     way_m = (away[:, :2] @ _OCTAGON.T).max(axis=1)
     up_m = np.maximum(-away[:, 2] - credit_m, 0.0)
     down_m = np.maximum(away[:, 2] - credit_m, 0.0)
-    return np.maximum(level_seconds(ROUTED, speeds, way_m), vertical_seconds(speeds, up_m, down_m))
+    level_s = level_seconds(ROUTED, speeds._replace(level_mps=level_mps), way_m)
+    return np.maximum(level_s, vertical_seconds(speeds, up_m, down_m))
 
 
 @allocating_kernel
-def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, octagon):
+def _ground_mps(level_mps, north_mps, east_mps, height_m, way_m, altitude_m):
+    """Ground speeds (N,) along ways (N, 3) at altitudes (N,), in a wind at a height."""
+    result = np.empty(len(way_m))
+    for i in range(len(way_m)):
+        length_m = math.hypot(way_m[i, 0], way_m[i, 1]) + 1e-9
+        along = way_m[i, 0] / length_m, way_m[i, 1] / length_m
+        share = wind_growth(altitude_m[i], height_m)
+        flown_mps = ground_speed(
+            level_mps, GUSTS, share * north_mps, share * east_mps, along[0], along[1]
+        )
+        result[i] = max(flown_mps, _LEAST_MPS)
+    return result
+
+
+@allocating_kernel
+def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, level_mps, octagon):
     """Flight times past the fixed obstacles; `targets` are rows of the arena's routes."""
     result = np.empty(len(targets))
     for i in range(len(targets)):
@@ -202,5 +269,6 @@ def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, octagon):
                     top = min(top, -obstacle.roof_m)
             up = max(up, z0 - top)
             down = max(down, z1 - top - credit_m[i])
-        result[i] = flight_seconds(ROUTED, speeds, 0.0, length_m, up, down)
+        flown = Speeds(level_mps[i], speeds.climb_mps, speeds.descent_mps)
+        result[i] = flight_seconds(ROUTED, flown, 0.0, length_m, up, down)
     return result

@@ -96,8 +96,11 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
     def _order_of_trajectory(self, brief: MissionBrief, seed: int) -> tuple[Routes, float]:
         """The order of its plan, and the weight that it gives energy."""
         planner = Trajectory(TrajectoryOptions(planned_orders=3, threads=self.options.threads))
-        # with whole flights, also where an autopilot is to fly the mission by legs
-        planner.reset(brief.model_copy(update={"execution": None}), seed)
+        # with whole flights, also where an autopilot is to fly the mission by legs, or in a wind
+        whole: dict[str, object] = {"execution": None}
+        if brief.conditions is not None:
+            whole["conditions"] = brief.conditions.model_copy(update={"mean_mps": 0.0})
+        planner.reset(brief.model_copy(update=whole), seed)
         assert planner.mission_plan is not None
         return planner.mission_plan.order, planner.total_weight
 

@@ -27,36 +27,27 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import LearntWind, MissionBrief
+from uas_coverage_env.mission.learnt_wind import axes
 from uas_coverage_env.vehicle import (
     LIFT,
     PHI,
     TAU_X,
     TAU_Y,
     THETA,
-    VX,
-    VY,
     VZ,
-    WX,
-    WY,
     LinearModel,
     VehicleParams,
-    X,
-    Y,
     Z,
 )
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
-from uas_coverage_env.vehicle.layout import RATE, SPEED
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
-from uas_coverage_env.vehicle.tube import belief_gain
-from uas_coverage_env.world import FLYING, Mode, SwarmState, Velocity
+from uas_coverage_env.world import Mode, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 
-# north and east: state of the axis, what of it is negative forward, and the torque
-_STATES = ((X, VX, THETA, WY), (Y, VY, PHI, WX))
-_FORWARD = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, 1.0, 1.0, 1.0]])
 _HOLDING_COST = 10.0
+# of the angular acceleration north and east
 _TORQUES = ((TAU_Y, -1.0, 1), (TAU_X, 1.0, 0))
 
 
@@ -87,11 +78,6 @@ def _regulator(A: FloatArray, B: FloatArray, cost: float) -> FloatArray:
     return gain
 
 
-def axes(x: FloatArray) -> FloatArray:
-    """(..., 2, 4) position, velocity, tilt and rate north and east of states (..., 14)."""
-    return np.asarray(x[..., _STATES] * _FORWARD)
-
-
 class InWind:
     """Finds out the wind of each UAS, and commands what a plan leads to in it.
 
@@ -101,35 +87,26 @@ class InWind:
 
     def __init__(self, brief: MissionBrief) -> None:
         self._names = {uas.name: i for i, uas in enumerate(brief.uas)}
-        self._vehicles, self._dt_s = brief.vehicles, brief.dt_s
-        self._axis = [horizontal_axis(vehicle, brief.dt_s) for vehicle in brief.vehicles]
+        self._vehicles = brief.vehicles
         self._loop = [design_velocity_loop(vehicle, brief.dt_s).gain for vehicle in brief.vehicles]
         self._hold = [position_gain(vehicle, brief.dt_s) for vehicle in brief.vehicles]
         self._climb = [climb_gain(vehicle, brief.dt_s) for vehicle in brief.vehicles]
-        self.wind_mps = np.zeros((len(brief.uas), 2))
-        self._before: SwarmState | None = None
-        self._seen = np.zeros(len(brief.uas), np.int64)
+        self._learnt = LearntWind(brief)
+
+    @property
+    def wind_mps(self) -> FloatArray:
+        """(U, 2) that is learnt so far, north and east [m/s]."""
+        return self._learnt.wind_mps
 
     def see(self, swarm: SwarmState) -> SwarmState:
         """Learn the wind from one more sample; returns it with tilts as in still air."""
-        before, self._before = self._before, swarm
-        if before is not None and swarm.step == before.step + 1:
-            for i in np.flatnonzero((before.status == FLYING) & (swarm.status == FLYING)).tolist():
-                self._learn(i, axes(before.x[i]), axes(swarm.x[i]))
+        self._learnt.see(swarm)
         x = swarm.x.copy()
         for i, vehicle in enumerate(self._vehicles):
             lean_rad = vehicle.trim_tilt_rad_per_mps * self.wind_mps[i]
             x[i, THETA] -= lean_rad[0]
             x[i, PHI] += lean_rad[1]
         return replace(swarm, x=x)
-
-    def _learn(self, i: int, before: FloatArray, now: FloatArray) -> None:
-        A, B = self._axis[i]
-        alpha = (now[:, RATE] - before[:, RATE]) / B[RATE]  # whatever was flown
-        off_mps = now[:, SPEED] - (before @ A[SPEED] + B[SPEED] * alpha)
-        gain = max(belief_gain(self._dt_s), 1.0 / (1.0 + self._seen[i]))
-        self._seen[i] += 1
-        self.wind_mps[i] += gain * (off_mps / (1.0 - A[SPEED, SPEED]) - self.wind_mps[i])
 
     def from_here(self, plan: Plan | None, problem: PlanningProblem) -> Plan | None:
         """What is left of a plan, from where the UAS of the problem are."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.tour.pursuit import HOME_TARGET, fly_step
+from uas_coverage_env.autopilot.belief import GUSTS, ground_speed
 from uas_coverage_env.autopilot.guidance import target_position
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake, moving_slack
 from uas_coverage_env.compiled.kernels import allocating_kernel
@@ -17,6 +18,7 @@ from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.vehicle.range import ROUTED, Speeds, flight_seconds
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart, route
+from uas_coverage_env.world.state import WIND
 
 FloatArray = NDArray[np.float64]
 
@@ -110,7 +112,7 @@ def _has_landed(arena, i, task, x, covered):
 
 
 @allocating_kernel
-def _seconds_to(arena, i, task, x, covered):
+def _seconds_to(arena, i, task, x, covered, belief):
     """Flight time left after the plan, estimated."""
     uas = arena.uas[i]
     heads_home = covered == len(task.route)
@@ -120,17 +122,22 @@ def _seconds_to(arena, i, task, x, covered):
     near_m = task.near_m[covered]
     left_m = max(way_m - near_m, 0.0)
     up_m, down_m = max(x[Z] - z1 - near_m, 0.0), max(z1 - x[Z] - near_m, 0.0)
-    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    dx, dy = corner_x - x[X], corner_y - x[Y]
+    length_m = math.hypot(dx, dy) + 1e-9
+    speed_mps = uas.speed_mps
+    if belief is not None:
+        speed_mps = ground_speed(
+            speed_mps, GUSTS, belief[WIND], belief[WIND + 1], dx / length_m, dy / length_m
+        )
+    speeds = Speeds(speed_mps, uas.climb_mps, uas.descent_mps)
     seconds = flight_seconds(ROUTED, speeds, 0.0, left_m, up_m, down_m)
     # what is left for later takes longer than straight flight: no gain in putting it off
     seconds = SLOWER * seconds + task.rest_s[covered]
     # what is lost until the velocity is the wanted one
-    wanted_mps = uas.speed_mps
+    wanted_mps = speed_mps
     if heads_home or task.cover_m[covered] < 0.0:
         wanted_mps = min(wanted_mps, math.sqrt(2.0 * task.acceleration_mps2 * left_m))
         seconds += 0.5 * wanted_mps / task.acceleration_mps2
-    dx, dy = corner_x - x[X], corner_y - x[Y]
-    length_m = math.hypot(dx, dy) + 1e-9
     dvx, dvy = x[VX] - wanted_mps * dx / length_m, x[VY] - wanted_mps * dy / length_m
     seconds += (dvx * dvx + dvy * dvy) / (2.0 * task.acceleration_mps2 * uas.speed_mps)
     return seconds
@@ -161,7 +168,7 @@ def _surroundings_cost(arena, i, task, plan, n_flown, others_m):
 
 
 @allocating_kernel
-def cost_s(arena, i, task, plan, first, around, command, limit_s):
+def cost_s(arena, i, task, plan, first, around, command, limit_s, belief=None):
     """Simulate a plan from step `first` on; the flight time to the end, and what it costs more.
 
     Gives up, with inf, where the plan is seen to cost more than the limit.
@@ -171,12 +178,12 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s):
     cost = 0.0
     for k in range(n_steps):
         if k >= first:
-            fly_step(arena, i, task, plan, k, command)
+            fly_step(arena, i, task, plan, k, command, belief)
             a, x = plan.path_m[k], plan.x[k + 1]
             clear = _is_clear(arena, i, around, a[0], a[1], a[2], x[X], x[Y], x[Z])
             if clear and k < _EXACT_STEPS:
                 n_braking, slack_m = fly_and_brake(
-                    arena, i, plan.x[k], plan.reference[k], command, False, around.path_m
+                    arena, i, plan.x[k], plan.reference[k], command, False, around.path_m, belief
                 )
                 clear = fixed_slack(arena, i, around.path_m, n_braking, 0.0, slack_m) >= 0.0
             elif clear:
@@ -189,14 +196,14 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s):
                 if cost > limit_s:
                     return math.inf
                 for later in range(k + 1, n_steps):
-                    fly_step(arena, i, task, plan, later, command)
+                    fly_step(arena, i, task, plan, later, command, belief)
                 break
         if _has_landed(arena, i, task, plan.x[k + 1], plan.covered[k + 1]):
             n_flown = k + 1
             break
     cost += n_flown * dt_s
     if n_flown == n_steps:
-        cost += _seconds_to(arena, i, task, plan.x[n_steps], plan.covered[n_steps])
+        cost += _seconds_to(arena, i, task, plan.x[n_steps], plan.covered[n_steps], belief)
     if cost > limit_s:
         return math.inf
     return cost + _surroundings_cost(arena, i, task, plan, n_flown, around.others_m)

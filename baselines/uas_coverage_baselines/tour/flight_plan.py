@@ -73,26 +73,27 @@ def _copy(plan, other, first):
 
 
 @allocating_kernel
-def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_changes, rng, command):
+def improve(arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, command, belief=None):
     """Plan the coming seconds of a UAS.
 
     Args:
         arena: The arena; its moving obstacles are where they are now, in row 0.
         i: Index of the UAS.
         task: What it has to do.
-        x: (14,) its state.
-        reference: (2,) [m/s] of its inner loop.
         others_m: (U, N+1, 3) [m] where the others are going; NaN where none is flying.
-        plan: What is left of the plan before is tried; written.
+        plan: What is left of the plan before is tried; written. Its first state, and reference of
+            the inner loop, are those of now.
         trial: Another plan of the same size, written.
         n_kept: How many legs of the plan before are left; the others are aimed anew.
         n_changes: How many changes are tried.
         rng: Source of random numbers.
         command: A record of COMMAND_DTYPE, written.
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
 
     Returns:
         Estimated flight time to the end [s]; above SAFE_BELOW_S where the plan is not safe.
     """
+    x, reference = plan.x[0], plan.reference[0]
     around = look_around(arena, i, x, others_m)
     n_legs = min(len(task.route), LEGS)
     begin(plan, x, reference)
@@ -103,17 +104,17 @@ def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_chang
             aim(arena, i, task, plan, leg)
     trial.push[:] = 0.0
     trial.share[:] = 1.0
-    best = cost_s(arena, i, task, trial, 0, around, command, math.inf)
-    cost = cost_s(arena, i, task, plan, 0, around, command, math.inf)
+    best = cost_s(arena, i, task, trial, 0, around, command, math.inf, belief)
+    cost = cost_s(arena, i, task, plan, 0, around, command, math.inf, belief)
     if cost >= SAFE_BELOW_S:  # what is new is its last step: brake there
         plan.share[-1] = 0.0
-        cost = cost_s(arena, i, task, plan, 0, around, command, math.inf)
+        cost = cost_s(arena, i, task, plan, 0, around, command, math.inf, belief)
     if cost < best:
         best = cost
         _copy(trial, plan, 0)
     _copy(plan, trial, 0)
-    push_to_guidance(arena, i, task, trial, command)
-    cost = cost_s(arena, i, task, trial, 0, around, command, best)
+    push_to_guidance(arena, i, task, trial, command, belief)
+    cost = cost_s(arena, i, task, trial, 0, around, command, best, belief)
     if cost < best:
         best = cost
         _copy(plan, trial, 0)
@@ -123,7 +124,7 @@ def improve(arena, i, task, x, reference, others_m, plan, trial, n_kept, n_chang
         first = _change(arena, i, task, trial, rng, spread)
         # steps before the change are known to be clear, unless the plan so far is unflyable
         since = first if best < SAFE_BELOW_S else 0
-        cost = cost_s(arena, i, task, trial, since, around, command, best)
+        cost = cost_s(arena, i, task, trial, since, around, command, best, belief)
         if cost < best - 1e-9:
             best = cost
             _copy(plan, trial, since)

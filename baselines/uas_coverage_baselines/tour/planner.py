@@ -20,6 +20,7 @@ from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
     GuidedFlight,
     Handover,
+    LearntWind,
     MissionBrief,
     Recall,
     Repeats,
@@ -65,16 +66,24 @@ class Tour:
 
     Before take-off simulated annealing gives every UAS a route (`schedule`); on events the order
     is searched again. At every step each UAS's commands for the coming seconds are improved in
-    simulation (`flight_plan`), and the first is flown. In a wind in which the plans of a UAS do not
-    come true, it flies along its route under the world's guidance. There is no clock in any of it:
-    the same seed flies the same mission.
+    simulation (`flight_plan`), and the first is flown. Where wind or wrong models are stated, order
+    and plans are made in the wind that is learnt; a UAS whose plans do not come true nevertheless
+    flies along its route under the world's guidance. There is no clock in any of it: the same seed
+    flies the same mission.
+
+    Args:
+        options: See `TourOptions`.
+        effort: Of the order's searches; None: by the options.
     """
 
     Options = TourOptions
     comes_home_by_legs = True
 
-    def __init__(self, options: TourOptions | None = None) -> None:
+    def __init__(
+        self, options: TourOptions | None = None, effort: SearchEffort | None = None
+    ) -> None:
         self.options = options or TourOptions()
+        self._effort = effort or SearchEffort(self.options.moves)
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
         self._has_acted = False
@@ -99,11 +108,15 @@ class Tour:
         self._has_acted, self._seed = False, seed
         self._by_legs: LegMission | None = None
         if brief.execution is not None:
-            effort = SearchEffort(self.options.moves)
-            self._by_legs = LegMission(brief, _LEG_SEARCHES, effort, seed)
+            self._by_legs = LegMission(brief, _LEG_SEARCHES, self._effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
         self._arena = self._world.arena
+        self._learnt: LearntWind | None = None
+        if brief.conditions is not None:
+            self._learnt, rules = LearntWind(brief), self._arena.rules.copy()
+            rules["disturbed"] = True  # else kernels fly as in still air
+            self._arena = self._arena._replace(rules=rules)
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
@@ -115,11 +128,10 @@ class Tour:
         self._is_flown = np.zeros(n_uas, np.bool_)
         self._guided, self._off_mps = GuidedFlight(brief), np.zeros(n_uas)
         self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
-        self._reference_mps = np.zeros((n_uas, 2))
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self._schedule = Schedule(brief, self._arena, self.options.moves)
+        self._schedule = Schedule(brief, self._arena, self._effort)
         self._brief, self._has_order = brief, not may_go_on
         if self._has_order:
             self._find_order(self._view(first_sight(brief)), seed)
@@ -135,6 +147,8 @@ class Tour:
         if self._by_legs is not None:
             self.last_decision = None
             return self._by_legs.commands(swarm)
+        if self._learnt is not None:
+            self._learnt.see(swarm)
         view = self._view(replace(swarm, uncovered=self._guided.wanted(swarm.uncovered)))
         if not self._has_order:
             self._go_on(view, swarm.step)
@@ -144,7 +158,7 @@ class Tour:
         predicted_m: dict[str, FloatArray] = {}
         for i in np.flatnonzero(view.flies).tolist():
             name = swarm.names[i]
-            commands[name] = self._fly(i, view, others_m)
+            commands[name] = self._fly(i, view, others_m, swarm)
             predicted_m[name] = others_m[i].copy()
         self.last_decision = Decision(predicted_m)
         commands |= self._guided.commands(swarm, self._guided_to(swarm), _closed(view))
@@ -163,8 +177,8 @@ class Tour:
 
     @property
     def _is_guided(self) -> NDArray[np.bool_]:
-        """(U,) whose plans do not come true, where that has to be expected."""
-        return self._off_mps > (_OFF_MPS if self._brief.conditions is not None else np.inf)
+        """(U,) whose plans do not come true, in spite of what is learnt of the wind."""
+        return self._off_mps > _OFF_MPS
 
     def _find_order(self, view: View, seed: int) -> None:
         self._schedule.begin(view, seed)
@@ -177,19 +191,22 @@ class Tour:
         else:
             self._find_order(self._view(first_sight(self._brief)), self._seed)
 
-    def _fly(self, i: int, view: View, others_m: FloatArray) -> Command:
+    def _fly(self, i: int, view: View, others_m: FloatArray, swarm: SwarmState) -> Command:
         task = self._task(i, view)
         plan, x = self._plans[i], view.x[i]
-        n_kept = self._catch_up(i, x, task.route)
+        n_kept = self._catch_up(i, x, task.route, swarm)
+        belief = None if self._learnt is None else self._learnt.belief[i]
         is_guided = self._is_guided[i]
         changes = 0 if is_guided else self.options.changes
         seconds = improve(
-            self._arena, i, task, x, self._reference_mps[i], others_m, plan, self._trial,
-            n_kept, changes, self._rng, self._command,
+            self._arena, i, task, others_m, plan, self._trial, n_kept, changes, self._rng,
+            self._command, belief,
         )  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
-        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided
+        # in wind the first step is a hover, for a first look at it
+        looks = self._learnt is not None and swarm.step == 0
+        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided and not looks
         if not self._is_flown[i]:
             return GoTo(int(task.route[0]) if len(task.route) else None, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
@@ -212,14 +229,20 @@ class Tour:
             _MOVING_MARGIN_M,
         )
 
-    def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64]) -> int:
+    def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState) -> int:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
         off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
-        if self._is_flown[i]:
-            self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
-        as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
-        self._reference_mps[i] = plan.reference[1] if as_planned else x[VX : VY + 1]
+        if self._learnt is None:
+            as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
+            plan.reference[0] = plan.reference[1] if as_planned else x[VX : VY + 1]
+        else:
+            filtered = len(swarm.filtered) > 0 and swarm.filtered[i]
+            as_planned = self._is_flown[i] and not filtered and not swarm.returning[i]
+            plan.reference[0] = swarm.reference_mps[i]
+            if as_planned:
+                self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
+        plan.x[0] = x
         plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
         plan.push[-1], plan.share[-1] = 0.0, 1.0
         if not as_planned:
@@ -268,6 +291,7 @@ class Tour:
             time_s=swarm.time_s,
             swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
             asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
+            wind_mps=None if self._learnt is None else self._learnt.mean_mps,
         )
 
 

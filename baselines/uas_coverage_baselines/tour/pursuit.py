@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
-from uas_coverage_env.autopilot.lookahead import fly_and_brake
+from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_as_believed
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
@@ -140,15 +140,18 @@ def _is_as_asked(waypoint, x):
 
 
 @allocating_kernel
-def _write_step(arena, i, task, plan, k, command):
+def _write_step(arena, i, task, plan, k, command, belief):
     """Simulate step k of a plan."""
     x, reference = plan.x[k + 1], plan.reference[k + 1]
     x[:] = plan.x[k]
     reference[:] = plan.reference[k]
     u = np.zeros(5)
     vehicle = arena.vehicles[i]
-    command_wrench(vehicle, x, reference, command, u)
-    fly_kinematics(vehicle, x, u)
+    if belief is None:
+        command_wrench(vehicle, x, reference, command, u)
+        fly_kinematics(vehicle, x, u)
+    else:
+        fly_as_believed(vehicle, belief, x, reference, command, False, u)
     plan.path_m[k + 1, 0] = x[X]
     plan.path_m[k + 1, 1] = x[Y]
     plan.path_m[k + 1, 2] = x[Z]
@@ -240,16 +243,19 @@ def _write_pushed(arena, i, plan, k, north_mps, east_mps, altitude_m):
 
 
 @allocating_kernel
-def fly_step(arena, i, task, plan, k, command):
-    """Pursue for step k of a plan: its command, and the state that it leads to."""
+def fly_step(arena, i, task, plan, k, command, belief=None):
+    """Pursue for step k of a plan: its command, and the state that it leads to.
+
+    Where the wind is known, the belief of the inner loop (N_BELIEF,) is given, and held.
+    """
     _pursue(arena, i, task, plan, k)
     values = plan.commands[k]
     write_command(command, VELOCITY, values[0], values[1], values[2])
-    _write_step(arena, i, task, plan, k, command)
+    _write_step(arena, i, task, plan, k, command, belief)
 
 
 @allocating_kernel
-def push_to_guidance(arena, i, task, plan, command):
+def push_to_guidance(arena, i, task, plan, command, belief=None):
     """Choose the pushes so that the world's own guidance is flown."""
     plan.share[:] = 1.0
     for k in range(plan.commands.shape[0]):
@@ -260,12 +266,12 @@ def push_to_guidance(arena, i, task, plan, command):
         if done < len(task.route):
             target = task.route[done]
             stop = task.cover_m[done] < 0.0 or arena.waypoints[target].asks
-        guide(arena, i, x, plan.reference[k], target, stop, False, command)
+        guide(arena, i, x, plan.reference[k], target, stop, False, command, belief)
         altitude_m = command.values[2] if command.kind == VELOCITY else -x[Z]
         plan.push[k, 0] = command.values[0] - plan.commands[k, 0]
         plan.push[k, 1] = command.values[1] - plan.commands[k, 1]
         plan.push[k, 2] = altitude_m - plan.commands[k, 2]
-        fly_step(arena, i, task, plan, k, command)
+        fly_step(arena, i, task, plan, k, command, belief)
 
 
 @allocating_kernel

@@ -17,7 +17,7 @@ from uas_coverage_baselines.routing import (
     improve_routes,
     improve_trips,
 )
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.mission import MEAN_HEIGHT_M, Legs, MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.vehicle.range import TOUR
 from uas_coverage_env.world import Arena, SwarmState
@@ -37,6 +37,8 @@ _OPENS_AFTER_S = 10.0  # and at least so long
 _FIRST_SEARCHES = 3
 _MOVES_AGAIN = 400_000  # of each of two searches on an event, one of them hot
 _WORTH_CHANGING_S = 1.0
+_WIND_KNOWN_S = 5.0  # after take-off
+_OTHER_WIND_MPS = 1.0  # by so much another: legs are timed anew
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class View:
         time_s: since the start.
         swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
         asked_in_s: (W,) from now until a waypoint is asked for; None: all are.
+        wind_mps: (2,) north and east at MEAN_HEIGHT_M, learnt so far; None: still air.
     """
 
     x: FloatArray
@@ -62,16 +65,18 @@ class View:
     time_s: float
     swarm: SwarmState | None = None
     asked_in_s: FloatArray | None = None
+    wind_mps: FloatArray | None = None
 
 
 class Schedule:
     """The order of the swarm, kept up to date."""
 
-    def __init__(self, brief: MissionBrief, arena: Arena, moves: int) -> None:
+    def __init__(self, brief: MissionBrief, arena: Arena, effort: SearchEffort) -> None:
         self.legs, self._packs = Legs(brief), Packs.of(brief)
+        self._wind_mps, self._knows_wind = np.zeros(2), False
         self._arena, self._can_cover = arena, brief.can_cover
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
-        self._moves = moves
+        self._effort = effort
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
@@ -80,11 +85,9 @@ class Schedule:
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
     def begin(self, view: View, seed: int) -> None:
-        """Search long, before take-off."""
+        """Search long: before take-off, and when the wind is known."""
         if (view.blocked & view.uncovered).any():  # how late is late, is known with an order
-            self.take(
-                improve_routes(self.task(view), self.order, SearchEffort(self._moves), seed), view
-            )
+            self.take(improve_routes(self.task(view), self.order, self._effort, seed), view)
         order = self._searched(view, seed)
         if len(order.left_out):
             self._keep_less()
@@ -93,9 +96,9 @@ class Schedule:
 
     def _searched(self, view: View, seed: int) -> Routes:
         """The best of several long searches that begin with nothing."""
-        task, fresh, effort = self.task(view), self._fresh_packs(view), SearchEffort(self._moves)
+        task, fresh = self.task(view), self._fresh_packs(view)
         orders = [
-            improve_trips(task, empty_routes(task.n_uas), effort, seed + attempt, fresh)
+            improve_trips(task, empty_routes(task.n_uas), self._effort, seed + attempt, fresh)
             for attempt in range(_FIRST_SEARCHES)
         ]
         return min(orders, key=lambda order: order.cost_s)
@@ -114,11 +117,33 @@ class Schedule:
     def update(self, view: View) -> None:
         """Drop what is covered, and search again where something has happened."""
         self._drop_covered(view)
+        if self._is_other_wind(view):
+            self._fly_in(view)
+            return
         self._time_legs(view)
         if self._has_changed(view) or self._is_asked_for_more(view):
-            kept, better = self._searched_again(view)
-            worthwhile = better.cost_s < kept.cost_s - _WORTH_CHANGING_S
-            self.take(better if worthwhile else kept, view)
+            self.take(self._better(view), view)
+
+    def _better(self, view: View) -> Routes:
+        """The present order, or one that is better by more than a change costs."""
+        kept, better = self._searched_again(view)
+        return better if better.cost_s < kept.cost_s - _WORTH_CHANGING_S else kept
+
+    def _is_other_wind(self, view: View) -> bool:
+        if view.wind_mps is None or view.time_s < _WIND_KNOWN_S:
+            return False
+        return float(np.hypot(*(view.wind_mps - self._wind_mps))) > _OTHER_WIND_MPS
+
+    def _fly_in(self, view: View) -> None:
+        """Time the legs in the wind of a moment; the first time, search anew."""
+        assert view.wind_mps is not None
+        self._wind_mps = view.wind_mps.copy()
+        self.legs = self.legs.in_wind(self._wind_mps, MEAN_HEIGHT_M)
+        if not self._knows_wind:
+            self._knows_wind = True
+            self.begin(view, round(view.time_s))
+        else:
+            self.take(self._better(view), view)
 
     def _drop_covered(self, view: View) -> None:
         open_ = view.uncovered
@@ -130,8 +155,9 @@ class Schedule:
     def _searched_again(self, view: View) -> tuple[Routes, Routes]:
         """The present order with all that is open, and the best that was found from it."""
         task, fresh = self.task(view), self._fresh_packs(view)
-        kept = improve_trips(task, self.order, SearchEffort(0), 0, fresh)
-        efforts = (SearchEffort(_MOVES_AGAIN, hottest_s=1.5), SearchEffort(_MOVES_AGAIN))
+        again = replace(self._effort, moves=_MOVES_AGAIN)
+        kept = improve_trips(task, self.order, replace(again, moves=0), 0, fresh)
+        efforts = (replace(again, hottest_s=1.5), again)
         found = [improve_trips(task, kept, effort, round(view.time_s), fresh) for effort in efforts]
         return kept, min(found, key=lambda order: order.cost_s)
 
@@ -233,10 +259,10 @@ class Schedule:
         route = self.order.routes[uas]
         if not len(route):
             return self.legs.way_home_s(uas, position_m)
-        first_m = self.legs.waypoints_m[route[0]] - position_m
-        return float(
-            np.linalg.norm(first_m[:2]) / self.legs.speed_mps[uas] + self.rest_s(uas, 1.0, 0.0)[0]
-        )
+        first_m = self.legs.waypoints_m[route[0]]
+        speed_mps = self.legs.ground_mps(uas, position_m, first_m)
+        first_s = np.linalg.norm((first_m - position_m)[:2]) / speed_mps
+        return float(first_s + self.rest_s(uas, 1.0, 0.0)[0])
 
     def _fresh_packs(self, view: View) -> FreshPacks | None:
         """What is there for later flights."""

@@ -164,6 +164,12 @@ def is_idle(swarm: SwarmState, planned: Mapping[int, Planned]) -> bool:
     return any((p.flight.visits + p.course.begin <= swarm.step).all() for p in flying)
 
 
+def order_effort(options: TrajectoryOptions, n_uas: int) -> SearchEffort:
+    """Of the search of an order: in a large fleet energy counts less, or most stay home."""
+    share = min(1.0, SMALL_FLEET / n_uas)
+    return SearchEffort(options.moves, total_weight=options.weight_energy * share)
+
+
 def plan_mission(
     fleet: Fleet,
     moment: Moment,

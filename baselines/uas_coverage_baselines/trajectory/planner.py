@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs import LegMission
-from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
+from uas_coverage_baselines.trajectory.in_wind import InWind, blows
 from uas_coverage_baselines.trajectory.mission_plan import (
-    SMALL_FLEET,
     Effort,
     MissionPlan,
     Planned,
     is_idle,
+    order_effort,
     plan_mission,
 )
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
@@ -57,7 +57,7 @@ class Trajectory:
     An order of the waypoints is searched, the flights along it are convex programs that are made
     shorter as long as nothing is violated, and what is flown is verified with a backup trajectory.
     Plans are made anew where the state is another, or something moves otherwise. There is no clock
-    in any of it: the same seed flies the same mission.
+    in any of it: the same seed flies the same mission. In a stated wind `tour`'s pursuit flies.
     """
 
     Options = TrajectoryOptions
@@ -69,6 +69,7 @@ class Trajectory:
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
         self._has_acted = False
+        self._in_wind = InWind()
         self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -77,12 +78,15 @@ class Trajectory:
         quick.reset(brief, 0)
         swarm = first_sight(brief)
         quick.act(swarm)
-        if brief.execution is not None:
+        if brief.execution is not None or blows(brief):
             return
         quick._safeguard.evade([0], {}, [0])
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts; one that may be under way, when it goes on."""
+        if self._in_wind.takes(brief, order_effort(self.options, len(brief.uas)), seed):
+            self._has_acted = False
+            return
         repeats = self._repeats if self._has_acted and seed == self._seed else None
         if repeats is not None and repeats.goes_on(brief):
             return
@@ -94,7 +98,7 @@ class Trajectory:
         self._by_legs: LegMission | None = None
         self.mission_plan = None
         if brief.execution is not None:
-            effort = SearchEffort(self.options.moves, total_weight=self.total_weight)
+            effort = order_effort(self.options, len(brief.uas))
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
             return
         self._world, self._handover = WorldView(brief), Handover(brief)
@@ -137,11 +141,12 @@ class Trajectory:
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)
         self._make_plan(swarm, Movers.seen(self._brief, swarm, self._silent))
-        if (said := self._brief.conditions) is not None and said.mean_mps > 0.0:
-            self.steering = self._steer()  # no flight that is planned in still air is flown
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
+        if (in_wind := self._in_wind.act(swarm)) is not None:
+            commands, self.last_decision = in_wind
+            return commands
         if self._repeats is not None:
             if self._has_acted and swarm.step == 0:  # the same mission once more
                 self._has_acted = False
@@ -186,14 +191,13 @@ class Trajectory:
 
     def _steer(self) -> Steering:
         assert self.mission_plan is not None
-        moves, weight = self.options.moves // 10, self.total_weight
-        order = self.mission_plan.order
-        return Steering(self._fleet, self._brief, order, moves, weight, self._seed)
+        made = self._fleet, self._brief, self.mission_plan.order
+        return Steering(*made, self.options.moves // 10, self.total_weight, self._seed)
 
     @property
     def total_weight(self) -> float:
-        """Worth of a second of each UAS's flight: in a large fleet of less, or most stay home."""
-        return self.options.weight_energy * min(1.0, SMALL_FLEET / len(self._brief.uas))
+        """Worth of a second of each UAS's flight."""
+        return order_effort(self.options, len(self._brief.uas)).total_weight
 
     def _commands(
         self,
@@ -395,8 +399,7 @@ class Trajectory:
             plan = found(self._waiting.barred)
         self.mission_plan, self._planned = plan, dict(plan.planned)
         self._planned_at, self._seen = swarm.step, movers
-        self._silent_then = self._silent
-        self._blocked = opens > 0
+        self._silent_then, self._blocked = self._silent, opens > 0
         self._may_fly = flying.copy()
         if first:
             for u in range(len(flying)):
@@ -431,8 +434,7 @@ class Trajectory:
 
         better = self._improvement.better(swarm, plan, self._planned, ahead)
         if better is not None:
-            kept = plan.order
-            order = replace(better.order, left_out=kept.left_out, trips=kept.trips)
+            order = replace(better.order, left_out=plan.order.left_out, trips=plan.order.trips)
             self.mission_plan = replace(better, order=order)
             self._planned |= better.planned
             self._ends |= {u: p.course.end for u, p in better.planned.items()}

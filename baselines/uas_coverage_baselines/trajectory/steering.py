@@ -1,9 +1,9 @@
 """What is flown where no flight goes as it was planned: the order, waypoint by waypoint.
 
-A planned flight is a sequence of wrenches, computed in still air. In a wind, or with another mass
-or thrust, each step ends elsewhere; the plan made anew from there meets the same in the next. The
-velocity loop of the vehicle does know what pushes it, so the order goes on under the world's
-guidance.
+A planned flight is a sequence of wrenches, computed in still air. With another mass or thrust, or
+a force of which nothing is stated, each step ends elsewhere; the plan made anew from there meets
+the same in the next. The velocity loop of the vehicle does know what pushes it, so the order goes
+on under the world's guidance.
 """
 
 from __future__ import annotations
