@@ -103,7 +103,8 @@ def in_a_row(
     at = before + np.concatenate([[0], np.cumsum(between)]).astype(int)
     size = 8 + 4 * n
     beyond, speed = 8 + 2 * n, 8 + 3 * n
-    x, place = np.zeros((2, 3, size)), np.zeros((2, size))
+    x: FloatArray = np.zeros((2, 3, size))
+    place: FloatArray = np.zeros((2, size))
     x[0, :, :3] = x[1, :, 3:6] = np.eye(3)
     place[0, 6] = place[1, 7] = 1.0
     angles = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
