@@ -106,7 +106,8 @@ def in_a_row(
     at = before + np.concatenate([[0], np.cumsum(between)]).astype(int)
     size = _INPUTS + 4 * n
     beyond, speed = _INPUTS + 2 * n, _INPUTS + 3 * n
-    x, place = np.zeros((2, 3, size)), np.zeros((2, size))
+    x: FloatArray = np.zeros((2, 3, size))
+    place: FloatArray = np.zeros((2, size))
     x[0, :, :_STATES] = x[1, :, _STATES:_PLACE] = np.eye(_STATES)
     place[:, _PLACE:_INPUTS] = np.eye(2)
     angles = 2.0 * np.pi * np.arange(_SIDES) / _SIDES

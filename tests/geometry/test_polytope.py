@@ -75,6 +75,15 @@ def test_outside_the_signed_distance_never_exceeds_the_euclidean_distance(points
 
 
 @EXAMPLES
+@given(clouds(), st.floats(0.0, 9.0))
+def test_a_raised_body_is_as_far_away_whether_its_corners_are_found_or_not(points, height_m):
+    hull = ConvexPolytope.from_points(points)
+    around = 2.0 * (points - points.mean(axis=0))
+    distances_m = hull.distance_when_raised(around, height_m)
+    np.testing.assert_array_equal(distances_m, hull.raised(height_m).signed_distance(around))
+
+
+@EXAMPLES
 @given(clouds(), st.randoms(use_true_random=False))
 def test_the_faces_do_not_depend_on_the_order_of_the_points(points, random):
     shuffled = list(points)

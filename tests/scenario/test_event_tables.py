@@ -1,5 +1,7 @@
 """The tables `[[events]]` and `[sensing]` of scenario files, and what planners know of them."""
 
+from typing import Any
+
 import pytest
 from small_worlds import box, meadow, mover
 
@@ -38,7 +40,7 @@ ONE_OF_EACH = (
 )  # fmt: skip
 
 
-def read(*events):
+def read(*events: dict[str, Any]) -> Scenario:
     data = {**PLAIN.model_dump(mode="json", by_alias=True), "events": list(events)}
     return parse(data, Scenario, "file.toml")
 

@@ -51,20 +51,20 @@ class Carried:
         self._half_m = 0.5 * np.linalg.norm(way_m, axis=2)
         self._ends = end_costs(legs, turning, self._along)
         self._priced = with_middles(legs)
-        self._price = np.zeros((self._n, self._n_nodes, 2))
+        self._price: FloatArray = np.zeros((self._n, self._n_nodes, 2))
         """Of a m/s in the middle of a leg, from waypoint to waypoint."""
         self._sought = False
         self._known: set[tuple[int, int, int]] = set()
         # triples in the order of flight, by numbers of steps, with what they cost at which prices
-        self._triple = np.zeros((0, 3), dtype=np.int64)
+        self._triple: IntArray = np.zeros((0, 3), dtype=np.int64)
         self._halves: list[tuple[Half, Half]] = []
-        self._cost = np.zeros(0)
-        self._at = np.zeros((0, 2, 2))
+        self._cost: FloatArray = np.zeros(0)
+        self._at: FloatArray = np.zeros((0, 2, 2))
         self._flown: dict[int, FloatArray] = {}
         # flights: triple in the order of flight, cost without prices, velocities
-        self._flights = np.zeros((0, 3), dtype=np.int64)
-        self._paid = np.zeros(0)
-        self._velocity = np.zeros((0, 2, 2))
+        self._flights: IntArray = np.zeros((0, 3), dtype=np.int64)
+        self._paid: FloatArray = np.zeros(0)
+        self._velocity: FloatArray = np.zeros((0, 2, 2))
 
     def least_routes(self, idle: float, cuts: Sequence[Cut]) -> float:
         """A lower bound on the cost of routes that visit every waypoint once.

@@ -186,9 +186,10 @@ class Passing:
         def potential(x: FloatArray) -> FloatArray:
             return np.einsum("i,iax->ax", motion.potential, x)
 
-        first = x = new_state()
-        place = at_visit = np.zeros((2, size))
-        last = place
+        first: FloatArray = new_state()
+        x: FloatArray = first
+        place: FloatArray = np.zeros((2, size))
+        at_visit = last = place
         for what in plan:
             if what == "visit":
                 at_visit = place

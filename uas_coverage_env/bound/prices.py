@@ -157,7 +157,8 @@ def _vertical_W(
     """
     record = compile_vehicle(vehicle, ends.dt_s)[()]
     A, B = record["vertical_A"], record["vertical_B"]
-    a, b = np.abs(np.linalg.solve([[B[0], B[1]], [A[0, 1], A[1, 1] - 1.0]], [1.0, -slope])).tolist()
+    system = np.array([[B[0], B[1]], [A[0, 1], A[1, 1] - 1.0]])
+    a, b = np.abs(np.linalg.solve(system, np.array([1.0, -slope]))).tolist()
     fastest_mps = WITHIN * max(vehicle.limits.v_up_max_mps, vehicle.limits.v_down_max_mps)
     last_N = a * ends.landing_distance_m + b * ends.landing_speed_mps
     largest_N = a * ends.height_m + b * fastest_mps

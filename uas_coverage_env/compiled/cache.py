@@ -31,7 +31,7 @@ _MOST_VERSIONS = 64
 _NAME = re.compile(r"-\w+\.py\w+\.(?P<stamp>[0-9a-f]{16})\.[0-9a-f]{16}\.nbc$")
 
 
-def keep_on_disk(dispatcher: Any, form: type[CacheImpl] = CompileResultCacheImpl) -> None:
+def keep_on_disk(dispatcher: Any) -> None:
     """Give a dispatcher that has compiled nothing yet a cache keyed by contents.
 
     Where its source cannot be read (typed into a prompt) or no folder can be written to, it is
@@ -39,12 +39,26 @@ def keep_on_disk(dispatcher: Any, form: type[CacheImpl] = CompileResultCacheImpl
 
     Args:
         dispatcher: What numba makes of a function.
-        form: How compiled versions are written and read; forms have files of their own.
     """
+    function = dispatcher.py_func
     try:
-        dispatcher._cache = _KernelCache(dispatcher.py_func, form)
+        digest = source_digest(function.__code__.co_filename)
+        dispatcher._cache = _KernelCache(function, CompileResultCacheImpl, digest)
     except (OSError, RuntimeError):
         dispatcher._cache = NullCache()
+
+
+def keep_as(form: type[CacheImpl], dispatcher: Any, kernel: Any) -> None:
+    """Keep what else a function is compiled to where its kernel is kept, if that is.
+
+    Args:
+        form: How compiled versions are written and read; forms have files of their own.
+        dispatcher: What compiles the other form; it has compiled nothing yet.
+        kernel: Known by the sources that it was imported from, though they may be edited by now.
+    """
+    kept = kernel._cache
+    if isinstance(kept, _KernelCache):
+        dispatcher._cache = _KernelCache(dispatcher.py_func, form, kept.digest)
 
 
 class _KernelCache(FunctionCache):
@@ -54,8 +68,8 @@ class _KernelCache(FunctionCache):
     are pickled, which differs in each process.
     """
 
-    def __init__(self, function: Callable[..., Any], form: type[CacheImpl]) -> None:
-        self.digest = source_digest(function.__code__.co_filename)
+    def __init__(self, function: Callable[..., Any], form: type[CacheImpl], digest: str) -> None:
+        self.digest = digest
         self._impl_class = form
         super().__init__(function)
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, self.digest)

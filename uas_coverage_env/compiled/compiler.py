@@ -9,6 +9,7 @@ all the rest of the kernel that Python calls. The result is the same to the last
 
 import gc
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from llvmlite import binding
@@ -17,6 +18,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags, compile_result
 from numba.core.registry import CPUDispatcher
 
+from uas_coverage_env.compiled.cache import keep_as
 from uas_coverage_env.compiled.progress import COMPILATIONS
 
 
@@ -39,10 +41,7 @@ class _Dispatcher(CPUDispatcher):
 class KernelDispatcher(_Dispatcher):
     """A kernel: compiled for Python where Python calls it, and as a part where a kernel calls it.
 
-    Attributes:
-        part: What other kernels call.
-        at_address: What they call at its address (`calls.py`). Python cannot: to take a hundred
-            arrays out of Python's objects is more machine code than most of these kernels.
+    Most kernels are one or the other, so that what compiles a part is made when it is asked for.
     """
 
     def __init__(
@@ -52,14 +51,38 @@ class KernelDispatcher(_Dispatcher):
         targetoptions: Any = None,
         pipeline_class: type[Compiler] | None = None,
     ) -> None:
-        options = dict(targetoptions or {})
-        compiler = pipeline_class or _KernelCompiler
-        super().__init__(py_func, locals, options, compiler)
-        options = {**options, "no_cpython_wrapper": True}
-        self.at_address = _Dispatcher(py_func, locals, options, compiler)
+        super().__init__(
+            py_func, locals, dict(targetoptions or {}), pipeline_class or _KernelCompiler
+        )
+
+    @cached_property
+    def part(self) -> CPUDispatcher:
+        """What other kernels call."""
         # threads call machine code
-        part_compiler = _KernelCompiler if options.get("parallel") else _PartCompiler
-        self.part = CPUDispatcher(py_func, locals, options, part_compiler)
+        in_threads = self.targetoptions.get("parallel")
+        return self._inside(
+            CPUDispatcher, _KernelCompiler if in_threads else _PartCompiler, PartCacheImpl
+        )
+
+    @cached_property
+    def at_address(self) -> CPUDispatcher:
+        """What they call at its address (`calls.py`).
+
+        Python cannot: to take a hundred arrays out of Python's objects is more machine code than
+        most of these kernels.
+        """
+        return self._inside(_Dispatcher, _KernelCompiler, AddressCacheImpl)
+
+    def _inside(
+        self,
+        dispatcher: type[CPUDispatcher],
+        compiler: type[Compiler],
+        form: type[CompileResultCacheImpl],
+    ) -> CPUDispatcher:
+        options = {**self.targetoptions, "no_cpython_wrapper": True}
+        made = dispatcher(self.py_func, self.locals, options, compiler)
+        keep_as(form, made, self)
+        return made
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What numba asks for where a kernel calls this one."""

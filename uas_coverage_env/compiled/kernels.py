@@ -21,7 +21,7 @@ from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.cache import keep_on_disk
-from uas_coverage_env.compiled.compiler import AddressCacheImpl, KernelDispatcher, PartCacheImpl
+from uas_coverage_env.compiled.compiler import KernelDispatcher
 
 
 def _decorator(**options: Any) -> Any:
@@ -34,8 +34,6 @@ def _decorator(**options: Any) -> Any:
             return function
         compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
         keep_on_disk(compiled)
-        keep_on_disk(compiled.at_address, AddressCacheImpl)
-        keep_on_disk(compiled.part, PartCacheImpl)
         return compiled
 
     return decorate

@@ -71,17 +71,25 @@ def _real(path: str) -> str:
 def _digest(file: str) -> str:
     home = _home(file)
     reached, found = {file}, [file]
-    lines = []
+    lines: list[str] = []
     while found:
-        module = found.pop()
-        label = _label(module, home)
-        lines.append(f"{label} {_source(module).digest}")
-        for name, target in _dependencies(module, home):
-            lines.append(f"{label} {name} {_label(target, home)}")
-            if target not in reached:
-                reached.add(target)
-                found.append(target)
+        targets, of_module = _lines(found.pop(), home)
+        lines += of_module
+        found += targets - reached
+        reached |= targets
     return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
+
+
+@cache  # most modules are reached from many
+def _lines(module: str, home: _Home) -> tuple[frozenset[str], tuple[str, ...]]:
+    """The files that define what a module imports, and what the module adds to a digest."""
+    label, source = _label(module, home), _source(module)
+    imports = [(each.bound, _targets(module, each, home)) for each in source.imports]
+    lines = [
+        f"{label} {name} {_label(target, home)}" for name, targets in imports for target in targets
+    ]
+    reached = frozenset(target for _, targets in imports for target in targets)
+    return reached, (f"{label} {source.digest}", *lines)
 
 
 @cache
@@ -112,16 +120,6 @@ def _names(text: str) -> list[tuple[str, str]]:
 def _with_parents(module: str) -> list[str]:
     parts = module.split(".")
     return [".".join(parts[:n]) for n in range(1, len(parts) + 1)]
-
-
-@cache
-def _dependencies(module: str, home: _Home) -> tuple[tuple[str, str], ...]:
-    """What a module imports: names and the files that define them."""
-    return tuple(
-        (imported.bound, target)
-        for imported in _source(module).imports
-        for target in _targets(module, imported, home)
-    )
 
 
 def _targets(
@@ -191,5 +189,5 @@ def _forget_what_was_edited(file: str) -> None:
     now_ns = os.stat(file).st_mtime_ns
     if _edited_ns.setdefault(file, now_ns) != now_ns:
         _edited_ns[file] = now_ns
-        for remembered in (_digest, _source, _dependencies, _file):
+        for remembered in (_digest, _lines, _source, _file):
             remembered.cache_clear()

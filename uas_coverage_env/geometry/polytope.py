@@ -113,12 +113,30 @@ class ConvexPolytope:
         Returns:
             The raised body with the same faces in the same order; this one where none is raised.
         """
-        out_m = height_m * np.maximum(-self.normals[:, 2], 0.0) - kept_m
+        out_m = self._upward_m(height_m) - kept_m
         if not (out_m > 0.0).any():
             return self
         offsets_m = self.offsets_m - np.maximum(out_m, 0.0)
         corners_m = corners_of(self.normals, offsets_m, self.vertices_m.mean(axis=0))
         return type(self)(self.normals, offsets_m, np.unique(corners_m.round(9), axis=0))
+
+    def distance_when_raised(self, points_m: ArrayLike, height_m: float) -> NDArray[np.float64]:
+        """`raised(height_m).signed_distance(points_m)`, without looking for the corners.
+
+        Args:
+            points_m: (..., 3) [m].
+            height_m: By how much the upper faces are raised [m].
+
+        Returns:
+            (...) [m].
+        """
+        offsets_m = self.offsets_m - self._upward_m(height_m)
+        distances_m = np.asarray(points_m, dtype=np.float64) @ self.normals.T + offsets_m
+        return distances_m.max(axis=-1)
+
+    def _upward_m(self, height_m: float) -> NDArray[np.float64]:
+        """(F,) how far faces move outward where the upper ones are raised."""
+        return height_m * np.maximum(-self.normals[:, 2], 0.0)
 
 
 def corners_of(

@@ -42,7 +42,7 @@ def _free_aim_m(brief: MissionBrief, waypoint: int) -> FloatArray:
     heights_m = brief.waypoints[waypoint].heights_m
     uas_m = max(uas.radius_m for uas in brief.uas)
     fence_m = brief.geofence.margin_m + _SPARE_M
-    aim_m = centre_m.copy()
+    aim_m: FloatArray = centre_m.copy()
     for _ in range(_ROUNDS):
         before_m = aim_m.copy()
         if brief.min_height_m:

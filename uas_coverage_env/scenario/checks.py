@@ -130,7 +130,7 @@ def _starts_and_fixed_things(scenario: UncheckedScenario) -> Iterator[str]:
             distance_m = float(hull.signed_distance(uas.start_m))
             named = f"obstacle {obstacle.name!r}"
             yield from _too_close(start, distance_m, named, uas.radius_m, obstacle.safe_distance_m)
-            over_roof = hull.raised(scenario.min_height_m).signed_distance(uas.start_m) < 0.0
+            over_roof = hull.distance_when_raised(uas.start_m, scenario.min_height_m) < 0.0
             if over_roof and distance_m >= uas.radius_m + obstacle.safe_distance_m:
                 yield (
                     f"{start} is lower than min_height_m {scenario.min_height_m:g} above the roof "
@@ -309,7 +309,7 @@ def _is_high_enough(
     """(P,) Whether the least height allows points (P, 3) to some UAS."""
     high = -points_m[:, 2] >= scenario.min_height_m
     for hull in scenario.hulls:
-        high &= hull.raised(scenario.min_height_m).signed_distance(points_m) >= 0.0
+        high &= hull.distance_when_raised(points_m, scenario.min_height_m) >= 0.0
     for uas in scenario.uas:
         away_m = np.hypot(*(points_m[:, :2] - uas.start_m[:2]).T)
         high |= away_m <= scenario.landing_zone_m

@@ -1,6 +1,7 @@
 """What follows from the parts of a vehicle: hover power, nominal voltage, full throttle."""
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -36,6 +37,7 @@ def steady_current_A(battery: Battery, dod: float, power_W: float) -> float:
     return battery_current_A(voltage_V, resistance_ohm, power_W)
 
 
+@lru_cache(maxsize=64)  # a vehicle is looked at again in every record that holds it
 def mean_voltage_V(battery: Battery, power_W: float, dod_end: float = 1.0) -> float:
     """Mean voltage, by charge, while a power is drawn from a full battery until dod_end [V]."""
     dod = np.linspace(0.0, dod_end, _DOD_POINTS)

@@ -88,6 +88,10 @@ class Power(StrictModel):
     slope_W_per_N: Annotated[float, _computed(1e-3, 1e4)] = ABSENT
 
 
+def _hash(record: StrictModel) -> int:
+    return hash(tuple(record.__dict__[name] for name in type(record).model_fields))
+
+
 class Battery(StrictModel):
     """Thevenin battery with a piecewise-linear discharge curve.
 
@@ -107,6 +111,10 @@ class Battery(StrictModel):
     current_max_A: Current_A
     dod_max: Fraction
     dod_cutoff: Fraction
+
+    # results are cached by it
+    def __hash__(self) -> int:
+        return _hash(self)
 
     @model_validator(mode="after")
     def _curve_falls(self) -> Self:
@@ -215,7 +223,7 @@ class Parts(StrictModel):
     return_rule: ReturnRule
 
     def __hash__(self) -> int:
-        return hash(tuple(self.__dict__[name] for name in type(self).model_fields))
+        return _hash(self)
 
     @property
     def weight_N(self) -> float:
