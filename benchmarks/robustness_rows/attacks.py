@@ -210,6 +210,6 @@ RANDOM = Row(
     lambda quick: (
         f"from {return_mode.FIRST_SEED} on, every family and policy of `benchmarks/return_mode.py`"
     ),
-    "Moving obstacles (`benchmarks/safety_filter.py` has them), and strong wind (docs/range.md says "
-    "how many are lost in it). Given in m/s, the wind is constant, and unknown to planner and file.",
+    "Moving obstacles (`benchmarks/safety_filter.py` has them), and strong wind, in which some are "
+    "lost (`docs/range.md`). In m/s, the wind is constant, and unknown to planner and file.",
 )
