@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
-from uas_coverage_agents.route import policy_runner
 from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import layers_of, value_of
 from uas_coverage_agents.route.leg_flight import (
@@ -27,7 +26,6 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.raised import raised
-from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.vehicle import THETA, VX, VY, X, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 from uas_coverage_env.world.commands import VELOCITY
@@ -204,9 +202,8 @@ def test_a_plan_covers_the_waypoint_behind_a_house_and_stays_clear(behind_a_hous
     layers = layers_of(network.flight, policy.tensors, "flight.")
     x, reference, plan = _state(20.0, 50.0, 8.0), np.array([8.0, 0.0]), np.zeros((HORIZON, 3))
     room = search_room(int(arena.rules[0].lookahead_steps))
-    targets = np.arange(AHEAD)
     assert plan_along(
-        arena, around, 0, x, reference, targets, 2, layers, plan, False,
+        arena, around, 0, x, reference, np.arange(2), layers, plan, False,
         np.random.default_rng(0), room,
     )  # fmt: skip
     command, u, path_m = np.zeros(1, COMMAND_DTYPE)[0], np.zeros(5), [x[:3].copy()]
@@ -218,14 +215,3 @@ def test_a_plan_covers_the_waypoint_behind_a_house_and_stays_clear(behind_a_hous
     assert len(path_m) <= 12
     path_m = np.array(path_m)
     assert fixed_slack(arena, 0, path_m, len(path_m) - 1, -1.0, 2.0) >= 0.0
-
-
-def test_plans_of_several_steps_are_searched_in_still_air_only(monkeypatch):
-    def searched(*_):
-        raise RuntimeError("searched")
-
-    monkeypatch.setattr(policy_runner, "plan_along", searched)
-    town = generate_scenario(3, n_uas=1, n_waypoints=6, n_obstacles=3)
-    assert rollout(with_disturbances(town, "light", 0), "learned-route", max_steps=15).steps == 15
-    with pytest.raises(RuntimeError, match="searched"):
-        rollout(town, "learned-route", max_steps=15)

@@ -1,8 +1,9 @@
-"""Where the world's guidance flies the routes of `learned-route` and `learned-velocity`."""
+"""Routes of `learned-route` and `learned-velocity` in wind, and where guidance flies them."""
 
 import numpy as np
 import pytest
-from uas_coverage_agents.route.fleet_routes import LEARNED_UP_TO_MPS
+from uas_coverage_agents.route import policy_runner
+from uas_coverage_agents.route.velocity_runner import LEARNED_UP_TO_MPS
 from uas_coverage_agents.training.velocity_learning import (
     DaggerSettings,
     TaughtRunner,
@@ -31,14 +32,36 @@ def _kinds(scenario, name):
     return {type(each) for each in commands if each.mode == "covering"}
 
 
-@BOTH
-def test_velocities_are_flown_up_to_a_stated_mean_wind_and_guidance_above_it(town, name):
+@pytest.mark.parametrize(
+    ("name", "in_more"), [("learned-route", Velocity), ("learned-velocity", GoTo)]
+)
+def test_guidance_flies_for_the_network_above_a_stated_mean_wind_not_for_the_search(
+    town, name, in_more
+):
     def in_wind(mean_mps):
         return town.model_copy(update={"wind": Wind(mean_mps=mean_mps, from_deg=0.0)})
 
     assert _kinds(town, name) == {Velocity}
     assert _kinds(in_wind(LEARNED_UP_TO_MPS), name) == {Velocity}
-    assert _kinds(in_wind(LEARNED_UP_TO_MPS + 0.5), name) == {GoTo}
+    assert _kinds(in_wind(LEARNED_UP_TO_MPS + 0.5), name) == {in_more}
+
+
+def test_plans_are_searched_in_the_wind_that_each_uas_has_learnt(town, monkeypatch):
+    believed, searched = [], policy_runner.plan_along
+
+    def plan_along(*arguments):
+        believed.append(arguments[-1])
+        return searched(*arguments)
+
+    monkeypatch.setattr(policy_runner, "plan_along", plan_along)
+    rollout(town, "learned-route", max_steps=5)
+    assert believed
+    assert all(belief is None for belief in believed)
+    believed.clear()
+    wind = Wind(mean_mps=5.0, from_deg=180.0)
+    rollout(town.model_copy(update={"wind": wind}), "learned-route", max_steps=12)
+    north_mps, east_mps = believed[-1][:2]
+    assert (north_mps, east_mps) == (pytest.approx(5.0, abs=0.5), pytest.approx(0.0, abs=0.2))
 
 
 @BOTH

@@ -6,7 +6,7 @@ from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
-from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind, in_disturbances
 from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.range import Range, ReturnEstimate, seconds_home
 from uas_coverage_env.mission.recall import Recall
@@ -37,6 +37,7 @@ __all__ = [
     "carefully",
     "find_blocked",
     "first_sight",
+    "in_disturbances",
     "refuse_what_asks",
     "seconds_home",
     "with_free_aims",

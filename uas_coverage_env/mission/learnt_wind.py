@@ -19,7 +19,7 @@ from uas_coverage_env.vehicle import PHI, THETA, VX, VY, WX, WY, X, Y, Z
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import RATE, SPEED
 from uas_coverage_env.vehicle.tube import belief_gain
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import FLYING, Arena, SwarmState
 from uas_coverage_env.world.state import N_BELIEF, WIND
 
 FloatArray = NDArray[np.float64]
@@ -36,6 +36,13 @@ _FORWARD = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, 1.0, 1.0, 1.0]])
 def axes(x: FloatArray) -> FloatArray:
     """(..., 2, 4) position, velocity, tilt and rate north and east of states (..., 14)."""
     return np.asarray(x[..., _STATES] * _FORWARD)
+
+
+def in_disturbances(arena: Arena) -> Arena:
+    """The same arena, for kernels that fly as believed."""
+    rules = arena.rules.copy()
+    rules["disturbed"] = True
+    return arena._replace(rules=rules)
 
 
 class LearntWind:

@@ -25,10 +25,6 @@ BoolArray = NDArray[np.bool_]
 SAMPLES = 64
 """Routes that are built before the best are flown; the first without noise."""
 
-LEARNED_UP_TO_MPS = 4.0
-"""In a stated mean wind above this, guidance flies along the routes [m/s]. What is weighed and
-learned as in still air is the better flight up to it."""
-
 _NOISE = 1.0
 _AGAIN_STEPS = 10
 
@@ -45,7 +41,7 @@ class FleetRoutes:
 
     Attributes:
         view: The world as the planner sees it, at the latest update.
-        by_guidance: Whether guidance flies all of the routes, as in much wind.
+        by_guidance: Whether guidance flies all of the routes; at first it does not.
     """
 
     def __init__(
@@ -54,8 +50,7 @@ class FleetRoutes:
         self._score, self._home_score, self._samples = score, home_score, samples
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
         self._guided, self._handover = GuidedFlight(brief), Handover(brief)
-        said = brief.conditions
-        self.by_guidance = said is not None and said.mean_mps > LEARNED_UP_TO_MPS
+        self.by_guidance = False
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._workspace, self._record = route_workspace(), no_record()
         self._routes = np.full((n_uas, n_waypoints), -1)

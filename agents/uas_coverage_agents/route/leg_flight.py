@@ -237,7 +237,7 @@ def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
 
 
 @allocating_kernel
-def spare_distance(arena, i, x, reference, command, n_held, enough_m, path_m):
+def spare_distance(arena, i, x, reference, command, n_held, enough_m, path_m, belief=None):
     """Distance to spare from what is fixed: a command held for some steps, then braking.
 
     Args:
@@ -249,13 +249,14 @@ def spare_distance(arena, i, x, reference, command, n_held, enough_m, path_m):
         n_held: Steps for which it is held, at most `MOST_HELD`.
         enough_m: Stop looking when it is below this [m].
         path_m: (lookahead_steps + MOST_HELD, 3) written.
+        belief: (N_BELIEF,) of its inner loop; None: in still air.
 
     Returns:
         See `fixed_slack`.
     """
     n_flown, slack_m = fly_hold_and_brake(
         arena, i, x, reference, command, n_held, False,
-        path_m[: path_m.shape[0] - MOST_HELD + n_held],
+        path_m[: path_m.shape[0] - MOST_HELD + n_held], belief,
     )  # fmt: skip
     return fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
 

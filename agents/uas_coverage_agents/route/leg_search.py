@@ -31,7 +31,12 @@ from uas_coverage_agents.route.leg_flight import (
 )
 from uas_coverage_agents.route.places import detour_s, places_along, write_place
 from uas_coverage_env.autopilot.control import command_wrench, write_brake, write_command
-from uas_coverage_env.autopilot.lookahead import PLENTY_M, fixed_slack, moving_slack
+from uas_coverage_env.autopilot.lookahead import (
+    PLENTY_M,
+    fixed_slack,
+    fly_as_believed,
+    moving_slack,
+)
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE
@@ -117,12 +122,20 @@ def search_room(lookahead_steps: int) -> Room:
 
 
 @allocating_kernel
-def _step(vehicle, values, room):
+def _fly(vehicle, room, belief):
+    """Fly the state of the room on for a step, by the command of the room."""
+    if belief is None:
+        command_wrench(vehicle, room.x, room.reference, room.command[0], room.u)
+        fly_kinematics(vehicle, room.x, room.u)
+    else:
+        fly_as_believed(vehicle, belief, room.x, room.reference, room.command[0], False, room.u)
+
+
+@allocating_kernel
+def _step(vehicle, values, room, belief):
     """Fly the state of the room on for a step."""
-    command = room.command[0]
-    write_command(command, VELOCITY, values[0], values[1], values[2])
-    command_wrench(vehicle, room.x, room.reference, command, room.u)
-    fly_kinematics(vehicle, room.x, room.u)
+    write_command(room.command[0], VELOCITY, values[0], values[1], values[2])
+    _fly(vehicle, room, belief)
 
 
 @allocating_kernel
@@ -131,13 +144,12 @@ def _note(room, n):
 
 
 @allocating_kernel
-def _is_clear(arena, i, x, reference, first, steps, room):
+def _is_clear(arena, i, x, reference, first, steps, room, belief):
     """Whether the plan just flown, and braking after its first and last step, is clear."""
     command, n = room.command[0], steps
     write_brake(command)
     while n < steps + _BRAKING:
-        command_wrench(arena.vehicles[i], room.x, room.reference, command, room.u)
-        fly_kinematics(arena.vehicles[i], room.x, room.u)
+        _fly(arena.vehicles[i], room, belief)
         n += 1
         _note(room, n)
         if math.hypot(room.x[VX], room.x[VY]) < _STANDS_MPS:
@@ -146,11 +158,12 @@ def _is_clear(arena, i, x, reference, first, steps, room):
     if moving_slack(arena, 0, i, room.path_m[: n + 1], 0.0, slack_m) < 0.0:
         return False
     write_command(command, VELOCITY, first[0], first[1], first[2])
-    return spare_distance(arena, i, x, reference, command, 1, 0.0, room.braking_m) >= 0.0
+    spare_m = spare_distance(arena, i, x, reference, command, 1, 0.0, room.braking_m, belief)
+    return spare_m >= 0.0
 
 
 @allocating_kernel
-def _weigh(arena, around, i, x, reference, plan, layers, best_s, room):
+def _weigh(arena, around, i, x, reference, plan, layers, best_s, room, belief):
     """Time [s] of a plan and of what comes after it, inf if not clear or not below `best_s`.
 
     Returns:
@@ -162,7 +175,7 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, room):
     _note(room, 0)
     steps, covered = 0, False
     while steps < HORIZON and not covered:
-        _step(arena.vehicles[i], plan[steps], room)
+        _step(arena.vehicles[i], plan[steps], room, belief)
         steps += 1
         _note(room, steps)
         covered = covers(there, ahead[0])
@@ -184,13 +197,13 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, room):
         return np.inf, steps
     k = 1 if covered else 0
     cost_s += detour_s(arena, around, i, room.rows[k], there, ahead[k])
-    if cost_s >= best_s or not _is_clear(arena, i, x, reference, plan[0], steps, room):
+    if cost_s >= best_s or not _is_clear(arena, i, x, reference, plan[0], steps, room, belief):
         return np.inf, steps
     return cost_s, steps
 
 
 @allocating_kernel
-def _aim(arena, around, i, x, reference, plan, first, way, share, room):
+def _aim(arena, around, i, x, reference, plan, first, way, share, room, belief):
     """Fill a plan from step `first` on: towards the next waypoint, and then the one after it."""
     uas, there, k = arena.uas[i], room.x, 0
     there[:] = x
@@ -214,7 +227,7 @@ def _aim(arena, around, i, x, reference, plan, first, way, share, room):
             plan[step, 0] = speed_mps * north_m / length_m
             plan[step, 1] = speed_mps * east_m / length_m
             plan[step, 2] = max(altitude_m, lowest_altitude(arena, i, there[X], there[Y]))
-        _step(arena.vehicles[i], plan[step], room)
+        _step(arena.vehicles[i], plan[step], room, belief)
         if k == 0 and covers(there, room.ahead[0]):
             k = 1
 
@@ -239,24 +252,26 @@ def _change(plan, used, speed_mps, rng):
 
 
 @allocating_kernel
-def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room):
+def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room, belief):
     """The best plan to begin with, in `room.best`: (its time [s], steps that are used, its way)."""
     trial, best = room.trial, room.best
     best_s, used, way = np.inf, HORIZON, OVER
     if kept:
         best[:] = plan
-        best_s, used = _weigh(arena, around, i, x, reference, plan, layers, best_s, room)
+        best_s, used = _weigh(arena, around, i, x, reference, plan, layers, best_s, room, belief)
     for begins in (OVER, ROUND, STRAIGHT):
         for share in _BEGIN_SPEEDS:
-            _aim(arena, around, i, x, reference, trial, 0, begins, share, room)
-            cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room)
+            _aim(arena, around, i, x, reference, trial, 0, begins, share, room, belief)
+            cost_s, steps = _weigh(
+                arena, around, i, x, reference, trial, layers, best_s, room, belief
+            )
             if cost_s < best_s:
                 best_s, used, way = cost_s, steps, begins
                 best[:] = trial
     for held in range(1, _BASE_HELD + 1 if has_base else 0):
         trial[:held] = room.base
-        _aim(arena, around, i, x, reference, trial, held, OVER, 1.0, room)
-        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room)
+        _aim(arena, around, i, x, reference, trial, held, OVER, 1.0, room, belief)
+        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room, belief)
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
@@ -264,19 +279,21 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room):
 
 
 @allocating_kernel
-def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room):
+def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room, belief):
     """Write the best plan found to the first of `room.ahead`; whether there is one."""
     trial, best, speed_mps = room.trial, room.best, arena.uas[i].speed_mps
     aim_ahead(arena.vehicles[i], x, room.ahead, room.aims_m)
-    best_s, used, way = _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room)
+    best_s, used, way = _begin(
+        arena, around, i, x, reference, layers, plan, kept, has_base, room, belief
+    )
     if best_s == np.inf:
         return False
     for _ in range(TRIES):
         trial[:] = best
         end = _change(trial, used, speed_mps, rng)
         if rng.random() < _ANEW:
-            _aim(arena, around, i, x, reference, trial, end, way, 1.0, room)
-        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room)
+            _aim(arena, around, i, x, reference, trial, end, way, 1.0, room, belief)
+        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room, belief)
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
@@ -285,7 +302,7 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, r
 
 
 @allocating_kernel
-def plan_along(arena, around, i, x, reference, targets, n_targets, layers, plan, kept, rng, room):
+def plan_along(arena, around, i, x, reference, targets, layers, plan, kept, rng, room, belief=None):
     """Write the plan whose first row is to be flown by UAS i.
 
     Args:
@@ -294,18 +311,19 @@ def plan_along(arena, around, i, x, reference, targets, n_targets, layers, plan,
         i: Index of the UAS.
         x: (14,) its state.
         reference: (2,) [m/s] of its inner loop.
-        targets: (AHEAD,) the next waypoints of its route.
-        n_targets: How many of them; after them comes home.
+        targets: At most AHEAD, the next waypoints of its route; after them comes home.
         layers: `Layers`.
         plan: (HORIZON, 3) velocity north and east [m/s] and altitude [m]; what is left of the plan
             of the step before, written.
         kept: Whether there is one.
         rng: Of the changes.
         room: `Room`.
+        belief: (N_BELIEF,) of its inner loop, where a wind is known; None: in still air.
 
     Returns:
         Whether there is one that is clear. Where not, the world's guidance knows better.
     """
+    n_targets = len(targets)
     leg, needed_m, speed_mps = places_along(arena, around, i, x, targets, n_targets, room.places)
     command = room.command[0]
     has_base = leg != NO_WAY and steer_to(
@@ -315,7 +333,8 @@ def plan_along(arena, around, i, x, reference, targets, n_targets, layers, plan,
     if n_targets > 0:
         for k in range(AHEAD):
             room.rows[k] = write_place(arena, i, targets, n_targets, k, room.ahead[k])
-        if _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room):
+        if _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room, belief):
             return True
     plan[:] = room.base
-    return has_base
+    # of one step only, weighed as in still air
+    return has_base and belief is None

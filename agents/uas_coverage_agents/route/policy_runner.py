@@ -12,12 +12,12 @@ from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.fleet_routes import SAMPLES, FleetRoutes
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
-from uas_coverage_agents.route.leg_flight import AHEAD, steer_along
+from uas_coverage_agents.route.leg_flight import AHEAD
 from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_room
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission import LearntWind, MissionBrief, first_sight, in_disturbances
 from uas_coverage_env.mission.raised import raised
-from uas_coverage_env.world import COMMAND_DTYPE, Command, SwarmState, Velocity, build_arena
+from uas_coverage_env.world import Command, SwarmState, Velocity, build_arena
 
 
 def observation() -> Observation:
@@ -59,19 +59,21 @@ class RouteRunner:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples draw from the seed."""
         self._routes = FleetRoutes(brief, seed, self._score, self._home_score, self._samples)
-        arena = self._routes.view.arena
+        self._arena = self._routes.view.arena
         self._around = build_arena((raised(brief) or brief).as_scenario())
-        self._room = search_room(int(arena.rules[0].lookahead_steps))
+        self._learnt: LearntWind | None = None
+        if brief.conditions is not None:
+            self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
+        self._room = search_room(int(self._arena.rules[0].lookahead_steps))
         self._rng = np.random.default_rng(seed)
         n_uas = len(brief.uas)
         self._plans, self._kept = np.zeros((n_uas, HORIZON, 3)), np.zeros(n_uas, np.bool_)
-        self._targets, self._command = np.full(AHEAD, -1), np.zeros(1, COMMAND_DTYPE)[0]
-        # plans of several steps in still air do not come true in a wind
-        self._searches = brief.conditions is None
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on along the routes; build them again where they are no longer right."""
         self._routes.update(swarm)
+        if self._learnt is not None:
+            self._learnt.see(swarm)
         return {name: self._command_of(swarm, swarm.names.index(name)) for name in swarm.active}
 
     def _command_of(self, swarm: SwarmState, u: int) -> Command:
@@ -79,38 +81,22 @@ class RouteRunner:
         kept, self._kept[u] = bool(self._kept[u]), False
         if (guided := routes.guided(swarm, u)) is not None:
             return guided
-        velocity = self._searched(u, kept) if self._searches else self._weighed(u)
+        velocity = self._searched(u, kept)
         if velocity is None:
             return routes.onwards(u)
         north_mps, east_mps, altitude_m = velocity
         return Velocity(north_mps, east_mps, altitude_m, routes.mode(u))
 
-    def _weighed(self, u: int) -> list[float] | None:
-        """Velocity north and east [m/s] and altitude [m]: the quickest of those weighed."""
-        arena, state, n_targets = self._routes.view.arena, self._routes.view.state, self._aim(u)
-        if not steer_along(
-            arena, u, state.x[u], state.reference[u], self._targets, n_targets, self._flight, 1,
-            0.0, self._command,
-        ):  # fmt: skip
-            return None
-        return self._command["values"][:3].tolist()
-
     def _searched(self, u: int, kept: bool) -> list[float] | None:
-        """The same, the first of a plan."""
-        arena, state, n_targets = self._routes.view.arena, self._routes.view.state, self._aim(u)
-        plan = self._plans[u]
+        """Velocity north and east [m/s] and altitude [m]: the first of a plan."""
+        state, plan = self._routes.view.state, self._plans[u]
+        belief = None if self._learnt is None else self._learnt.belief[u]
         if not plan_along(
-            arena, self._around, u, state.x[u], state.reference[u], self._targets, n_targets,
-            self._flight, plan, kept, self._rng, self._room,
+            self._arena, self._around, u, state.x[u], state.reference[u],
+            self._routes.of(u)[:AHEAD], self._flight, plan, kept, self._rng, self._room, belief,
         ):  # fmt: skip
             return None
         velocity = plan[0].tolist()
         plan[:-1] = plan[1:]
         self._kept[u] = True
         return velocity
-
-    def _aim(self, u: int) -> int:
-        """Note the next waypoints of a UAS; how many there are."""
-        targets = self._routes.of(u)[:AHEAD]
-        self._targets[: len(targets)] = targets
-        return len(targets)

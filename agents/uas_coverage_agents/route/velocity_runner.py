@@ -27,6 +27,10 @@ from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState, Velocity
 from uas_coverage_env.world.routes import NO_WAY
 
+LEARNED_UP_TO_MPS = 4.0
+"""In a stated mean wind above this, guidance flies along the routes [m/s]: the network learned in
+still air."""
+
 SMALL = 0.75
 """A sphere with a smaller radius, in steps at top speed, is missed too often: waypoints are covered
 at samples. Training had radii of 1.25 steps."""
@@ -71,6 +75,8 @@ class RouteVelocityRunner:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples draw from the seed."""
         self.routes = FleetRoutes(brief, seed, self._score, self._home_score, self._samples)
+        said = brief.conditions
+        self.routes.by_guidance = said is not None and said.mean_mps > LEARNED_UP_TO_MPS
         n_uas = len(brief.uas)
         self.rows, self.frames = np.zeros((n_uas, N_VELOCITY)), np.zeros((n_uas, N_FRAME))
         self.ahead = np.full((n_uas, AHEAD), -1)

@@ -26,6 +26,7 @@ from uas_coverage_env.mission import (
     Repeats,
     WorldView,
     first_sight,
+    in_disturbances,
     without,
 )
 from uas_coverage_env.vehicle import VX, VY, VZ
@@ -114,9 +115,7 @@ class Tour:
         self._arena = self._world.arena
         self._learnt: LearntWind | None = None
         if brief.conditions is not None:
-            self._learnt, rules = LearntWind(brief), self._arena.rules.copy()
-            rules["disturbed"] = True  # else kernels fly as in still air
-            self._arena = self._arena._replace(rules=rules)
+            self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
