@@ -24,6 +24,7 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "trajectory": {},
     "learned-waypoint": {},
     "learned-velocity": {},
+    "learned-route": {},
     "milp-mpc-guided": _NO_CLOCK,
     "milp-mpc-guided in_wind=tube": {**_NO_CLOCK, "in_wind": "tube"},
 }
@@ -35,6 +36,7 @@ _MISSIONS = {
     "tour": (6, 300, 30),
     "trajectory": (4, 300, 10),
     "learned-waypoint": (1, 300, 10),
+    "learned-route": (1, 300, 10),
     "milp-mpc-guided": (1, 300, 1),
     "milp-mpc-guided in_wind=tube": (1, 30, 1),
 }
