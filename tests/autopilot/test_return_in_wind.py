@@ -60,14 +60,14 @@ def test_a_wind_that_a_uas_cannot_hold_against_is_left_for_lower_air(return_mode
 
 @pytest.mark.parametrize("wind_mps", [0.0, 3.0])
 def test_home_is_found_from_above_a_roof_right_below_the_ceiling(wind_mps):
-    block = box("block", (60.0, 60.0, -46.3), (90.0, 90.0, 0.0))
+    block = box("block", (60.0, 60.0, -45.6), (90.0, 90.0, 0.0))
     world = World(
         meadow([(100.0, 40.0, -1.0)], obstacles=(block,), waypoints=FAR),
         disturbances=(constant_wind(wind_mps, 180.0),) if wind_mps else None,
         safety_filter=True,
     )
     world.state.departed[0] = True
-    world.state.x[0, :3] = 75.0, 75.0, -49.4
+    world.state.x[0, :3] = 75.0, 75.0, -48.4
     while not world.done:
         outcome = world.step({"uas_1": GoTo(None)})
         assert outcome["breaches"][0] == 0

@@ -96,9 +96,10 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
         if not passes_over(obstacle, over, ends, leg, max(altitude_m, altitude1_m)):
             continue
         needed_m = max(needed_m, roof_m + HEADROOM_M)
-        # no higher than the ceiling: a UAS that is there waits for nothing
-        high_m = roof_m if roof_m <= ceiling_m else ceiling_m - HEADROOM_M
-        rise_m = high_m - altitude_m
+        # where it can be passed right below the ceiling, no more height is waited for
+        if roof_m > ceiling_m > obstacle.top_m + HEADROOM_M:
+            roof_m = ceiling_m - HEADROOM_M
+        rise_m = roof_m - altitude_m
         if rise_m > 0.0:
             climbing_s = rise_m / arena.uas[i].climb_mps + LEAD_S
             speed_mps = min(speed_mps, at * length_m / climbing_s)

@@ -49,6 +49,8 @@ _FIELDS = [
     ("wall_m", "f8"),
     ("roof_m", "f8"),
     ("tall", "?"),
+    # the same without the margin of routes: lower is a breach
+    ("top_m", "f8"),
     # there is room below a part of it
     ("overhangs", "?"),
     # nothing stands there: no contact
@@ -131,6 +133,7 @@ def obstacle_records(
         record["wall_m"] = wall_m
         record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m
+        record["top_m"] = record["roof_m"] - route_m
         record["overhangs"] = overhangs(hull, ground_m)
         record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
         if record["tall"]:
