@@ -96,9 +96,11 @@ def test_planners_of_a_kind_are_named_with_their_argument(directory):
     assert "policy" not in registry.planner_names()
     described = {planner.name: planner for planner in describe_planners()}
     assert [option.name for option in described["policy:DIR"].options] == ["filter", "return_mode"]
-    for name in ("policy", "policy:", "polity:here", ":here"):
+    for name in ("policy", "policy:", "polity:here"):
         with pytest.raises(InputError, match=r"planner .*policy:(\.\.\.|here)"):
             load_planner(name)
+    with pytest.raises(InputError, match="':here' is no MODULE:"):
+        load_planner(":here")
     with pytest.raises(InputError, match="no option 'speed'; allowed: filter, return_mode"):
         load_planner(f"policy:{directory}", {"speed": "1"})
 

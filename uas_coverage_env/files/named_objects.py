@@ -22,14 +22,17 @@ def object_named(kind: str, name: str) -> Any:
             is not caught.
     """
     module_name, _, attribute = name.partition(":")
+    if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
+        raise InputError(f"{kind} {name!r} is no MODULE:CLASS")
     with _current_folder():
         try:
             module = importlib.import_module(module_name)
         except ModuleNotFoundError as error:
-            if error.name != module_name:
+            missing = error.name or ""
+            if not f"{module_name}.".startswith(f"{missing}."):
                 raise
             raise InputError(
-                f"{kind} {name!r}: there is no module {module_name!r}, neither installed nor in "
+                f"{kind} {name!r}: there is no module {missing!r}, neither installed nor in "
                 "the current folder"
             ) from error
     try:
