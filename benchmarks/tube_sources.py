@@ -55,7 +55,7 @@ def loop(vehicle: VehicleParams, dt_s: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _by_wind(A: FloatArray, dt_s: float) -> FloatArray:
-    """What a wind of 1 m/s, which nobody knows, does to the states of an axis in a step."""
+    """What an unknown wind of 1 m/s does to the states of an axis in a step."""
     carried = -A[:, SPEED]
     carried[POSITION] += dt_s
     carried[SPEED] += 1.0

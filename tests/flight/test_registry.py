@@ -134,7 +134,7 @@ from uas_coverage_env.flight import PlannerOptions
 
 
 class Plain:
-    \"\"\"Everybody to the first waypoint.\"\"\"
+    \"\"\"All UAS to the first waypoint.\"\"\"
 
     def reset(self, brief, seed):
         pass
@@ -186,7 +186,7 @@ def test_a_class_beside_the_command_is_a_planner_with_or_without_options():
     described = registry.describe_planner("my_own_planners:Set")
     assert described.name == "my_own_planners:Set"
     assert [option.name for option in described.options] == ["waypoint"]
-    assert registry.describe_planner("my_own_planners:Plain").summary.startswith("Everybody")
+    assert registry.describe_planner("my_own_planners:Plain").summary.startswith("All UAS")
 
 
 @pytest.mark.usefixtures("own")

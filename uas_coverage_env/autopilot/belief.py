@@ -40,6 +40,9 @@ SEES_CONSUMPTION_S = 30.0
 MOST_WIND = 0.95
 """Of the highest speed: a UAS believes in no wind in which it could not hover."""
 
+LEAST_GROUND_MPS = 0.2
+"""Estimates of flight times take no ground speed to be lower, however hard the wind blows."""
+
 GUSTS = 0.1
 """What is kept of the speed limit for gusts, of the wind believed in."""
 

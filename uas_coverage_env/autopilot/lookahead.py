@@ -61,10 +61,29 @@ def _kept_m(required_m, now_m):
 
 
 @kernel
-def fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
+def _fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
     """Fly a command for a step in the disturbances believed in."""
     believed_wrench(vehicle, belief, x, governed, command, u)
     believed_kinematics(vehicle, belief, nonlinear, x, u)
+
+
+@kernel
+def fly_kinematically(vehicle, x, governed, command, u, belief=None):
+    """Fly a command for a step, by the linear model without the battery.
+
+    Args:
+        vehicle: Record of VEHICLE_DTYPE.
+        x: (14,) state, written.
+        governed: (2,) [m/s] reference of the inner loop, written.
+        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
+        u: (5,) inputs, written.
+        belief: (N_BELIEF,) of the inner loop; None: in still air.
+    """
+    if belief is None:
+        command_wrench(vehicle, x, governed, command, u)
+        fly_kinematics(vehicle, x, u)
+    else:
+        _fly_as_believed(vehicle, belief, x, governed, command, False, u)
 
 
 @inlined_kernel
@@ -118,7 +137,7 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
         # one call: what is flown becomes part of this function
         flown = command if k < n_held else arena.rules[0].brake
         if belief is not None and arena.rules[0].disturbed:
-            fly_as_believed(vehicle, belief, x, governed, flown, nonlinear, u)
+            _fly_as_believed(vehicle, belief, x, governed, flown, nonlinear, u)
         else:
             command_wrench(vehicle, x, governed, flown, u)
             if nonlinear:

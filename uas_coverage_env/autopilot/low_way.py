@@ -7,7 +7,7 @@ descends, and passes beside the roofs that would hold it up.
 
 import math
 
-from uas_coverage_env.autopilot.belief import speed_along, wind_growth
+from uas_coverage_env.autopilot.belief import LEAST_GROUND_MPS, speed_along, wind_growth
 from uas_coverage_env.compiled.kernels import kernel, stack_array
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import X, Y, Z
@@ -18,7 +18,6 @@ from uas_coverage_env.world.state import WIND
 LITTLE_MPS = 2.0
 """Headway below which a UAS flies low: of a wind that is known to about a metre per second."""
 
-_LEAST_MPS = 0.2
 _HERE_M = 2.0
 """A place so near has been reached."""
 
@@ -60,7 +59,7 @@ def _seconds(arena, i, belief, x0, y0, x1, y1):
     if length_m < _HERE_M:
         return 0.0
     headway_mps = _headway_mps(arena, i, belief, x1 - x0, y1 - y0, 1.0)
-    return length_m / min(max(headway_mps, _LEAST_MPS), arena.uas[i].speed_mps)
+    return length_m / min(max(headway_mps, LEAST_GROUND_MPS), arena.uas[i].speed_mps)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.autopilot.belief import speed_along, vertical_margin_mps
+from uas_coverage_env.autopilot.belief import LEAST_GROUND_MPS, speed_along, vertical_margin_mps
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.geometry import signed_distance
@@ -30,7 +30,6 @@ _RINGS = 2
 _UNKNOWN_MPS, _UNKNOWN_SHARE = 0.5, 0.05
 """The wind on the way may be stronger than believed by this, and this share of it."""
 
-_LEAST_MPS = 0.2
 _WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
 """Where disturbances are declared, the margin is more: this share of the time, and these seconds
 in a wind as fast as the UAS, in which it turns and stops the more slowly."""
@@ -87,7 +86,7 @@ def _more_in_wind_s(arena, i, belief, north_m, east_m):
     speed_mps = speed_along(
         most_mps, north_mps, east_mps, north_m / length_m, east_m / length_m
     ) - (_UNKNOWN_MPS + _UNKNOWN_SHARE * math.hypot(north_mps, east_mps))
-    speed_mps = min(max(speed_mps, _LEAST_MPS), arena.uas[i].speed_mps)
+    speed_mps = min(max(speed_mps, LEAST_GROUND_MPS), arena.uas[i].speed_mps)
     return length_m / speed_mps - length_m / arena.uas[i].speed_mps
 
 

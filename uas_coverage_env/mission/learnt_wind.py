@@ -1,9 +1,9 @@
 """The wind that each UAS is in, found out by a planner from what it sees.
 
-The inner loop finds it out likewise (`autopilot.belief`), but tells nobody. A horizontal axis is
-position, velocity, tilt and rate, with the angular acceleration as input; drag pulls the velocity
-towards that of the wind. What a velocity is off by after a step, the angular acceleration being
-known from the rates, is the wind's.
+The inner loop does the same (`autopilot.belief`), but planners do not see what it learns. A
+horizontal axis is position, velocity, tilt and rate, with the angular acceleration as input; drag
+pulls the velocity towards that of the wind. What a velocity is off by after a step, the angular
+acceleration being known from the rates, is the wind's.
 """
 
 from __future__ import annotations

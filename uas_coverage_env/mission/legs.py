@@ -17,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from uas_coverage_env.autopilot.belief import GUSTS, ground_speed, wind_growth
+from uas_coverage_env.autopilot.belief import (
+    GUSTS,
+    LEAST_GROUND_MPS,
+    ground_speed,
+    wind_growth,
+)
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.leg_model import Autopilot
@@ -38,7 +43,6 @@ _NEIGHBOURS = 24
 _FROM_HERE = 64
 """Likewise from where a UAS is."""
 _AT_ONCE = 2**20  # straight legs: more than so many are computed in parts, for the memory
-_LEAST_MPS = 0.2
 _STOP_DEG = np.array([0.0, 10.0, 25.0, 90.0, 180.0])
 _STOP_SHARE = np.array([0.0, 0.0, 0.6, 1.0, 1.1])
 """What an autopilot loses in a corner, in corners of 90 degrees; a few degrees are no corner."""
@@ -240,7 +244,7 @@ def _ground_mps(level_mps, north_mps, east_mps, height_m, way_m, altitude_m):
         flown_mps = ground_speed(
             level_mps, GUSTS, share * north_mps, share * east_mps, along[0], along[1]
         )
-        result[i] = max(flown_mps, _LEAST_MPS)
+        result[i] = max(flown_mps, LEAST_GROUND_MPS)
     return result
 
 

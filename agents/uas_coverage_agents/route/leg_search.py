@@ -30,15 +30,15 @@ from uas_coverage_agents.route.leg_flight import (
     steer_to,
 )
 from uas_coverage_agents.route.places import detour_s, places_along, write_place
-from uas_coverage_env.autopilot.control import command_wrench, write_brake, write_command
+from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.lookahead import (
     PLENTY_M,
     fixed_slack,
-    fly_as_believed,
+    fly_kinematically,
     moving_slack,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import VX, VY, X, Y, Z
 from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
@@ -122,20 +122,10 @@ def search_room(lookahead_steps: int) -> Room:
 
 
 @allocating_kernel
-def _fly(vehicle, room, belief):
-    """Fly the state of the room on for a step, by the command of the room."""
-    if belief is None:
-        command_wrench(vehicle, room.x, room.reference, room.command[0], room.u)
-        fly_kinematics(vehicle, room.x, room.u)
-    else:
-        fly_as_believed(vehicle, belief, room.x, room.reference, room.command[0], False, room.u)
-
-
-@allocating_kernel
 def _step(vehicle, values, room, belief):
     """Fly the state of the room on for a step."""
     write_command(room.command[0], VELOCITY, values[0], values[1], values[2])
-    _fly(vehicle, room, belief)
+    fly_kinematically(vehicle, room.x, room.reference, room.command[0], room.u, belief)
 
 
 @allocating_kernel
@@ -149,7 +139,7 @@ def _is_clear(arena, i, x, reference, first, steps, room, belief):
     command, n = room.command[0], steps
     write_brake(command)
     while n < steps + _BRAKING:
-        _fly(arena.vehicles[i], room, belief)
+        fly_kinematically(arena.vehicles[i], room.x, room.reference, command, room.u, belief)
         n += 1
         _note(room, n)
         if math.hypot(room.x[VX], room.x[VY]) < _STANDS_MPS:

@@ -27,11 +27,11 @@ from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState, Velocity
 from uas_coverage_env.world.routes import NO_WAY
 
-LEARNED_UP_TO_MPS = 4.0
+LEARNED_UP_TO_MPS: float = 4.0
 """In a stated mean wind above this, guidance flies along the routes [m/s]: the network learned in
 still air."""
 
-SMALL = 0.75
+LEAST_RADIUS_STEPS = 0.75
 """A sphere with a smaller radius, in steps at top speed, is missed too often: waypoints are covered
 at samples. Training had radii of 1.25 steps."""
 
@@ -52,6 +52,8 @@ class RouteVelocityRunner:
     Raises:
         ValueError: The policy was trained on another observation, or has another network.
     """
+
+    learned_up_to_mps = LEARNED_UP_TO_MPS  # of the network that it flies
 
     def __init__(self, policy: Policy, assistants: Assistants, samples: int = SAMPLES) -> None:
         network, tensors = policy.description.network, policy.tensors
@@ -76,7 +78,7 @@ class RouteVelocityRunner:
         """Build the first routes; samples draw from the seed."""
         self.routes = FleetRoutes(brief, seed, self._score, self._home_score, self._samples)
         said = brief.conditions
-        self.routes.by_guidance = said is not None and said.mean_mps > LEARNED_UP_TO_MPS
+        self.routes.by_guidance = said is not None and said.mean_mps > self.learned_up_to_mps
         n_uas = len(brief.uas)
         self.rows, self.frames = np.zeros((n_uas, N_VELOCITY)), np.zeros((n_uas, N_FRAME))
         self.ahead = np.full((n_uas, AHEAD), -1)
@@ -110,7 +112,9 @@ class RouteVelocityRunner:
         """Whether UAS u flies to a sphere that is too small for what was learned."""
         arena, route = self.routes.view.arena, self.routes.of(u)
         step_m = arena.uas["speed_mps"][u] * arena.rules["dt_s"][0]
-        return len(route) > 0 and arena.waypoints["radius_m"][route[0]] < SMALL * step_m
+        return (
+            len(route) > 0 and arena.waypoints["radius_m"][route[0]] < LEAST_RADIUS_STEPS * step_m
+        )
 
     def _look(self, u: int) -> int:
         view, targets = self.routes.view, self.routes.of(u)[:AHEAD]

@@ -58,7 +58,6 @@ from uas_coverage_env.autopilot import velocity_of
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
-from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import LEVELS, Scenario, with_disturbances
 from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.commands import VELOCITY
@@ -139,6 +138,8 @@ class TaughtRunner(RouteVelocityRunner):
         lessons: What was noted, one for each step in which it was asked.
     """
 
+    learned_up_to_mps = math.inf  # what is to be learned is flown in any wind
+
     def __init__(
         self,
         policy: Policy,
@@ -152,11 +153,6 @@ class TaughtRunner(RouteVelocityRunner):
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
         self._led, self._settings, self._rng = led, settings, rng
         self.lessons: list[Lesson] = []
-
-    def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Build the first routes; what is to be learned is flown in any wind."""
-        super().reset(brief, seed)
-        self.routes.by_guidance = False
 
     def velocities(self, flown: Sequence[int]) -> NDArray[np.float64]:
         """Those of the teacher, where it leads, or of the network."""

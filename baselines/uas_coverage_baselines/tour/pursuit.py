@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
-from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_as_believed
+from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematically
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
@@ -145,13 +145,7 @@ def _write_step(arena, i, task, plan, k, command, belief):
     x, reference = plan.x[k + 1], plan.reference[k + 1]
     x[:] = plan.x[k]
     reference[:] = plan.reference[k]
-    u = np.zeros(5)
-    vehicle = arena.vehicles[i]
-    if belief is None:
-        command_wrench(vehicle, x, reference, command, u)
-        fly_kinematics(vehicle, x, u)
-    else:
-        fly_as_believed(vehicle, belief, x, reference, command, False, u)
+    fly_kinematically(arena.vehicles[i], x, reference, command, np.zeros(5), belief)
     plan.path_m[k + 1, 0] = x[X]
     plan.path_m[k + 1, 1] = x[Y]
     plan.path_m[k + 1, 2] = x[Z]
