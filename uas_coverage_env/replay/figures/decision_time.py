@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.style import printed, shade, width_in
@@ -51,7 +52,7 @@ def decision_time_figure(flight: Flight) -> Figure:
             value = float(np.percentile(ordered, percent))
             shares.plot(percent / 100, value, "o", color=ink, markersize=3.5)
             shares.annotate(
-                f"{percent} %: {value:.3g} {unit}",
+                f"{percent} %: {three_digits(value)} {unit}",
                 (percent / 100, value),
                 xytext=(-6, 5),
                 textcoords="offset points",
@@ -79,7 +80,7 @@ def decision_time_figure(flight: Flight) -> Figure:
         series.set_ylim(bottom=0, top=1.12 * drawn)
         if durations_s[0] > _OFF_SCALE * later_s:
             series.annotate(
-                f"first: {scale * durations_s[0]:.3g} {unit} ↑",
+                f"first: {three_digits(scale * durations_s[0])} {unit} ↑",
                 (0.0, 1.0),
                 xycoords="axes fraction",
                 xytext=(6, -9),
