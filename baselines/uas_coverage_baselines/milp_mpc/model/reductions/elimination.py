@@ -32,10 +32,10 @@ from uas_coverage_env.vehicle import (
     PSI,
     TAU_Z,
     U_TH,
-    VOLTAGE,
     WZ,
     LinearModel,
 )
+from uas_coverage_env.vehicle.layout import VOLTAGE
 
 _BATTERY = [DOD, U_TH]
 _DOD = _BATTERY.index(DOD)
