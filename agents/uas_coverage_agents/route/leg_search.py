@@ -24,7 +24,7 @@ from uas_coverage_agents.route.leg_flight import (
     NORTH,
     aim_ahead,
     covers,
-    look_ahead,
+    observe_places,
     over_roofs,
     spare_distance,
     steer_to,
@@ -179,7 +179,7 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, workspace, beli
         covered = covers(there, ahead[0])
     cost_s = steps * arena.vehicles[i].dt_s
     if covered:
-        cost_s += look_ahead(
+        cost_s += observe_places(
             there,
             workspace.reference,
             uas.speed_mps,

@@ -16,7 +16,7 @@ from uas_coverage_agents.route.leg_flight import (
     N_VELOCITIES,
     NORTH,
     RADIUS,
-    look_ahead,
+    observe_places,
     weigh,
 )
 from uas_coverage_agents.training.route_labels import Label, town_of
@@ -74,7 +74,7 @@ def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, notes):
             covered += 1
         _places_ahead(places, covered, ahead)
         notes[step, _COVERED] = covered
-        notes[step, _STRAIGHT_S] = look_ahead(
+        notes[step, _STRAIGHT_S] = observe_places(
             x, reference, uas.speed_mps, ahead[0], ahead[1], ahead[2], rows[step]
         )
         if covered == n:

@@ -56,7 +56,7 @@ class Around(NamedTuple):
 
 
 @allocating_kernel
-def look_around(arena, i, x, others_m):
+def distances_kept(arena, i, x, others_m):
     """What is kept from obstacles, fence and ground: less where there is less already."""
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
     keep_m = np.empty(arena.obstacles.shape[0])
