@@ -124,7 +124,7 @@ def printed() -> AbstractContextManager[None]:
     """Figures are made and saved within this context; what a person has set stays as it was."""
     style = _style.get({})
     # the grids of a style that does not draw them itself are not meant to be behind curves
-    grids = {"axes.grid": False} if "grid.color" in style else {}
+    grids: dict[Any, Any] = {"axes.grid": False} if "grid.color" in style else {}
     return mpl.rc_context({**mpl.rcParamsDefault, **_RC, **grids, **style})
 
 
