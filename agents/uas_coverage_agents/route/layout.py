@@ -18,8 +18,8 @@ _CHOICE = {
     order.ALONE: "1 where no other UAS covers",
     order.OTHERS_FREE: "how much later the others are free on average / 5 unit_s",
     order.IN_AIR: "1 where it is at no waypoint",
-    order.MORE_TOTAL: "flying time of all of the greedy rollout, over the best choice / 2 unit_s",
-    order.MORE_LONGEST: "longest flight of the greedy rollout, likewise",
+    order.MORE_TOTAL: "flying time of all in the greedy rollout, over the best choice / 2 unit_s",
+    order.MORE_LONGEST: "longest flight in the greedy rollout, likewise",
     order.FIRST_LEG: "leg time of the nearest waypoint / 2 unit_s",
     order.OFF_CENTRE: "distance from the centre of the open waypoints / 100 m",
 }
