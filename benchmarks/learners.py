@@ -130,7 +130,7 @@ def untrained(study: Study) -> Policy:
     """What a study begins with; where it is trained does not matter."""
     if study.module:
         return velocity_learning.VelocityTraining(seed=0).policy()
-    config = load_config(study.config, changes=["scenarios.pool=1", "lanes=1"])
+    config = load_config(study.config, changes=["scenarios.pool=1", "num_envs=1"])
     return TrainingRun.untrained(TrainingJob(study.config, config, seed=0)).policy()
 
 

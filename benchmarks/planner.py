@@ -274,10 +274,10 @@ def closed_loop(
 ) -> None:
     """Fly a mission and look at the planner's decisions."""
     table = _decision_table(f"Decisions of {planner} in {scenario}, {steps} steps at most")
-    pilot = load_planner(planner, _options(option))
+    flown = load_planner(planner, _options(option))
     with console.status(f"{planner} flies {scenario}"):
-        flight = rollout(load_scenario(scenario), pilot, max_steps=steps)
-    table.add_row(scenario, *_decision_cells(flight, _limit_s(pilot)))
+        flight = rollout(load_scenario(scenario), flown, max_steps=steps)
+    table.add_row(scenario, *_decision_cells(flight, _limit_s(flown)))
     console.print(table)
 
 
@@ -302,19 +302,19 @@ def growth(
         table.add_column("planned anew")
         p95_s = []
         for n_uas, n_waypoints in sizes:
-            pilot = load_planner(planner, _options(option))
+            flown = load_planner(planner, _options(option))
             town = _town(seed, n_uas, n_waypoints)
             with console.status(town.name):
                 anew: list[int] = []
                 flight = rollout(
-                    *(town, pilot),
+                    *(town, flown),
                     seed=seed,
                     max_steps=steps,
-                    on_step=lambda _, pilot=pilot, anew=anew: anew.append(_planned_anew(pilot)),
+                    on_step=lambda _, flown=flown, anew=anew: anew.append(_planned_anew(flown)),
                 )
             table.add_row(
                 *(f"{n_uas} UAS, {n_waypoints} waypoints",),
-                *_decision_cells(flight, _limit_s(pilot)),
+                *_decision_cells(flight, _limit_s(flown)),
                 f"{np.mean(anew[1:]):.1f} of {n_uas}",
             )
             p95_s.append(np.percentile([d.duration_s for d in flight.decisions], 95))

@@ -20,6 +20,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from uas_coverage_env.files.digits import three_digits
+
 ROOT = Path(__file__).parents[1]
 WIND = ("light", "moderate", "strong")
 MARKS = ("leaderboard", "test", "karhula", *WIND)
@@ -73,7 +75,7 @@ _STILL: _Columns = {
     "accomplished": lambda one: f"{one['accomplished']}/{one['flights']}",
     "violations": lambda one: str(one["violations"]),
     "decision p50, ms": lambda one: (
-        "–" if one["decision_p50_ms"] is None else f"{one['decision_p50_ms']:.3g}"
+        "–" if one["decision_p50_ms"] is None else three_digits(one["decision_p50_ms"])
     ),
 }
 

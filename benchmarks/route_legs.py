@@ -44,7 +44,7 @@ class AlongRunner(RouteRunner):
 class Along(LearnedRoute):
     """`learned-route` along the routes of its `runner`."""
 
-    def _runner(self) -> AlongRunner:
+    def _make_runner(self) -> AlongRunner:
         self.runner = AlongRunner(self.policy, self.assistants, samples=1)
         return self.runner
 

@@ -4,7 +4,7 @@
     python benchmarks/waypoint_choices.py --seeds 3000:3020 --simulations 0,8,32,128
 
 Flies the village and generated scenarios (see `missions.py`) with `nearest-waypoint`; with the
-choice whose greedy outlook is cheapest, home included, which is what the network is told but
+choice whose greedy rollout is cheapest, home included, which is what the network is told but
 without a network; with the network of `learned-waypoint` alone (0 simulations); and with so many
 missions simulated before each decision. Differences to `nearest-waypoint` are paired, with 95 %
 bootstrap intervals. Decision times are those of all steps; most have nothing to decide.
@@ -60,7 +60,7 @@ def flown(scenarios: Sequence[Scenario], name: str, options: dict[str, Any]) -> 
 
 
 def by_greedy_rollout(scenarios: Sequence[Scenario]) -> NDArray:
-    """(missions, columns) of who chooses what the greedy outlook says is cheapest."""
+    """(missions, columns) of who chooses whose greedy rollout is cheapest."""
     worlds, legs = pool_worlds(scenarios), pool_legs(scenarios)
     n = len(scenarios)
     lanes, states = make_lanes(n, worlds)
@@ -124,7 +124,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = {"filter": arguments.filter}
         flights = {"nearest-waypoint": flown(scenarios, "nearest-waypoint", options)}
         if arguments.filter == "true":
-            flights["greedy outlook, not learned"] = by_greedy_rollout(scenarios)
+            flights["greedy rollout, not learned"] = by_greedy_rollout(scenarios)
         for number in arguments.simulations.split(","):
             name = f"learned-waypoint, {number} simulations"
             choice = {**options, "simulations": number}

@@ -133,6 +133,10 @@ def test_a_column_by_its_number_is_told_from_coordinates(text, numbered):
 RECORDS = {
     "x": "states of the UAS: `vehicle/layout.py`",
     "packs": "flights with fresh packs: `routing/task.py`",
+    "gain": "battery over thrust: `reductions/elimination.py`",
+    "level": "voltage and current: `reductions/elimination.py`",
+    "notes": "steps of a labelled route: `training/route_flights.py`",
+    "output": "voltage and current: `reductions/elimination.py`",
     "history": "what a solver told: `benchmarks/solver_watch.py`",
     "trace": "better and better orders: `benchmarks/routing_peers.py`",
     "_DEFLECTIONS": "commands to try instead: `autopilot/safety.py`",

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs import LegPilot
+from uas_coverage_baselines.by_legs import LegFollower
 from uas_coverage_baselines.targets import Targets, warm_up_once
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import Handover, MissionBrief
@@ -46,9 +46,9 @@ class Lawnmower:
             if team:
                 for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
                     self._runs[u] += run
-        self._by_legs: LegPilot | None = None
+        self._by_legs: LegFollower | None = None
         if brief.execution is not None:
-            self._by_legs = LegPilot(brief)
+            self._by_legs = LegFollower(brief)
             self._by_legs.begin(self._runs)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:

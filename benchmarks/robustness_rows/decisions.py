@@ -10,6 +10,7 @@ import numpy as np
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 from uas_coverage_env import MissionBrief, generate_scenario, load_planner, rollout
+from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.world import Command, SwarmState
 
 FIRST_SEED = 14000
@@ -93,7 +94,7 @@ def finding(results: Mapping[str, Result]) -> Finding:
         decisions, failed = decisions + len(cpu_s) * bool(np.isfinite(limit_s)), failed + late
         figures = [*np.quantile(cpu_s, (0.5, 0.95, 0.99)), cpu_s.max()]
         limit = f"{limit_s:g}" if np.isfinite(limit_s) else "none"
-        milliseconds = [f"{1e3 * each:.3g}" for each in figures]
+        milliseconds = [three_digits(1e3 * each) for each in figures]
         rows.append([f"`{planner}`", len(cpu_s), *milliseconds, limit, late])
     headings = ("planner", "decisions", "p50, ms", "p95", "p99", "most", "limit, s", "late")
     return Finding(decisions + len(errors(results)), failed, markdown(headings, rows))

@@ -21,12 +21,12 @@ from uas_coverage_agents.route.velocity_layout import (
     PLACES,
     SPARE,
     commanded,
-    look_along,
+    observe_route,
     outputs_of,
 )
 from uas_coverage_agents.training.velocity_learning import (
+    DaggerRunner,
     DaggerSettings,
-    TaughtRunner,
     VelocityTraining,
     mission_of,
     train,
@@ -51,7 +51,7 @@ def town():
 
 def _seen(arena, x, reference, targets):
     row, frame = np.zeros(N_VELOCITY), np.zeros(N_FRAME)
-    look_along(arena, 0, x, reference, targets, len(targets), row, frame)
+    observe_route(arena, 0, x, reference, targets, len(targets), row, frame)
     return row, frame
 
 
@@ -146,10 +146,10 @@ def test_it_sees_what_flying_along_its_way_would_leave_whatever_way_it_flies_now
 
 @pytest.mark.parametrize("least_m", [0.0, 1.0])
 def test_a_velocity_along_the_route_leaves_the_distance_that_is_asked_for(least_m):
-    teacher = load_policy(LEARNED_ROUTE)
-    network = teacher.description.network
+    expert = load_policy(LEARNED_ROUTE)
+    network = expert.description.network
     assert isinstance(network, RouteNetworks)
-    flight = layers_of(network.flight, teacher.tensors, "flight.")
+    flight = layers_of(network.flight, expert.tensors, "flight.")
     command, found = np.zeros(1, COMMAND_DTYPE)[0], 0
     for left_m in range(20, 60, 4):
         arena, x = _towards_the_fence(left_m)
@@ -163,11 +163,11 @@ def test_a_velocity_along_the_route_leaves_the_distance_that_is_asked_for(least_
     assert 0 < found < 10
 
 
-def test_where_it_is_too_late_to_brake_the_teacher_turns_back():
+def test_where_it_is_too_late_to_brake_the_expert_turns_back():
     town = generate_scenario(seed=5, n_uas=1, n_waypoints=8, n_obstacles=0)
     training = VelocityTraining(seed=0)
-    runner = TaughtRunner(
-        training.policy(), training.teacher, 1.0, training.settings, np.random.default_rng(0)
+    runner = DaggerRunner(
+        training.policy(), training.expert, 1.0, training.settings, np.random.default_rng(0)
     )
     brief = MissionBrief.of(town)
     runner.reset(brief, 0)
@@ -220,19 +220,19 @@ class ByLegFlight(RouteRunner):
 
 
 class ByLegs(LearnedRoute):
-    def _runner(self):
+    def _make_runner(self):
         return ByLegFlight(self.policy, self.assistants, samples=8)
 
 
-def test_where_the_teacher_leads_its_own_flight_is_flown_and_noted(town):
+def test_where_the_expert_leads_its_own_flight_is_flown_and_noted(town):
     training = VelocityTraining(seed=0)
     rng = np.random.default_rng(0)
     settings = DaggerSettings(samples=8, held=1, spare_m=0.0)
-    runner = TaughtRunner(training.policy(), training.teacher, 1.0, settings, rng)
+    runner = DaggerRunner(training.policy(), training.expert, 1.0, settings, rng)
     led = rollout(town, runner, return_mode=False, safety_filter=True)
     own = rollout(town, ByLegs(), safety_filter=True)
     np.testing.assert_allclose(led.x, own.x, atol=1e-6)
-    rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
+    rows, outputs = (np.concatenate(part) for part in zip(*runner.labels, strict=True))
     assert len(rows) == len(outputs) > led.steps
     assert np.abs(outputs[:, :2]).max() <= 1.0 + 1e-9
 

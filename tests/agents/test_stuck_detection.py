@@ -1,4 +1,4 @@
-"""A pilot's memory: what it hides, for how long, and when it does not."""
+"""Stuck detection: what it hides, for how long, and when it does not."""
 
 import numpy as np
 import pytest

@@ -202,7 +202,7 @@ def test_without_the_extra_one_line_names_it(monkeypatch, tmp_path, capsys):
 
 SAC = [
     "scenarios.pool=1",
-    "lanes=1",
+    "num_envs=1",
     "learning.first_samples=10",
     "learning.buffer_size=1000",
     "learning.batch_size=16",
@@ -283,7 +283,7 @@ def test_a_memory_that_points_elsewhere_is_refused(remembering, name, change, wo
 
 @pytest.fixture(scope="module")
 def remembering():
-    """A training off-policy, put aside."""
+    """A training off-policy, as arrays."""
     job = TrainingJob("tiny", load_config("sac", changes=["policy.hidden=[8]", *SAC]), seed=0)
     training_run = TrainingRun.untrained(job)
     training_run.model.learn(64)

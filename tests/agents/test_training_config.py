@@ -85,11 +85,14 @@ def test_a_change_that_does_not_fit_is_named(change, words):
 def test_a_configuration_with_the_names_of_before_is_the_same_one(tmp_path):
     old = tmp_path / "old.toml"
     text = (PUBLISHED / "ppo.toml").read_text()
-    old.write_text(text.replace("[policy", "[player").replace('"attention"', '"gaze"'))
-    assert "[player.rewards]" in old.read_text()
+    for name, former in (("[policy", "[player"), ('"attention"', '"gaze"'), ("num_envs", "lanes")):
+        assert name in text
+        text = text.replace(name, former)
+    old.write_text(text)
     assert load_config(str(old)) == load_config("ppo")
     changed = [load_config("ppo", changes=[f"{table}.keys=8"]) for table in ("player", "policy")]
     assert changed[0] == changed[1] != load_config("ppo")
+    assert load_config("ppo", changes=["lanes=8"]) == load_config("ppo", changes=["num_envs=8"])
 
 
 def test_a_table_is_not_given_under_both_names(tmp_path):

@@ -86,7 +86,7 @@ def test_nearing_is_a_potential_and_adds_up_to_nothing_but_its_start(towns):
     assert np.allclose(extra, -start, atol=1e-4)
 
 
-def test_lanes_go_on_where_they_were_put_aside(towns):
+def test_restored_lanes_go_on_where_they_were(towns):
     first, _ = lanes(towns, nearing=0.5)
     second, _ = lanes(towns, nearing=0.5)
     first.reset()
@@ -136,7 +136,7 @@ def test_sac_remembers_decisions_alone_and_what_came_of_them(towns):
 
 
 def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays():
-    config = load_config("sac", changes=["scenarios.pool=4", "lanes=4"])
+    config = load_config("sac", changes=["scenarios.pool=4", "num_envs=4"])
     training_run = TrainingRun.untrained(TrainingJob("sac", config, seed=0))
     assert isinstance(training_run.model, SAC)
     assert isinstance(config.learning, SacSettings)
@@ -157,7 +157,7 @@ def test_at_the_start_of_sac_a_unit_of_entropy_is_worth_about_what_a_step_pays()
 def test_what_is_exported_decides_as_the_model_does(algorithm):
     changes = ["policy.hidden=[8, 8]"]
     if algorithm == "sac":
-        config = load_config("sac", changes=[*changes, "scenarios.pool=1", "lanes=1"])
+        config = load_config("sac", changes=[*changes, "scenarios.pool=1", "num_envs=1"])
     else:
         config = load_config(TINY, changes=changes)
     training_run = TrainingRun.untrained(TrainingJob(algorithm, config, seed=0))
@@ -174,7 +174,7 @@ def test_what_is_exported_decides_as_the_model_does(algorithm):
 def test_a_few_seconds_of_training_cover_far_more_than_none():
     changes = [
         "steps=120_000",
-        "lanes=16",
+        "num_envs=16",
         "learning.rollout_steps=128",
         "learning.batch_size=2048",
         "learning.learning_rate=1e-3",
@@ -199,7 +199,7 @@ def test_a_few_seconds_of_training_cover_far_more_than_none():
 def test_a_quarter_of_a_minute_of_sac_covers_most_of_what_it_has_never_seen():
     changes = [
         "steps=15_000",
-        "lanes=8",
+        "num_envs=8",
         "policy.hidden=[64, 64]",
         "scenarios.pool=16",
         "scenarios.family.towns.n_uas=[1, 2]",

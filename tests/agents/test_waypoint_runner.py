@@ -31,8 +31,8 @@ def policy_of(weights, hidden=16):
 
 
 def flown(scenario, weights, simulations=0, seed=0):
-    pilot = WaypointRunner(policy_of(weights), BOTH, simulations)
-    return rollout(scenario, pilot, seed, return_mode=True, safety_filter=True)
+    runner = WaypointRunner(policy_of(weights), BOTH, simulations)
+    return rollout(scenario, runner, seed, return_mode=True, safety_filter=True)
 
 
 def in_training(scenario, weights):
@@ -118,7 +118,7 @@ def _price(flight):
     return energy_Wh(flight).sum() + 0.1 * flight.steps
 
 
-def test_a_pilot_needs_no_knowledge_of_what_moving_obstacles_will_do():
+def test_a_runner_needs_no_knowledge_of_what_moving_obstacles_will_do():
     """Two obstacles that differ only in the future are flown the same until they differ."""
     scenario = town(12, n_uas=2, n_waypoints=12)
     early = flown(with_something_parked(scenario, 3, leaves_s=40.0), tensors(), simulations=3)

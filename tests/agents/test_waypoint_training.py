@@ -23,7 +23,7 @@ def environment(n_lanes=3, seed=0):
 
 def config(*changes):
     return load_config(
-        "maskable-ppo", changes=["scenarios.pool=4", "lanes=4", "policy.hidden=8", *changes]
+        "maskable-ppo", changes=["scenarios.pool=4", "num_envs=4", "policy.hidden=8", *changes]
     )
 
 
@@ -78,7 +78,7 @@ def test_the_same_seed_flies_the_same_and_another_does_not():
     assert not np.array_equal(runs[0][0][0], runs[2][0][0])
 
 
-def test_lanes_go_on_bit_for_bit_from_where_they_were_put_aside():
+def test_restored_lanes_go_on_bit_for_bit():
     lanes = environment()
     lanes.reset()
     fly(lanes, np.random.default_rng(1), 25)
@@ -154,7 +154,7 @@ def test_a_short_training_saves_energy_and_time_on_towns_it_has_not_seen():
     torch.set_num_threads(1)
     learner = WaypointLearner()
     shares = [f"policy.{of}_share=0.0" for of in ("moving", "covered", "discharged")]
-    little = config("lanes=32", "scenarios.pool=48", "policy.hidden=48", *shares)
+    little = config("num_envs=32", "scenarios.pool=48", "policy.hidden=48", *shares)
     model = learner.model(little, learner.lanes(little, 0), 0)
 
     def costs_Wh():

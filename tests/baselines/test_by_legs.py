@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
-from uas_coverage_baselines.by_legs import LegPilot
+from uas_coverage_baselines.by_legs import LegFollower
 from uas_coverage_baselines.by_legs.course import CoursePlanner
 
 from uas_coverage_env import load_planner, rollout
@@ -82,10 +82,10 @@ STARTS_M = (50.0, 60.0, -1.0), (50.0, 140.0, -1.0)
 
 def test_uas_that_cross_wait_on_the_ground_until_one_may_be_late():
     scenario = by_autopilot(meadow(STARTS_M, waypoints=CROSSING))
-    pilot = LegPilot(MissionBrief.of(scenario))
-    pilot.begin([[0], [1]])
+    follower = LegFollower(MissionBrief.of(scenario))
+    follower.begin([[0], [1]])
     names = [uas.name for uas in scenario.uas]
-    flown = [Timed(u, names[u], course.followed) for u, course in enumerate(pilot.courses)]
+    flown = [Timed(u, names[u], course.followed) for u, course in enumerate(follower.courses)]
     (pair,) = pairs_of(scenario, flown)
     assert pair.slack_s >= 20.0
 
@@ -108,45 +108,47 @@ def test_planners_fly_to_the_time_of_the_legs_and_accomplish_the_mission(planner
 def test_a_uas_that_is_late_finds_time_stopped_where_it_is():
     scenario = by_autopilot(meadow(waypoints=ROW))
     brief = MissionBrief.of(scenario)
-    flight = rollout(scenario, Held(pilot_of(brief), until_s=40.0))
+    flight = rollout(scenario, Held(follower_of(brief), until_s=40.0))
     assert coverage(flight) == 1.0
-    assert flight.last_sample[0] > rollout(scenario, Held(pilot_of(brief), 0.0)).last_sample[0] + 15
+    assert (
+        flight.last_sample[0] > rollout(scenario, Held(follower_of(brief), 0.0)).last_sample[0] + 15
+    )
 
 
-def pilot_of(brief):
-    pilot = LegPilot(brief)
-    pilot.begin([[0, 1, 2]])
-    return pilot
+def follower_of(brief):
+    follower = LegFollower(brief)
+    follower.begin([[0, 1, 2]])
+    return follower
 
 
 class Held:
     """Flies along, but hovers between 20 s and a later time, whatever it should do."""
 
-    def __init__(self, pilot, until_s):
-        self._pilot, self._until_s = pilot, until_s
+    def __init__(self, follower, until_s):
+        self._follower, self._until_s = follower, until_s
 
     def reset(self, brief, seed):
         pass
 
     def act(self, swarm):
         route = [w for w in (0, 1, 2) if swarm.uncovered[w]]
-        commands = self._pilot.commands(swarm, [route])
+        commands = self._follower.commands(swarm, [route])
         if 20.0 < swarm.time_s < self._until_s:
             return {name: Velocity(0.0, 0.0, -swarm.x[0, 2]) for name in commands}
         return commands
 
 
-def test_a_pilot_that_takes_over_in_the_air_flies_on_from_where_the_uas_is():
+def test_a_follower_that_takes_over_in_the_air_flies_on_from_where_the_uas_is():
     scenario = by_autopilot(meadow(waypoints=ROW))
     brief = MissionBrief.of(scenario)
 
     class Replaced(Held):
         def act(self, swarm):
             if swarm.step == 25:
-                self._pilot = pilot_of(brief)
+                self._follower = follower_of(brief)
             return super().act(swarm)
 
-    flight = rollout(scenario, Replaced(pilot_of(brief), 0.0))
-    whole = rollout(scenario, Held(pilot_of(brief), 0.0))
+    flight = rollout(scenario, Replaced(follower_of(brief), 0.0))
+    whole = rollout(scenario, Held(follower_of(brief), 0.0))
     assert coverage(flight) == 1.0
     assert flight.last_sample[0] < whole.last_sample[0] + 15

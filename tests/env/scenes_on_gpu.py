@@ -18,17 +18,17 @@ ASKED = np.full((2, 3), 0.2)
 
 
 def go_on_elsewhere():
-    """Put missions aside in which scenes have changed, and go on beside them in other ones."""
+    """Copy missions in which scenes have changed, and go on beside them in other ones."""
     missions, other = (CudaMissions(N_LANES, EVERYTHING, seed=seed) for seed in (SEED, SEED + 9))
     for _ in range(9):
         missions.step(np.array([ASKED] * N_LANES))
-    aside = missions.state_dict()
-    wrong = {**aside, "changes": aside["changes"] + 1}
+    kept = missions.state_dict()
+    wrong = {**kept, "changes": kept["changes"] + 1}
     try:
         other.load_state_dict(wrong)
     except ValueError as error:
         refused = str(error)
-    other.load_state_dict(aside)
+    other.load_state_dict(kept)
     briefs = [
         [MissionBrief.of(each.scenario_of(lane)) for lane in range(N_LANES)]
         for each in (missions, other)
@@ -38,8 +38,8 @@ def go_on_elsewhere():
         for each in (missions, other):
             each.step(np.array([ASKED] * N_LANES))
         arrays = [each.state_dict() for each in (missions, other)]
-        different += sum(int((arrays[0][name] != arrays[1][name]).sum()) for name in aside)
-    n_changes = (aside["changes"] >= 0).sum(axis=1).tolist()
+        different += sum(int((arrays[0][name] != arrays[1][name]).sum()) for name in kept)
+    n_changes = (kept["changes"] >= 0).sum(axis=1).tolist()
     return {"different": different, "changes": n_changes, "refused": refused}
 
 

@@ -257,17 +257,17 @@ def test_an_action_that_is_refused_draws_nothing():
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
-def test_a_batch_that_was_put_aside_goes_on_with_the_same_missions(mode):
+def test_a_batch_that_was_kept_goes_on_with_the_same_missions(mode):
     actions = np.random.default_rng(0).uniform(-1, 1, (60, 4, 3, 3))
     batch = CoverageBatch(4, grounds, autoreset=mode)
     batch.reset(seed=9)
     for asked in actions[:30]:
         batch.step(asked)
-    put_aside = batch.state_dict()
+    kept = batch.state_dict()
     travelled = pickle.loads(pickle.dumps(batch))
     copied = copy.deepcopy(batch)
     fresh = CoverageBatch(4, grounds, autoreset=mode)
-    fresh.load_state_dict(put_aside)
+    fresh.load_state_dict(kept)
     for asked in actions[30:]:
         expected = batch.step(asked).copy()
         for other in (travelled, copied, fresh):

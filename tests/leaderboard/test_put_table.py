@@ -37,7 +37,7 @@ def test_tables_and_picture_go_between_the_marks_as_often_as_one_likes(put_table
     assert short.endswith("after\n")
     assert short.count("old") == len(put_table.MARKS) - 1  # between the other marks
     assert short.count("`a command`") == 1
-    assert "| `p` | 2/2 | 0 | 1 | +0.0 [+0.0, +0.0] | -10.0 [-10.0, -10.0] |" in short
+    assert "| `p` | 2/2 | 0 | 1.00 | +0.0 [+0.0, +0.0] | -10.0 [-10.0, -10.0] |" in short
     assert "| `q` | 0/1 | 0 | – | – | – |" in short
     tables, words = (sweep / "table.md").read_text().split("\nInterquartile means")
     long = (tmp_path / "baselines/README.md").read_text()
@@ -68,7 +68,7 @@ def test_the_test_set_has_marks_of_its_own(put_table, tmp_path):
     assert put_table.main(str(sweep), "test") == 0
     begin, end = put_table.marks_of("test")
     inside = readme.read_text().split(begin)[1].split(end)[0]
-    assert "| `p` | 2/2 | 0 | 1 |" in inside
+    assert "| `p` | 2/2 | 0 | 1.00 |" in inside
     assert readme.read_text().count("old") == len(put_table.MARKS) - 1
     assert other.read_text() == untouched
     assert not (tmp_path / "picture.png").exists()

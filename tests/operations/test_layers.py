@@ -6,7 +6,7 @@ from small_worlds import meadow, waypoint
 
 pytest.importorskip("pyproj")
 
-from uas_coverage_baselines.by_legs import LegPilot
+from uas_coverage_baselines.by_legs import LegFollower
 
 from uas_coverage_env import rollout
 from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
@@ -25,13 +25,13 @@ class Routes:
     """Flies given routes."""
 
     def reset(self, brief, seed):
-        self._pilot = LegPilot(brief)
+        self._follower = LegFollower(brief)
         self._routes = [[0, 1, 2, 3], [4, 5, 6, 7]]
-        self._pilot.begin(self._routes)
+        self._follower.begin(self._routes)
 
     def act(self, swarm):
         left = [[w for w in route if swarm.uncovered[w]] for route in self._routes]
-        return self._pilot.commands(swarm, left)
+        return self._follower.commands(swarm, left)
 
 
 @pytest.fixture(scope="module")

@@ -96,6 +96,23 @@ def pixels_of(element) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(element.screenshot_as_png)).convert("RGB"))
 
 
+def map_pixels(shape, low, high, north_m, east_m):
+    """Rows and columns of places on the map: what `map.ts` does where no UAS is followed.
+
+    Args:
+        shape: Of the picture of the stage: (height, width).
+        low: Least north and east of the fence [m].
+        high: Greatest.
+        north_m: Places [m].
+        east_m: Places [m].
+    """
+    height, width = shape[0] - 18, shape[1]  # the scale lies at the foot
+    scale = min((width - 28) / (high[1] - low[1]), (height - 28) / (high[0] - low[0]))
+    rows = height / 2 - scale * (north_m - (low[0] + high[0]) / 2)
+    columns = width / 2 + scale * (east_m - (low[1] + high[1]) / 2)
+    return np.rint(rows).astype(int), np.rint(columns).astype(int)
+
+
 def colours(image) -> int:
     return len(np.unique(image.reshape(-1, 3), axis=0))
 

@@ -141,6 +141,13 @@ def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path)
         assert soc.get_lines()[-2].get_linewidth() == width
 
 
+@pytest.mark.parametrize(("style", "drawn"), [(None, True), ("grayscale", False), ("ggplot", True)])
+def test_a_style_without_a_grid_has_none_behind_its_curves(flight, style, drawn):
+    with look(style=style):
+        axes = battery_figure(flight).axes[0]
+    assert any(line.get_visible() for line in axes.get_xgridlines()) is drawn
+
+
 @pytest.mark.parametrize(
     ("style", "message"),
     [
@@ -171,7 +178,7 @@ def test_the_first_decision_does_not_set_the_axis(plain):
     decisions = tuple(DecisionRecord(time_s) for time_s in times_s)
     series, _ = decision_time_figure(dataclasses.replace(plain, decisions=decisions)).axes
     assert 0.4 < series.get_ylim()[1] < 0.5
-    assert any("first: 30 s" in text.get_text() for text in series.texts)
+    assert any("first: 30.0 s" in text.get_text() for text in series.texts)
 
 
 def test_a_step_that_was_not_flown_is_refused(flight):
@@ -304,7 +311,20 @@ def test_decision_times_are_drawn_with_fallbacks_and_the_limit(flight):
     assert any(line[:, 0].tolist() == [7, 9] for line in lines(series)), "the fallbacks"
     assert any((line[:, 1] == 1.0).all() for line in lines(series)), "the limit"
     assert series.get_ylabel() == "Decision time, s"
-    assert "50 %: 0.795 s" in {text.get_text() for text in shares.texts}
+    assert "50 %: 0.795" in {text.get_text() for text in shares.texts}
+
+
+@pytest.mark.parametrize("width_in", [6.3, 3.4])
+def test_panels_of_decision_times_are_wide_enough_for_their_words(plain, width_in):
+    decisions = tuple(DecisionRecord(3.7e-5 + 1e-6 * k) for k in range(plain.steps))
+    with look(width_in=width_in):
+        figure = decision_time_figure(dataclasses.replace(plain, decisions=decisions))
+        figure.draw_without_rendering()
+    _, shares = figure.axes
+    panel = shares.get_window_extent()
+    assert len(shares.texts) == 2
+    for text in shares.texts:
+        assert panel.x0 <= text.get_window_extent().x0, text.get_text()
 
 
 def test_fast_decisions_are_counted_in_milliseconds(plain):

@@ -12,6 +12,7 @@ from chromium import (
     cards,
     colours,
     complaints,
+    map_pixels,
     needs_chromium,
     opened,
     pixels,
@@ -182,16 +183,12 @@ def test_without_following_one_the_area_in_reach_of_each_ends_where_range_says(
     page = write_replay([discharged], tmp_path / "replay.html")
     opened(browser, page, DESKTOP, moment=f"#view=map&t={k}")
     picture = pixels(browser, ".stage").astype(int)
-    height, width = picture.shape[:2]
     corners_m = discharged.scenario.fence.vertices_m
     low, high = corners_m.min(axis=0), corners_m.max(axis=0)
-    scale = min((width - 28) / (high[1] - low[1]), (height - 28) / (high[0] - low[0]))
-    middle = (low + high) / 2
     at_m = discharged.x[k, 1, :2]
 
     def orange(north, east) -> bool:
-        row = round(height / 2 - scale * (north - middle[0]))
-        column = round(width / 2 + scale * (east - middle[1]))
+        row, column = map_pixels(picture.shape, low, high, north, east)
         near = picture[row - 5 : row + 6, column - 5 : column + 6]
         return bool(((near[..., 0] - near[..., 2]) > 60).any())
 

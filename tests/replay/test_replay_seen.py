@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from chromium import SMALL, complaints, needs_chromium, opened, pixels
+from chromium import SMALL, complaints, map_pixels, needs_chromium, opened, pixels
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -64,12 +64,9 @@ def test_the_map_is_tinted_where_the_ground_was_seen(browser, pages, mapped):
     shares = []
     for sample in (10, STEPS):
         tinted = painted(browser, pages, "map", sample)
-        height, width = tinted.shape
-        scale = min((width - 28) / (high[1] - low[1]), (height - 28) / (high[0] - low[0]))
         grounds = seen_ground(mapped, sample)
-        north_m, east_m = grounds[0].north_m, grounds[0].east_m
-        rows = np.rint(height / 2 - scale * (north_m - (low[0] + high[0]) / 2)).astype(int)
-        columns = np.rint(width / 2 + scale * (east_m - (low[1] + high[1]) / 2)).astype(int)
+        places_m = grounds[0].north_m, grounds[0].east_m
+        rows, columns = map_pixels(tinted.shape, low, high, *places_m)
         seen = np.any([ground.seen for ground in grounds], axis=0)
         agree = tinted[np.ix_(rows, columns)] == seen
         # buildings, marks and names lie above the tint

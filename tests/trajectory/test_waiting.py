@@ -6,7 +6,7 @@ from small_fleets import fleet_of
 from small_worlds import meadow, mover, waypoint
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_baselines.trajectory.fleet import Moment
-from uas_coverage_baselines.trajectory.waiting import who_waits
+from uas_coverage_baselines.trajectory.waiting import choose_waiting
 
 from uas_coverage_env import Scenario, rollout
 from uas_coverage_env.flight import accomplished
@@ -56,7 +56,7 @@ def waiting(socs, max_steps=300):
     moment = Moment(
         swarm.x, np.ones(n_uas, bool), np.ones(5, bool), np.zeros(5, np.int64), swarm.time_s
     )
-    return who_waits(fleet, Range(fleet.brief), moment, blocked)
+    return choose_waiting(fleet, Range(fleet.brief), moment, blocked)
 
 
 def test_what_opens_when_most_are_home_is_covered_by_the_one_that_could_wait_longest():

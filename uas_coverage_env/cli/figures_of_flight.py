@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import (
     MODES,
     Flight,
@@ -127,4 +128,4 @@ def _metres(value: float | None) -> str:
 
 
 def _milliseconds(value_s: float | None) -> str:
-    return NONE if value_s is None else f"{1e3 * value_s:.2f}"
+    return NONE if value_s is None else three_digits(1e3 * value_s)

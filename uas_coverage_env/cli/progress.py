@@ -13,6 +13,7 @@ from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.cli.live import LiveView
 from uas_coverage_env.cli.watch import FlightWindow
 from uas_coverage_env.draw import NoDisplayError
+from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import Planner, Progress
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD
@@ -117,7 +118,7 @@ def progress_line(progress: Progress) -> str:
             f"step {swarm.step}/{progress.max_steps}",
             f"covered {progress.covered}/{len(swarm.uncovered)}",
             *charges,
-            *([] if decision_s is None else [f"decision {1e3 * decision_s:.2f} ms"]),
+            *([] if decision_s is None else [f"decision {three_digits(1e3 * decision_s)} ms"]),
         ]
     )
 

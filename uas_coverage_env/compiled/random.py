@@ -1,7 +1,7 @@
 """Random numbers in kernels: SplitMix64 (Steele, Lea, Flood 2014), whose state is one number.
 
-The state is an array of one element, so that it can be part of the arrays that a mission is put
-aside with, and the numbers are the same wherever the mission is flown.
+The state is an array of one element, so that it can be part of the arrays of a checkpoint, and the
+numbers are the same wherever the mission is flown.
 """
 
 import math

@@ -158,7 +158,7 @@ class DrawnPool:
         return lane
 
     def check_drawn(self) -> None:
-        """Refuse to put missions aside that cannot be drawn again.
+        """Refuse to checkpoint missions that cannot be drawn again.
 
         Raises:
             ValueError: A mission was not drawn.

@@ -22,7 +22,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import (
     first_observation,
     learners_sizes,
-    look_around,
+    observe_scene,
     tables_of,
 )
 from uas_coverage_env.scenario import Room, Scenario
@@ -105,7 +105,7 @@ class Episode:
         for array, old in zip(self._scratch, outcome, strict=True):
             array[:] = old
         self._prepare()
-        look_around(
+        observe_scene(
             world.arena, world.state, self.tables, self._learners, self._observing,
             self.observation,
         )  # fmt: skip

@@ -10,7 +10,7 @@ from uas_coverage_env.env.batch_memory import Missions
 from uas_coverage_env.env.drawn import DrawnPool
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing, Tables
 from uas_coverage_env.env.pool import ScenarioPool, scene_arrays
-from uas_coverage_env.env.start import look_around
+from uas_coverage_env.env.start import observe_scene
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
@@ -99,7 +99,7 @@ class SceneChanges:
             array[:] = each
         learners = LEARNERS.first_rows(lane.learners, sizes)
         observation = lane.observation[: sizes["U"]]
-        look_around(arena, state, tables, learners, self._observing, observation)
+        observe_scene(arena, state, tables, learners, self._observing, observation)
         return True
 
     def _after(

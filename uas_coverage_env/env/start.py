@@ -70,11 +70,11 @@ def first_observation(
     learners.report[:, STATUS] = state.status
     learners.report[:, COVERED] = (~state.uncovered).sum()
     first = FIRST_OBSERVATION.zeros(sizes)
-    look_around(arena, state, tables, learners, observing, first.observation)
+    observe_scene(arena, state, tables, learners, observing, first.observation)
     return learners, first.observation
 
 
-def look_around(
+def observe_scene(
     arena: Arena,
     state: WorldState,
     tables: Tables,

@@ -165,6 +165,7 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
             bound = sorted({(one.time_s, one.bound_Wh) for one in found if one.bound_Wh})
             if bound:
                 style = {"drawstyle": "steps-pre", "color": "black", "label": "lower bound"}
+                style["marker"] = "_" if len(bound) == 1 else ""  # a line has no length there
                 axes.plot(*zip(*bound, strict=True), ":", **style)  # of less time, it is higher
             axes.set_title(name, fontsize=8)
             axes.set_xlabel("Time, s")

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.leaderboard.row import FLOWN, Row
 from uas_coverage_env.leaderboard.scores import Scores, drawn_anew
 from uas_coverage_env.leaderboard.statistics import Estimate
@@ -166,9 +167,7 @@ def _text(found: Estimate, form: str) -> str:
 
 
 def _milliseconds(value_ms: float | None) -> str:
-    if value_ms is None:
-        return NOTHING
-    return f"{value_ms:.2f}" if value_ms < 10.0 else f"{value_ms:.0f}"
+    return NOTHING if value_ms is None else three_digits(value_ms)
 
 
 def _escaped(cell: str) -> str:

@@ -11,6 +11,10 @@ import { Trail } from "./trail";
 import type { Focus, View } from "./view";
 
 const FOLLOWED_ZOOM = 3;
+/** Height of the strip under the area, for the scale [px]. */
+const FOOT = 18;
+/** Length of the scale, about [px]. */
+const SCALE_PX = 60;
 const MANY = 12;
 
 export class MapView implements View {
@@ -89,6 +93,7 @@ export class MapView implements View {
     this.movingObstacles(moment);
     const zoom = focus.uas === null ? 1 : FOLLOWED_ZOOM;
     this.overlay.draw(moment, focus, this.unit, zoom, true);
+    this.scaleBar();
   }
 
   private frame(moment: Moment, followed: number | null): void {
@@ -96,7 +101,7 @@ export class MapView implements View {
     this.unit = Math.min(1, Math.max(0.65, Math.min(width, height) / 500));
     const fit = Math.min(
       (width - 28) / (this.high[1] - this.low[1]),
-      (height - 28) / (this.high[0] - this.low[0]),
+      (height - 28 - FOOT) / (this.high[0] - this.low[0]),
     );
     const at = followed === null ? null : moment.vehicles[followed].position;
     this.scale = fit * (at ? FOLLOWED_ZOOM : 1);
@@ -108,7 +113,7 @@ export class MapView implements View {
   pixel(point: Point2 | Point3): Point2 {
     return [
       this.size[0] / 2 + this.scale * (point[1] - this.middle[1]),
-      this.size[1] / 2 - this.scale * (point[0] - this.middle[0]),
+      (this.size[1] - FOOT) / 2 - this.scale * (point[0] - this.middle[0]),
     ];
   }
 
@@ -154,7 +159,6 @@ export class MapView implements View {
       const [x, y] = this.pixel(homeAt(homes, sample));
       this.circle(x, y, 5 * this.unit, bright(hex), 1.5);
     }
-    this.scaleBar();
   }
 
   private grid(): void {
@@ -170,12 +174,16 @@ export class MapView implements View {
     }
   }
 
+  /** At the foot of the picture, over what may lie there when a UAS is followed. */
   private scaleBar(): void {
-    const step = this.gridStep;
-    const [x, y] = this.pixel(this.low);
-    const end = x + 8 + step * this.scale;
-    marks.stroke(this.pen, x + 8, y - 8, end, y - 8, 2, colour("--ink"));
-    marks.words(this.pen, `${step} m, N ↑`, x + 8, y - 18, 11, colour("--ink"), "left");
+    const { pen } = this;
+    const [left, y] = [14, this.size[1] - 12];
+    const step = Math.min(this.gridStep, roundStep(SCALE_PX / this.scale));
+    const end = left + step * this.scale;
+    for (const [width, ink] of [[6, "--halo"], [2, "--ink"]] as const) {
+      marks.stroke(pen, left, y, end, y, width, colour(ink));
+    }
+    marks.words(pen, `${step} m, N ↑`, end + 8, y, 11, colour("--ink"), "left");
   }
 
   private circle(x: number, y: number, radius: number, edge: string, width: number): void {

@@ -108,7 +108,9 @@ export function landed(pen: Pen, x: number, y: number, radius: number, hex: stri
 
 /** A UAS of another flight: a thin ring, its number with a stroke. */
 export function ghost(pen: Pen, x: number, y: number, radius: number, label: string, hex: string): void {
+  pen.globalAlpha = 0.75;
   ring(pen, x, y, radius, 2 * Math.PI, 0.16 * radius, bright(hex));
+  pen.globalAlpha = 1;
   words(pen, `${label}′`, x + 1.2 * radius, y + 1.1 * radius, Math.max(11, 0.9 * radius), legible(hex));
 }
 

@@ -69,12 +69,10 @@ export class Overlay {
   }
 
   ghosts(ghost: Flight, moment: Moment, unit: number): void {
-    this.pen.globalAlpha = 0.75;
     ghost.scene.uas.forEach(({ name, colour: hex }, i) => {
       const at = this.project(moment.vehicles[i].position);
       if (at) marks.ghost(this.pen, ...at, 9 * unit, marks.shortName(name), hex);
     });
-    this.pen.globalAlpha = 1;
   }
 
   moving(moment: Moment, unit: number): void {

@@ -47,7 +47,7 @@ class Observation(StrictModel):
     """What the network reads: the numbers one after the other, and what lengths were scaled by.
 
     Attributes:
-        layout: Name of the layout; a pilot flies only policies of the layout it can compute.
+        layout: Name of the layout; a runner flies only policies of the layout it can compute.
         groups: In order.
         scales: Constants of the layout by name, with the unit at the end of the name.
     """
@@ -132,7 +132,7 @@ class Training(StrictModel):
         algorithm: As in `uas-coverage train ALGORITHM`.
         settings: The whole configuration, as plain data.
         seed: Of the training.
-        steps: Of all lanes together, those that wait for the others included.
+        steps: Of all environments together, those that wait for the others included.
         process_s: Processor time [s].
         wall_s: [s].
         machine: Where.

@@ -38,8 +38,8 @@ RUNNERS = {
 where it flies, since runners import this package."""
 
 
-def pilot_of(policy: Policy, assistants: Assistants) -> PolicyRunner:
-    """The pilot that flies a policy.
+def runner_of(policy: Policy, assistants: Assistants) -> PolicyRunner:
+    """The runner that flies a policy.
 
     Raises:
         ValueError: The policy cannot be flown; says why.
@@ -68,12 +68,12 @@ class PolicyPlanner:
         self.argument = str(argument)
         self.policy = load_policy(argument)
         try:
-            self._pilot = self._runner()
+            self._runner = self._make_runner()
         except ValueError as error:
             raise InputError(f"{self.argument}: cannot be flown: {error}") from error
 
-    def _runner(self) -> PolicyRunner:
-        return pilot_of(self.policy, self.assistants)
+    def _make_runner(self) -> PolicyRunner:
+        return runner_of(self.policy, self.assistants)
 
     @property
     def fingerprint(self) -> str:
@@ -83,13 +83,13 @@ class PolicyPlanner:
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what needs compiling."""
         refuse_what_asks(brief)
-        self._pilot.warm_up(brief)
+        self._runner.warm_up(brief)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission."""
         refuse_what_asks(brief)
-        self._pilot.reset(brief, seed)
+        self._runner.reset(brief, seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Let the policy decide."""
-        return self._pilot.act(swarm)
+        return self._runner.act(swarm)

@@ -39,7 +39,7 @@ class Reference(StrictModel):
         critic: "own": the critic sees what the policy sees. "full": the whole mission.
         missions: Flown at the same time.
         steps: Learned from, of all agents together.
-        rounds: A training is put aside so many times; each round begins with new missions.
+        rounds: How many; each ends with a checkpoint and begins with new missions.
         environment: What it chooses of a level.
         learning: Arguments of the class, by its own names; else the library's defaults.
     """

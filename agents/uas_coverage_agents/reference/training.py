@@ -1,4 +1,4 @@
-"""Trains a reference learner on a level in rounds, each of which is put aside when it is over.
+"""Trains a reference learner on a level in rounds, each of which ends with a checkpoint.
 
 A round begins with a fresh model that takes over what was learned, new missions and random numbers
 of its own: a training that was killed goes on to the same weights as one that was not.
@@ -73,7 +73,7 @@ def train_reference(
     torch.set_num_threads(1)
     task = level_named(level)
     order = {"reference": reference.model_dump(mode="json"), "level": level, "seed": seed}
-    arrays, done, process_s = _standing(directory / STATE, order)
+    arrays, done, process_s = _checkpoint(directory / STATE, order)
     lanes = lanes_of(reference, level)
     model = _model(reference, lanes, _seed(seed, done), level)
     if arrays is not None:
@@ -140,10 +140,10 @@ def _seed(seed: int, done: int) -> int:
     return _SEEDS_APART * seed + done
 
 
-def _standing(
+def _checkpoint(
     path: Path, order: dict[str, Any]
 ) -> tuple[dict[str, NDArray[Any]] | None, int, float]:
-    """What was put aside: arrays, rounds done, processor time; nothing where none was."""
+    """What the checkpoint holds: arrays, rounds done, processor time; nothing where none was."""
     if not path.exists():
         return None, 0, 0.0
     try:

@@ -95,7 +95,7 @@ def aim_ahead(vehicle, x, ahead, aims_m):
 
 
 @allocating_kernel
-def look_ahead(x, reference, speed_mps, first, second, third, row):
+def observe_places(x, reference, speed_mps, first, second, third, row):
     """Write what the network reads of a state and the next three places.
 
     Everything is told along and across the direction of the first place; the second lies on the
@@ -227,12 +227,12 @@ def _fly_on(vehicle, x, reference, values, at, most_steps, command, u):
 def _cost_s(vehicle, speed_mps, x, reference, steps, ahead, layers, row):
     """Time [s] to the last of the places ahead, after so many steps (see `_fly_on`)."""
     if steps < 0:
-        rest_s = look_ahead(x, reference, speed_mps, ahead[1], ahead[2], ahead[_LAST], row)
+        rest_s = observe_places(x, reference, speed_mps, ahead[1], ahead[2], ahead[_LAST], row)
     else:
         last, before = ahead[_LAST], ahead[_LAST - 1]
         beyond_m = math.hypot(last[NORTH] - before[NORTH], last[EAST] - before[EAST])
         rest_s = beyond_m / speed_mps
-        rest_s += look_ahead(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
+        rest_s += observe_places(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], row)
     return abs(steps) * vehicle.dt_s + rest_s + value_of(layers, row)
 
 

@@ -24,7 +24,7 @@ from uas_coverage_agents.route.leg_flight import (
     NORTH,
     aim_ahead,
     covers,
-    look_ahead,
+    observe_places,
     over_roofs,
     spare_distance,
     steer_to,
@@ -65,8 +65,8 @@ _TURN_RAD, _RISE_M = 1.5, 3.0  # largest changes
 _SPEED, _ALTITUDE, _ANEW = 0.4, 0.2, 0.1  # how often they concern speed, altitude, what follows
 
 
-class Room(NamedTuple):
-    """Room for a search.
+class Workspace(NamedTuple):
+    """Arrays that a search writes to.
 
     Attributes:
         x: (14,) a state.
@@ -101,9 +101,9 @@ class Room(NamedTuple):
     base: NDArray[np.float64]
 
 
-def search_room(lookahead_steps: int) -> Room:
+def search_workspace(lookahead_steps: int) -> Workspace:
     """An empty one; `lookahead_steps` are those of the arena's rules."""
-    return Room(
+    return Workspace(
         x=np.zeros(14),
         reference=np.zeros(2),
         u=np.zeros(5),
@@ -122,59 +122,73 @@ def search_room(lookahead_steps: int) -> Room:
 
 
 @allocating_kernel
-def _step(vehicle, values, room, belief):
-    """Fly the state of the room on for a step."""
-    write_command(room.command[0], VELOCITY, values[0], values[1], values[2])
-    fly_kinematically(vehicle, room.x, room.reference, room.command[0], room.u, belief)
+def _step(vehicle, values, workspace, belief):
+    """Fly `workspace.x` on for a step."""
+    write_command(workspace.command[0], VELOCITY, values[0], values[1], values[2])
+    fly_kinematically(
+        vehicle, workspace.x, workspace.reference, workspace.command[0], workspace.u, belief
+    )
 
 
 @allocating_kernel
-def _note(room, n):
-    room.path_m[n, 0], room.path_m[n, 1], room.path_m[n, 2] = room.x[X], room.x[Y], room.x[Z]
+def _note(workspace, n):
+    workspace.path_m[n, 0], workspace.path_m[n, 1], workspace.path_m[n, 2] = (
+        workspace.x[X],
+        workspace.x[Y],
+        workspace.x[Z],
+    )
 
 
 @allocating_kernel
-def _is_clear(arena, i, x, reference, first, steps, room, belief):
+def _is_clear(arena, i, x, reference, first, steps, workspace, belief):
     """Whether the plan just flown, and braking after its first and last step, is clear."""
-    command, n = room.command[0], steps
+    command, n = workspace.command[0], steps
     write_brake(command)
     while n < steps + _BRAKING:
-        fly_kinematically(arena.vehicles[i], room.x, room.reference, command, room.u, belief)
+        fly_kinematically(
+            arena.vehicles[i], workspace.x, workspace.reference, command, workspace.u, belief
+        )
         n += 1
-        _note(room, n)
-        if math.hypot(room.x[VX], room.x[VY]) < _STANDS_MPS:
+        _note(workspace, n)
+        if math.hypot(workspace.x[VX], workspace.x[VY]) < _STANDS_MPS:
             break
-    slack_m = fixed_slack(arena, i, room.path_m[: n + 1], n, 0.0, PLENTY_M)
-    if moving_slack(arena, 0, i, room.path_m[: n + 1], 0.0, slack_m) < 0.0:
+    slack_m = fixed_slack(arena, i, workspace.path_m[: n + 1], n, 0.0, PLENTY_M)
+    if moving_slack(arena, 0, i, workspace.path_m[: n + 1], 0.0, slack_m) < 0.0:
         return False
     write_command(command, VELOCITY, first[0], first[1], first[2])
-    spare_m = spare_distance(arena, i, x, reference, command, 1, 0.0, room.braking_m, belief)
+    spare_m = spare_distance(arena, i, x, reference, command, 1, 0.0, workspace.braking_m, belief)
     return spare_m >= 0.0
 
 
 @allocating_kernel
-def _weigh(arena, around, i, x, reference, plan, layers, best_s, room, belief):
+def _weigh(arena, around, i, x, reference, plan, layers, best_s, workspace, belief):
     """Time [s] of a plan and of what comes after it, inf if not clear or not below `best_s`.
 
     Returns:
         The time, and the steps of the plan.
     """
-    uas, there, ahead = arena.uas[i], room.x, room.ahead
+    uas, there, ahead = arena.uas[i], workspace.x, workspace.ahead
     there[:] = x
-    room.reference[:] = reference
-    _note(room, 0)
+    workspace.reference[:] = reference
+    _note(workspace, 0)
     steps, covered = 0, False
     while steps < HORIZON and not covered:
-        _step(arena.vehicles[i], plan[steps], room, belief)
+        _step(arena.vehicles[i], plan[steps], workspace, belief)
         steps += 1
-        _note(room, steps)
+        _note(workspace, steps)
         covered = covers(there, ahead[0])
     cost_s = steps * arena.vehicles[i].dt_s
     if covered:
-        cost_s += look_ahead(
-            there, room.reference, uas.speed_mps, ahead[1], ahead[2], ahead[AHEAD - 1], room.row
+        cost_s += observe_places(
+            there,
+            workspace.reference,
+            uas.speed_mps,
+            ahead[1],
+            ahead[2],
+            ahead[AHEAD - 1],
+            workspace.row,
         )
-        cost_s += value_of(layers, room.row)
+        cost_s += value_of(layers, workspace.row)
     else:
         # with the places after it, as in the time of a plan that covers it
         way_m = math.hypot(ahead[0, NORTH] - there[X], ahead[0, EAST] - there[Y])
@@ -186,26 +200,26 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, room, belief):
     if cost_s >= best_s:
         return np.inf, steps
     k = 1 if covered else 0
-    cost_s += detour_s(arena, around, i, room.rows[k], there, ahead[k])
-    if cost_s >= best_s or not _is_clear(arena, i, x, reference, plan[0], steps, room, belief):
+    cost_s += detour_s(arena, around, i, workspace.rows[k], there, ahead[k])
+    if cost_s >= best_s or not _is_clear(arena, i, x, reference, plan[0], steps, workspace, belief):
         return np.inf, steps
     return cost_s, steps
 
 
 @allocating_kernel
-def _aim(arena, around, i, x, reference, plan, first, way, share, room, belief):
+def _aim(arena, around, i, x, reference, plan, first, way, share, workspace, belief):
     """Fill a plan from step `first` on: towards the next waypoint, and then the one after it."""
-    uas, there, k = arena.uas[i], room.x, 0
+    uas, there, k = arena.uas[i], workspace.x, 0
     there[:] = x
-    room.reference[:] = reference
+    workspace.reference[:] = reference
     for step in range(HORIZON):
         if step >= first:
-            north_m, east_m, down_m = room.aims_m[k]
+            north_m, east_m, down_m = workspace.aims_m[k]
             altitude_m, speed_mps = -down_m, share * uas.speed_mps
             if way != STRAIGHT:
                 known = around if way == ROUND else arena
                 north_m, east_m, _, leg = route(
-                    known, room.rows[k], there[X], there[Y], there[Z], north_m, east_m, down_m
+                    known, workspace.rows[k], there[X], there[Y], there[Z], north_m, east_m, down_m
                 )
                 needed_m, most_mps = over_roofs(known, there, north_m, east_m, -down_m, uas, leg)
                 altitude_m, speed_mps = max(altitude_m, needed_m), min(speed_mps, most_mps)
@@ -217,8 +231,8 @@ def _aim(arena, around, i, x, reference, plan, first, way, share, room, belief):
             plan[step, 0] = speed_mps * north_m / length_m
             plan[step, 1] = speed_mps * east_m / length_m
             plan[step, 2] = max(altitude_m, lowest_altitude(arena, i, there[X], there[Y]))
-        _step(arena.vehicles[i], plan[step], room, belief)
-        if k == 0 and covers(there, room.ahead[0]):
+        _step(arena.vehicles[i], plan[step], workspace, belief)
+        if k == 0 and covers(there, workspace.ahead[0]):
             k = 1
 
 
@@ -242,26 +256,30 @@ def _change(plan, used, speed_mps, rng):
 
 
 @allocating_kernel
-def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room, belief):
-    """The best plan to begin with, in `room.best`: (its time [s], steps that are used, its way)."""
-    trial, best = room.trial, room.best
+def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspace, belief):
+    """Write the best plan to begin with to `workspace.best`: (time [s], steps used, its way)."""
+    trial, best = workspace.trial, workspace.best
     best_s, used, way = np.inf, HORIZON, OVER
     if kept:
         best[:] = plan
-        best_s, used = _weigh(arena, around, i, x, reference, plan, layers, best_s, room, belief)
+        best_s, used = _weigh(
+            arena, around, i, x, reference, plan, layers, best_s, workspace, belief
+        )
     for begins in (OVER, ROUND, STRAIGHT):
         for share in _BEGIN_SPEEDS:
-            _aim(arena, around, i, x, reference, trial, 0, begins, share, room, belief)
+            _aim(arena, around, i, x, reference, trial, 0, begins, share, workspace, belief)
             cost_s, steps = _weigh(
-                arena, around, i, x, reference, trial, layers, best_s, room, belief
+                arena, around, i, x, reference, trial, layers, best_s, workspace, belief
             )
             if cost_s < best_s:
                 best_s, used, way = cost_s, steps, begins
                 best[:] = trial
     for held in range(1, _BASE_HELD + 1 if has_base else 0):
-        trial[:held] = room.base
-        _aim(arena, around, i, x, reference, trial, held, OVER, 1.0, room, belief)
-        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room, belief)
+        trial[:held] = workspace.base
+        _aim(arena, around, i, x, reference, trial, held, OVER, 1.0, workspace, belief)
+        cost_s, steps = _weigh(
+            arena, around, i, x, reference, trial, layers, best_s, workspace, belief
+        )
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
@@ -269,12 +287,12 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, room, b
 
 
 @allocating_kernel
-def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room, belief):
-    """Write the best plan found to the first of `room.ahead`; whether there is one."""
-    trial, best, speed_mps = room.trial, room.best, arena.uas[i].speed_mps
-    aim_ahead(arena.vehicles[i], x, room.ahead, room.aims_m)
+def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief):
+    """Write the best plan found to the first of `workspace.ahead`; whether there is one."""
+    trial, best, speed_mps = workspace.trial, workspace.best, arena.uas[i].speed_mps
+    aim_ahead(arena.vehicles[i], x, workspace.ahead, workspace.aims_m)
     best_s, used, way = _begin(
-        arena, around, i, x, reference, layers, plan, kept, has_base, room, belief
+        arena, around, i, x, reference, layers, plan, kept, has_base, workspace, belief
     )
     if best_s == np.inf:
         return False
@@ -282,8 +300,10 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, r
         trial[:] = best
         end = _change(trial, used, speed_mps, rng)
         if rng.random() < _ANEW:
-            _aim(arena, around, i, x, reference, trial, end, way, 1.0, room, belief)
-        cost_s, steps = _weigh(arena, around, i, x, reference, trial, layers, best_s, room, belief)
+            _aim(arena, around, i, x, reference, trial, end, way, 1.0, workspace, belief)
+        cost_s, steps = _weigh(
+            arena, around, i, x, reference, trial, layers, best_s, workspace, belief
+        )
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
@@ -292,7 +312,9 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, r
 
 
 @allocating_kernel
-def plan_along(arena, around, i, x, reference, targets, layers, plan, kept, rng, room, belief=None):
+def plan_along(
+    arena, around, i, x, reference, targets, layers, plan, kept, rng, workspace, belief=None
+):
     """Write the plan whose first row is to be flown by UAS i.
 
     Args:
@@ -307,24 +329,28 @@ def plan_along(arena, around, i, x, reference, targets, layers, plan, kept, rng,
             of the step before, written.
         kept: Whether there is one.
         rng: Of the changes.
-        room: `Room`.
+        workspace: `Workspace`.
         belief: (N_BELIEF,) of its inner loop, where a wind is known; None: in still air.
 
     Returns:
         Whether there is one that is clear. Where not, the world's guidance knows better.
     """
     n_targets = len(targets)
-    leg, needed_m, speed_mps = places_along(arena, around, i, x, targets, n_targets, room.places)
-    command = room.command[0]
-    has_base = leg != NO_WAY and steer_to(
-        arena, i, x, reference, room.places, needed_m, speed_mps, layers, 1, 0.0, command
+    leg, needed_m, speed_mps = places_along(
+        arena, around, i, x, targets, n_targets, workspace.places
     )
-    room.base[:] = command.values[:3]
+    command = workspace.command[0]
+    has_base = leg != NO_WAY and steer_to(
+        arena, i, x, reference, workspace.places, needed_m, speed_mps, layers, 1, 0.0, command
+    )
+    workspace.base[:] = command.values[:3]
     if n_targets > 0:
         for k in range(AHEAD):
-            room.rows[k] = write_place(arena, i, targets, n_targets, k, room.ahead[k])
-        if _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, room, belief):
+            workspace.rows[k] = write_place(arena, i, targets, n_targets, k, workspace.ahead[k])
+        if _search(
+            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief
+        ):
             return True
-    plan[:] = room.base
+    plan[:] = workspace.base
     # of one step only, weighed as in still air
     return has_base and belief is None

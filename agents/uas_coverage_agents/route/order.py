@@ -45,7 +45,9 @@ _LEFT_OUT_S = 300.0
 
 
 @allocating_kernel
-def _outlook(mission, u, first, ready_s, place, before_m, open_, trial_ready, trial_place, todo):
+def _greedy_rollout(
+    mission, u, first, ready_s, place, before_m, open_, trial_ready, trial_place, todo
+):
     """(total, longest, left) if UAS u flies to `first` (-1: home), and all go on to the nearest."""
     n_uas = ready_s.shape[0]
     total_s, longest_s = 0.0, 0.0
@@ -125,7 +127,7 @@ def _nearest(mission, u, place, before_m, open_, candidates, leg_s):
 
 
 class RouteWorkspace(NamedTuple):
-    """Room for building routes.
+    """Arrays that the construction of routes writes to.
 
     Attributes:
         candidates: (K,) waypoints of the choice.
@@ -187,13 +189,13 @@ def observe_choices(mission, u, ready_s, place, before_m, open_, workspace):
         w = candidates[k]
         legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + _SPARE_S <= mission.budget_s[u]
         n_legal += legal[k]
-        total_s[k], longest_s[k], left[k] = _outlook(
+        total_s[k], longest_s[k], left[k] = _greedy_rollout(
             mission, u, w, ready_s, place, before_m, open_, room_ready, room_place, room_todo
         )
         cost = longest_s[k] + mission.weight * total_s[k] + 60.0 * left[k]
         if best < 0 or cost < longest_s[best] + mission.weight * total_s[best] + 60.0 * left[best]:
             best = k
-    total_s[K], longest_s[K], left[K] = _outlook(
+    total_s[K], longest_s[K], left[K] = _greedy_rollout(
         mission, u, -1, ready_s, place, before_m, open_, room_ready, room_place, room_todo
     )
     legal[K] = n_legal == 0 or (mates > 0 and left[K] <= (left[best] if best >= 0 else 0.0))
@@ -318,7 +320,7 @@ class Record(NamedTuple):
 
 
 def no_record(size: int = 0) -> Record:
-    """Room for so many decisions."""
+    """An empty record of so many decisions."""
     return Record(
         np.zeros((size, K + 1, N_ORDER), np.float32),
         np.zeros((size, K + 1), np.bool_),

@@ -36,5 +36,5 @@ class LearnedRoute(PolicyPlanner):
         self._samples = options.samples
         super().__init__(options, SHIPPED)
 
-    def _runner(self) -> RouteRunner:
+    def _make_runner(self) -> RouteRunner:
         return RouteRunner(self.policy, self.assistants, self._samples)

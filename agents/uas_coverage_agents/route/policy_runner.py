@@ -13,7 +13,7 @@ from uas_coverage_agents.route.fleet_routes import SAMPLES, FleetRoutes
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
-from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_room
+from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import LearntWind, MissionBrief, first_sight, in_disturbances
 from uas_coverage_env.mission.raised import raised
@@ -64,7 +64,7 @@ class RouteRunner:
         self._learnt: LearntWind | None = None
         if brief.conditions is not None:
             self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
-        self._room = search_room(int(self._arena.rules[0].lookahead_steps))
+        self._workspace = search_workspace(int(self._arena.rules[0].lookahead_steps))
         self._rng = np.random.default_rng(seed)
         n_uas = len(brief.uas)
         self._plans, self._kept = np.zeros((n_uas, HORIZON, 3)), np.zeros(n_uas, np.bool_)
@@ -93,7 +93,8 @@ class RouteRunner:
         belief = None if self._learnt is None else self._learnt.belief[u]
         if not plan_along(
             self._arena, self._around, u, state.x[u], state.reference[u],
-            self._routes.of(u)[:AHEAD], self._flight, plan, kept, self._rng, self._room, belief,
+            self._routes.of(u)[:AHEAD], self._flight, plan, kept, self._rng, self._workspace,
+            belief,
         ):  # fmt: skip
             return None
         velocity = plan[0].tolist()

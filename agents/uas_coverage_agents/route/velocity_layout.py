@@ -123,7 +123,7 @@ def commanded(
 
     Args:
         outputs: (N, OUTPUTS).
-        frames: (N, N_FRAME), see `look_along`.
+        frames: (N, N_FRAME), see `observe_route`.
         speeds_mps: (N,) top speeds.
 
     Returns:
@@ -145,7 +145,7 @@ def outputs_of(
 
 
 @allocating_kernel
-def _look_around(arena, x, north, east, side, angles_rad, row):
+def _cast_rays(arena, x, north, east, side, angles_rad, row):
     """Write how little is free in directions off one, the positive ones on the positive side."""
     for k in range(angles_rad.shape[0]):
         along, across = math.cos(angles_rad[k]), side * math.sin(angles_rad[k])
@@ -154,7 +154,7 @@ def _look_around(arena, x, north, east, side, angles_rad, row):
 
 
 @allocating_kernel
-def _look_at_braking(arena, i, x, reference, north_mps, east_mps, altitude_m, after, row):
+def _observe_braking(arena, i, x, reference, north_mps, east_mps, altitude_m, after, row):
     """Write how much distance is to spare if it brakes after so many steps at a velocity."""
     path_m = np.empty((arena.rules[0].lookahead_steps + MOST_HELD, 3))
     command = np.zeros(1, COMMAND_DTYPE)[0]
@@ -165,8 +165,8 @@ def _look_at_braking(arena, i, x, reference, north_mps, east_mps, altitude_m, af
 
 
 @allocating_kernel
-def look_along(arena, i, x, reference, targets, n_targets, row, frame):
-    """Write what UAS i sees along its route.
+def observe_route(arena, i, x, reference, targets, n_targets, row, frame):
+    """Write the observation of UAS i along its route.
 
     Args:
         arena: The arena.
@@ -220,19 +220,19 @@ def look_along(arena, i, x, reference, targets, n_targets, row, frame):
         row[at + _PLACE.home] = ahead[k, IS_HOME]
         bx, by, bz = aims_m[k, 0], aims_m[k, 1], aims_m[k, 2]
     at = _FIRST_AROUND
-    _look_around(arena, x, ex, ey, side, _AHEAD_RAD, row[at + _AROUND.ahead :])
+    _cast_rays(arena, x, ex, ey, side, _AHEAD_RAD, row[at + _AROUND.ahead :])
     speed = math.hypot(x[VX], x[VY])
     if speed > _STILL_MPS:
         ex, ey = x[VX] / speed, x[VY] / speed
-    _look_around(arena, x, ex, ey, side, _FLIGHT_RAD, row[at + _AROUND.flight :])
+    _cast_rays(arena, x, ex, ey, side, _FLIGHT_RAD, row[at + _AROUND.flight :])
     row[at + _AROUND.rise] = (floor_m + x[Z]) / _RISE_M
     row[at + _AROUND.pace] = min(1.0, speed_mps / arena.uas[i].speed_mps)
-    _look_at_braking(
+    _observe_braking(
         arena, i, x, reference, reference[0], reference[1], aimed_m, _BRAKED_AFTER,
         row[at + _AROUND.spare :],
     )  # fmt: skip
     top_mps = arena.uas[i].speed_mps
-    _look_at_braking(
+    _observe_braking(
         arena, i, x, reference, top_mps * frame[ALONG_NORTH], top_mps * frame[ALONG_EAST],
         aimed_m, _AHEAD_AFTER, row[at + _AROUND.spare_ahead :],
     )  # fmt: skip

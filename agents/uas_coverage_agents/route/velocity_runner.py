@@ -18,7 +18,7 @@ from uas_coverage_agents.route.velocity_layout import (
     N_FRAME,
     N_VELOCITY,
     commanded,
-    look_along,
+    observe_route,
     velocity_groups,
     velocity_networks,
 )
@@ -119,7 +119,7 @@ class RouteVelocityRunner:
     def _look(self, u: int) -> int:
         view, targets = self.routes.view, self.routes.of(u)[:AHEAD]
         self.ahead[u, : len(targets)] = targets
-        return look_along(
+        return observe_route(
             view.arena, u, view.state.x[u], view.state.reference[u], self.ahead[u], len(targets),
             self.rows[u], self.frames[u],
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Checkpoints: a training put aside in plain tensors, so that it goes on after any kill.
+"""Checkpoints: a training as plain tensors, so that it goes on after it was killed.
 
 Two files each, `NUMBER.safetensors` and `NUMBER.json`; the JSON is written last and holds the
 checksum of the other. What a kill has torn is not read: the one before takes its place.
@@ -71,14 +71,14 @@ class TrainingState(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """A training put aside.
+    """A training between two updates.
 
     Attributes:
-        standing: How far it has come.
-        tensors: Model, optimisers, random numbers and lanes, see `frozen`.
+        state: How far it has come.
+        tensors: Model, optimisers, random numbers and environments, see `to_arrays`.
     """
 
-    standing: TrainingState
+    state: TrainingState
     tensors: dict[str, NDArray[np.generic]]
 
 
@@ -91,11 +91,11 @@ def write_checkpoint(directory: Path, checkpoint: Checkpoint) -> None:
         {name: np.array(array, order="C") for name, array in checkpoint.tensors.items()}
     )
     checksum = hashlib.sha256(content).hexdigest()
-    standing = checkpoint.standing.model_copy(update={"tensors_sha256": checksum})
+    state = checkpoint.state.model_copy(update={"tensors_sha256": checksum})
     numbers = _numbers(directory)
     number = (numbers[-1] if numbers else 0) + 1
     write_atomically(directory / f"{number:06}.safetensors", content)
-    text = json.dumps(standing.model_dump(mode="json"), allow_nan=False)
+    text = json.dumps(state.model_dump(mode="json"), allow_nan=False)
     write_atomically(directory / f"{number:06}.json", text.encode())
     for old in _numbers(directory)[:-KEPT]:
         # the description goes first: without it the rest is no checkpoint
@@ -136,10 +136,10 @@ def _read(path: Path) -> Checkpoint:
         raise InputError(f"{source}: cannot be read ({' '.join(str(error).split())})") from None
     if not isinstance(data, dict):
         raise InputError(f"{source}: should be an object, not {type(data).__name__}")
-    standing = parse(data, TrainingState, source)
-    if hashlib.sha256(content).hexdigest() != standing.tensors_sha256:
+    state = parse(data, TrainingState, source)
+    if hashlib.sha256(content).hexdigest() != state.tensors_sha256:
         raise InputError(f"{tensors_path}: is not what {path.name} was written with")
     try:
-        return Checkpoint(standing, safetensors.load(content))
+        return Checkpoint(state, safetensors.load(content))
     except (SafetensorError, KeyError, ValueError, TypeError) as error:
         raise InputError(f"{tensors_path}: is no safetensors file ({error})") from None

@@ -113,7 +113,7 @@ def train(
     try:
         with filelock.FileLock(directory / ".lock", timeout=0), _shown(screen) as on_progress:
             if overwrite:
-                _throw_away(directory)
+                _discard(directory)
             _note(directory, job, screen)
             if zip_file is not None:
                 policy = loop.import_zip(job, zip_file, directory)
@@ -179,7 +179,7 @@ def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) ->
         )
 
 
-def _throw_away(directory: Path) -> None:
+def _discard(directory: Path) -> None:
     """Remove what a training has left, and nothing else."""
     for name in _OURS:
         path = directory / name

@@ -19,8 +19,8 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
 
-_FORMER = {"player": "policy"}
-"""Tables that had another name in version 0.2."""
+_FORMER = {"player": "policy", "lanes": "num_envs"}
+"""Tables and keys that had another name before."""
 
 
 class PpoSettings(StrictModel):
@@ -28,7 +28,7 @@ class PpoSettings(StrictModel):
 
     Attributes:
         algorithm: "ppo"; "maskable-ppo" where the action has a mask.
-        rollout_steps: Steps of every lane between two updates.
+        rollout_steps: Steps of every environment between two updates.
         batch_size: Samples of a gradient step.
         epochs: Passes over the samples of a rollout.
         learning_rate: At the start.
@@ -73,7 +73,7 @@ class SacSettings(StrictModel):
         buffer_size: Samples that are remembered.
         first_samples: Samples before the first update.
         batch_size: Samples of a gradient step.
-        updates_per_step: Gradient steps for a step of all lanes.
+        updates_per_step: Gradient steps for a step of all environments.
         learning_rate: At the start.
         final_share: See `PpoSettings`.
         gamma: Discount of a decision.
@@ -111,9 +111,9 @@ class TrainingConfig(StrictModel):
 
     Attributes:
         summary: What it is, in a line.
-        steps: Of all lanes together, those that wait for the others included.
-        lanes: Missions flown at the same time; a lane of the learner is one UAS of one of them
-            (velocities) or the whole team (waypoints).
+        steps: Of all environments together, those that wait for the others included.
+        num_envs: Missions flown at the same time. An environment of the learner is one UAS of one
+            of them (velocities) or the whole team (waypoints). Files may say `lanes`, as before.
         scenarios: Where.
         learning: How the network is improved.
         policy: What it reads, what it commands, and what it is paid for.
@@ -121,12 +121,14 @@ class TrainingConfig(StrictModel):
 
     summary: str
     steps: Count
-    lanes: Annotated[int, Field(ge=1, le=65_536)]
+    num_envs: Annotated[
+        int, Field(ge=1, le=65_536, validation_alias=AliasChoices("num_envs", "lanes"))
+    ]
     scenarios: TrainingScenarios
     learning: Annotated[PpoSettings | SacSettings, Field(discriminator="algorithm")]
     policy: Annotated[
         VelocitySettings | WaypointSettings,
-        Field(discriminator="interface", validation_alias=AliasChoices("policy", *_FORMER)),
+        Field(discriminator="interface", validation_alias=AliasChoices("policy", "player")),
     ]
 
     @model_validator(mode="after")
@@ -187,8 +189,7 @@ def _set(data: dict[str, Any], change: str) -> None:
         value = tomllib.loads(f"value = {text}")["value"]
     except (tomllib.TOMLDecodeError, RecursionError):
         value = text  # a plain word is text
-    *tables, last = key.split(".")
-    tables = [_FORMER.get(name, name) for name in tables]
+    *tables, last = (_FORMER.get(name, name) for name in key.split("."))
     table = data
     for name in tables:
         inner = table.get(name)

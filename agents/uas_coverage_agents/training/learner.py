@@ -12,7 +12,7 @@ from uas_coverage_agents.training.config import TrainingConfig
 
 
 class StatefulVecEnv(Protocol):
-    """A `VecEnv` that can be put aside and taken up again, bit for bit."""
+    """A `VecEnv` that is checkpointed and restored, bit for bit."""
 
     def state_dict(self) -> dict[str, NDArray[np.generic]]:
         """Everything that changes, as plain arrays by name."""

@@ -1,4 +1,4 @@
-"""The training loop: learn, look how it flies, put it aside, go on; the same for all learners."""
+"""The training loop: learn, fly for the curve, checkpoint, go on; the same for all learners."""
 
 import time
 from collections.abc import Callable
@@ -70,9 +70,9 @@ def train(
     if before is not None:
         from_arrays(before.tensors, training_run.model, training_run.lanes)
     watch = _TrainingCallback(
-        training_run, directory, before.standing if before else None, on_progress
+        training_run, directory, before.state if before else None, on_progress
     )
-    if before is None or not before.standing.done:
+    if before is None or not before.state.done:
         model = training_run.model
         model.lr_schedule = watch.learning_rate
         model.set_logger(configure(str(directory / "tensorboard"), ["tensorboard"]))
@@ -100,13 +100,13 @@ def curve_scenarios(job: TrainingJob) -> list[Scenario]:
 
 
 class _TrainingCallback(BaseCallback):
-    """Looks up between two updates: the only moments at which a training can be put aside."""
+    """Acts between two updates, the only moments at which a training can be checkpointed."""
 
     def __init__(
         self,
         training_run: TrainingRun,
         directory: Path,
-        standing: TrainingState | None,
+        state: TrainingState | None,
         on_progress: Callable[[TrainingProgress], object],
     ) -> None:
         super().__init__()
@@ -116,9 +116,9 @@ class _TrainingCallback(BaseCallback):
             on_progress,
         )
         job = training_run.job
-        self._points = list(standing.curve) if standing else []
-        self._process_before_s = (standing.process_s if standing else 0.0) - time.process_time()
-        self._wall_before_s = (standing.wall_s if standing else 0.0) - time.monotonic()
+        self._points = list(state.curve) if state else []
+        self._process_before_s = (state.process_s if state else 0.0) - time.process_time()
+        self._wall_before_s = (state.wall_s if state else 0.0) - time.monotonic()
         self._saved_at_s = time.monotonic()
         self._scenarios = curve_scenarios(job)
         self._share = 0.0
@@ -164,8 +164,8 @@ class _TrainingCallback(BaseCallback):
         self._on_progress(TrainingProgress(self._share, self.model.num_timesteps, point))
 
     def _save(self, *, done: bool) -> None:
-        """Put the training aside."""
-        standing = TrainingState(
+        """Write a checkpoint."""
+        state = TrainingState(
             steps=self.model.num_timesteps,
             updates=self.model._n_updates,
             process_s=self._training_run.process_s,
@@ -173,7 +173,7 @@ class _TrainingCallback(BaseCallback):
             done=done,
             curve=tuple(self._points),
         )
-        checkpoint = Checkpoint(standing, to_arrays(self.model, self._training_run.lanes))
+        checkpoint = Checkpoint(state, to_arrays(self.model, self._training_run.lanes))
         write_checkpoint(self._directory / CHECKPOINTS, checkpoint)
         self._saved_at_s = time.monotonic()
 

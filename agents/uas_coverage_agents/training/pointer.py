@@ -12,7 +12,7 @@ from uas_coverage_agents.policy.pointer import HOME_AT_FIRST, Pointer
 from uas_coverage_agents.training.actor_critic import ActorCritic
 from uas_coverage_agents.waypoint.layout import TEAM
 
-_OUTLOOK = [
+_ROLLOUT = [
     n for n, f in enumerate(TEAM.features) if f.name in ("total", "longest", "left", "blocked")
 ]
 """Columns that tell, linearly, most of what a mission will still cost."""
@@ -80,9 +80,9 @@ class Critic(nn.Module):
         self.out = nn.Linear(pointer.hidden, pointer.hidden)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """(..., inputs) -> (..., hidden + columns of the outlook)."""
+        """(..., inputs) -> (..., hidden + columns of the greedy rollout)."""
         _, _, t = self.pool(x)
-        return torch.cat([torch.relu(self.out(t)), x[:, _OUTLOOK]], 1)
+        return torch.cat([torch.relu(self.out(t)), x[:, _ROLLOUT]], 1)
 
 
 class PointerPolicy(MaskableActorCriticPolicy):
@@ -100,7 +100,7 @@ class PointerPolicy(MaskableActorCriticPolicy):
 
     def _build_mlp_extractor(self) -> None:
         pointer = self.pointer
-        critic_width = pointer.hidden + len(_OUTLOOK)
+        critic_width = pointer.hidden + len(_ROLLOUT)
         both: Any = ActorCritic(
             PointerActor(pointer), pointer.outputs, Critic(pointer), critic_width
         )

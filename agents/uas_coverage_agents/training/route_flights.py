@@ -16,17 +16,20 @@ from uas_coverage_agents.route.leg_flight import (
     N_VELOCITIES,
     NORTH,
     RADIUS,
-    look_ahead,
+    observe_places,
     weigh,
 )
 from uas_coverage_agents.training.route_labels import Label, town_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES, X, Y, Z, fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 from uas_coverage_env.world.commands import VELOCITY
 
 MOST_STEPS = 900
+
+_COVERED, _STRAIGHT_S = range(2)
+"""What is noted of each step: waypoints covered so far, and the time of the straight way [s]."""
 
 
 class Course(NamedTuple):
@@ -53,16 +56,16 @@ def _places_ahead(places, covered, ahead):
 
 
 @allocating_kernel
-def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table):
-    """Fly a route; (steps, covered). Rows of `table`: covered so far, and the straight way [s]."""
+def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, notes):
+    """Fly a route; (steps, covered). Writes what the network reads to `rows`, and `notes`."""
     n = places.shape[0] - 1
-    x, reference, u = np.zeros(14), np.zeros(2), np.zeros(5)
+    x, reference, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
     x[:3] = uas.home_m
     command = np.zeros(1, COMMAND_DTYPE)[0]
     ahead, aims_m = np.empty((AHEAD, 5)), np.empty((AHEAD, 3))
     commands, costs = np.empty((N_VELOCITIES, 3)), np.empty(N_VELOCITIES)
     covered = 0
-    for step in range(table.shape[0]):
+    for step in range(notes.shape[0]):
         while covered < n:
             at = places[covered]
             dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
@@ -70,8 +73,8 @@ def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table):
                 break
             covered += 1
         _places_ahead(places, covered, ahead)
-        table[step, 0] = covered
-        table[step, 1] = look_ahead(
+        notes[step, _COVERED] = covered
+        notes[step, _STRAIGHT_S] = observe_places(
             x, reference, uas.speed_mps, ahead[0], ahead[1], ahead[2], rows[step]
         )
         if covered == n:
@@ -90,7 +93,7 @@ def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table):
         write_command(command, VELOCITY, commands[best, 0], commands[best, 1], commands[best, 2])
         command_wrench(vehicle, x, reference, command, u)
         fly_kinematics(vehicle, x, u)
-    return table.shape[0], covered
+    return notes.shape[0], covered
 
 
 def courses_of(labels: list[Label]) -> list[Course]:
@@ -119,18 +122,18 @@ def flown(
     """Fly all courses: what can be learned, and their steps over those that were planned."""
     rows_of, beyond_of, steps, planned = [], [], 0, 0
     for course in courses:
-        rows, table = np.zeros((MOST_STEPS, N_FLIGHT)), np.zeros((MOST_STEPS, 2))
+        rows, notes = np.zeros((MOST_STEPS, N_FLIGHT)), np.zeros((MOST_STEPS, 2))
         uas, vehicle, rules, places, planned_steps = course
-        end, covered = _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, table)
+        end, covered = _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, notes)
         steps, planned = steps + end, planned + planned_steps
         n = len(places) - 1
         if covered < n or end == MOST_STEPS:
             continue
-        done = table[: end + 1, 0]
+        done = notes[: end + 1, _COVERED]
         times = np.full(n + 3, float(end))  # at which each place is reached; home at the end
         times[:n] = np.searchsorted(done, np.arange(1, n + 1))
         third = times[(done + 2).astype(int)]
-        beyond = third - np.arange(end + 1) - table[: end + 1, 1]
+        beyond = third - np.arange(end + 1) - notes[: end + 1, _STRAIGHT_S]
         rows_of.append(rows[: end + 1].astype(np.float32))
         beyond_of.append(beyond.astype(np.float32))
     return Samples(np.concatenate(rows_of), np.concatenate(beyond_of)), steps / planned

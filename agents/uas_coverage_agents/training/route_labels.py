@@ -1,4 +1,4 @@
-"""What a route policy is taught by: towns, and the routes that a planner would fly there."""
+"""Labels for a route policy: towns, and the routes that a planner would fly there."""
 
 import json
 from pathlib import Path

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Interval, Policy, Score
-from uas_coverage_agents.policy.planner import pilot_of
+from uas_coverage_agents.policy.planner import runner_of
 from uas_coverage_env.flight import (
     Assistants,
     Flight,
@@ -44,7 +44,7 @@ def fly(
         (missions, measures) in the order of MEASURES.
     """
     assistants = Assistants(return_mode=return_mode, safety_filter=safety_filter)
-    runner = pilot_of(policy, assistants)
+    runner = runner_of(policy, assistants)
     return np.array(
         [
             measured(

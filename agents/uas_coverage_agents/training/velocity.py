@@ -167,7 +167,7 @@ class VelocityLearner:
         """The environment to learn in."""
         settings = _settings(config)
         lanes = CoverageVecEnv(
-            config.lanes,
+            config.num_envs,
             some_with_moving_obstacles(
                 training_scenarios(config.scenarios, seed), settings.moving_share, seed
             ),

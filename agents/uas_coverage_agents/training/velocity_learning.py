@@ -1,10 +1,10 @@
 """Train velocities along routes: `python -m uas_coverage_agents.training.velocity_learning OUT`.
 
-`learned-route` is the teacher: it builds the routes, and says in every state that the pupil comes
+`learned-route` is the expert: it builds the routes, and says in every state that the learner comes
 to which velocity its `leg_flight` would choose, after simulating eighty of them. It is more
-cautious than on its own, since the pupil errs, and says what leads away from where it would not
-have come. The pupil, one network, learns to say the same without weighing anything (DAgger: Ross,
-Gordon, Bagnell 2011). In the first round the teacher flies, in the second either, then the pupil.
+cautious than on its own, since the learner errs, and says what leads away from where it would not
+have come. The learner, one network, learns to say the same without weighing anything (DAgger: Ross,
+Gordon, Bagnell 2011). In the first round the expert flies, in the second either, then the learner.
 Nothing here is tuned on the set `test`.
 """
 
@@ -40,7 +40,7 @@ from uas_coverage_agents.route.leg_flight import (
     spare_distance,
     steer_along,
 )
-from uas_coverage_agents.route.planner import SHIPPED as TEACHER
+from uas_coverage_agents.route.planner import SHIPPED as EXPERT
 from uas_coverage_agents.route.velocity_layout import (
     AIMED_M,
     N_VELOCITY,
@@ -78,7 +78,7 @@ class DaggerSettings(StrictModel):
         levels: Of wind and wrong models that are flown in turn with still air.
         rounds: Of flying, and of learning from all that was flown so far.
         towns_per_round: How many.
-        led: Share of the steps that the teacher flies, in the first rounds; later ones: none.
+        led: Share of the steps that the expert flies, in the first rounds; later ones: none.
         asked: Share of the other steps in which it is asked; neighbouring ones say much the same.
         samples: Sets of routes that are built.
         hidden: Widths of the layers between.
@@ -88,7 +88,7 @@ class DaggerSettings(StrictModel):
         rate: At which is learned at first.
         beta: Error above which the loss (smooth L1) is linear.
         near_weight: Further weight of steps in which it is late to brake: an error costs a UAS.
-        held: Steps for which the teacher's velocity could be flown before braking.
+        held: Steps for which the expert's velocity could be flown before braking.
         spare_m: Distance that is left then, beyond what has to be kept [m].
     """
 
@@ -117,25 +117,25 @@ class DaggerSettings(StrictModel):
         return ScenarioFamily(name="generated", towns=self.towns)
 
 
-class Lesson(NamedTuple):
-    """What was seen, and the outputs that the teacher would have given: (N, ...) each."""
+class ExpertLabels(NamedTuple):
+    """What was seen, and the outputs that the expert would have given: (N, ...) each."""
 
     rows: NDArray[np.float64]
     outputs: NDArray[np.float64]
 
 
-class TaughtRunner(RouteVelocityRunner):
-    """Flies, and notes what it saw and what the teacher would have flown there.
+class DaggerRunner(RouteVelocityRunner):
+    """Flies, and notes what it saw and what the expert would have flown there.
 
     Args:
         policy: Of the interface "route-velocity".
-        teacher: Of the interface "route".
-        led: Share of the steps that the teacher flies.
-        settings: Of routes, and how often the teacher is asked in other steps.
+        expert: Of the interface "route".
+        led: Share of the steps that the expert flies.
+        settings: Of routes, and how often the expert is asked in other steps.
         rng: Draws the steps.
 
     Attributes:
-        lessons: What was noted, one for each step in which it was asked.
+        labels: What was noted, one for each step in which it was asked.
     """
 
     learned_up_to_mps = math.inf  # what is to be learned is flown in any wind
@@ -143,35 +143,35 @@ class TaughtRunner(RouteVelocityRunner):
     def __init__(
         self,
         policy: Policy,
-        teacher: Policy,
+        expert: Policy,
         led: float,
         settings: DaggerSettings,
         rng: np.random.Generator,
     ) -> None:
         super().__init__(policy, Assistants(), settings.samples)
-        self._teacher = _flight_of(teacher)
+        self._expert = _flight_of(expert)
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
         self._led, self._settings, self._rng = led, settings, rng
-        self.lessons: list[Lesson] = []
+        self.labels: list[ExpertLabels] = []
 
     def velocities(self, flown: Sequence[int]) -> NDArray[np.float64]:
-        """Those of the teacher, where it leads, or of the network."""
+        """Those of the expert, where it leads, or of the network."""
         leads, asked = self._rng.random(2) < (self._led, self._settings.asked)
         if not (leads or asked):
             return super().velocities(flown)
-        taught = np.array([self._taught(u) for u in flown])
+        labelled = np.array([self._expert_velocity(u) for u in flown])
         speeds_mps = self.routes.view.arena.uas[flown]["speed_mps"]
-        outputs = outputs_of(taught, self.frames[flown], speeds_mps)
-        self.lessons.append(Lesson(self.rows[flown], outputs))
-        return taught if leads else super().velocities(flown)
+        outputs = outputs_of(labelled, self.frames[flown], speeds_mps)
+        self.labels.append(ExpertLabels(self.rows[flown], outputs))
+        return labelled if leads else super().velocities(flown)
 
-    def _taught(self, u: int) -> list[float]:
+    def _expert_velocity(self, u: int) -> list[float]:
         view, n = self.routes.view, min(len(self.routes.of(u)), AHEAD)
         x, reference = view.state.x[u], view.state.reference[u]
-        # with more caution than the teacher flies itself, since the pupil errs
+        # with more caution than the expert flies itself, since the learner errs
         for held, spare_m in ((self._settings.held, self._settings.spare_m), (1, 0.0)):
             if steer_along(
-                view.arena, u, x, reference, self.ahead[u], n, self._teacher, held, spare_m,
+                view.arena, u, x, reference, self.ahead[u], n, self._expert, held, spare_m,
                 self._command,
             ):  # fmt: skip
                 return self._command["values"][:3].tolist()
@@ -200,7 +200,7 @@ class TaughtRunner(RouteVelocityRunner):
 
 
 class VelocityTraining:
-    """One training: the network, its teacher, and what was noted so far.
+    """One training: the network, its expert, and what was noted so far.
 
     Args:
         seed: Of network, samples and towns.
@@ -211,7 +211,7 @@ class VelocityTraining:
         torch.set_num_threads(1)
         torch.manual_seed(seed)
         self.settings = settings or DaggerSettings()
-        self.seed, self.teacher = seed, load_policy(TEACHER)
+        self.seed, self.expert = seed, load_policy(EXPERT)
         self._rng = np.random.default_rng(seed)
         self._network = fresh_network(self.settings.hidden)
         self._rows = torch.zeros((0, N_VELOCITY))
@@ -220,21 +220,21 @@ class VelocityTraining:
 
     @property
     def steps(self) -> int:
-        """Velocities that were taught so far."""
+        """Velocities that were labelled so far."""
         return len(self._rows)
 
     def fly_and_note(self, number: int) -> None:
         """Fly the towns of a round, home without return mode."""
         settings = self.settings
         led = settings.led[number] if number < len(settings.led) else 0.0
-        runner = TaughtRunner(self.policy(), self.teacher, led, settings, self._rng)
+        runner = DaggerRunner(self.policy(), self.expert, led, settings, self._rng)
         first = (self.seed * settings.rounds + number) * settings.towns_per_round
         for k in range(first, first + settings.towns_per_round):
             # without the filter, states come up in which it would have had to help
             rollout(
                 mission_of(settings, k), runner, return_mode=False, safety_filter=k % 3 == 0, seed=k
             )
-        rows, outputs = (np.concatenate(part) for part in zip(*runner.lessons, strict=True))
+        rows, outputs = (np.concatenate(part) for part in zip(*runner.labels, strict=True))
         self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
         self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
 
@@ -258,16 +258,16 @@ class VelocityTraining:
                 optimiser.step()
 
     def policy(self) -> Policy:
-        """What flies now; its orders are the teacher's."""
+        """What flies now; its orders are the expert's."""
         modules = [module for module in self._network if isinstance(module, nn.Linear)]
-        tensors = {n: t for n, t in self.teacher.tensors.items() if not n.startswith("flight.")}
+        tensors = {n: t for n, t in self.expert.tensors.items() if not n.startswith("flight.")}
         for k, module in enumerate(modules):
             for part in ("weight", "bias"):
                 array = getattr(module, part).detach().numpy().astype(np.float64)
                 tensors[f"flight.layers.{k}.{part}"] = array
         description = PolicyDescription(
             interface="route-velocity",
-            network=velocity_networks(_networks_of(self.teacher).order, self.settings.hidden),
+            network=velocity_networks(_networks_of(self.expert).order, self.settings.hidden),
             observation=velocity_observation(),
             scenarios=self.settings.family,
             training=Training(
@@ -321,8 +321,8 @@ def _networks_of(policy: Policy) -> RouteNetworks:
     return network
 
 
-def _flight_of(teacher: Policy) -> Layers:
-    return layers_of(_networks_of(teacher).flight, teacher.tensors, "flight.")
+def _flight_of(expert: Policy) -> Layers:
+    return layers_of(_networks_of(expert).flight, expert.tensors, "flight.")
 
 
 def train(training: VelocityTraining, directory: Path, missions: int) -> None:

@@ -27,7 +27,7 @@ class WaypointLearner:
         scenarios = some_with_moving_obstacles(
             training_scenarios(config.scenarios, seed), settings.moving_share, seed
         )
-        return WaypointVecEnv(scenarios, settings, config.lanes, seed)
+        return WaypointVecEnv(scenarios, settings, config.num_envs, seed)
 
     def model(self, config: TrainingConfig, lanes: VecEnv, seed: int) -> BaseAlgorithm:
         """A model that takes the nearest waypoint at first."""

@@ -1,4 +1,4 @@
-"""The memory of a pilot: looking away for a while from a waypoint that is not to be had now."""
+"""Detects UAS that are stuck: hides for a while a waypoint that cannot be covered now."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -356,7 +356,7 @@ def _scale(table, unit, numbers, row):
 
 @allocating_kernel
 def _worth(total_s, longest_s, left, k, best):
-    """Whether the outlook of choice k is better than that of the best so far."""
+    """Whether the greedy rollout of choice k is better than that of the best so far."""
     cost_s = total_s[k] + longest_s[k] + 120.0 * left[k]
     return cost_s < total_s[best] + longest_s[best] + 120.0 * left[best]
 

@@ -32,5 +32,5 @@ class LearnedWaypoint(PolicyPlanner):
         self._simulations = options.simulations
         super().__init__(options, SHIPPED)
 
-    def _runner(self) -> WaypointRunner:
+    def _make_runner(self) -> WaypointRunner:
         return WaypointRunner(self.policy, self.assistants, self._simulations)

@@ -156,7 +156,7 @@ class WaypointRunner:
                 self._weights, choices.observation, choices.legal, self._workspace.scores
             )
             if not looked_ahead:
-                self._look_ahead(state)
+                self._search(state)
                 looked_ahead = True
             follow = planned(
                 state.uncovered, self._plan, self._plan.following, i, choices.candidates,
@@ -167,7 +167,7 @@ class WaypointRunner:
         self._returning[:] |= state.returning & ~silent & ~swarm.returning
         self._returning &= swarm.status == FLYING
 
-    def _look_ahead(self, state: WorldState) -> None:
+    def _search(self, state: WorldState) -> None:
         """Make the plan better; the observation in the workspace is lost."""
         choices = self._workspace.choices
         kept = choices.candidates.copy(), choices.legal.copy()

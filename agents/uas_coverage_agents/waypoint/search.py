@@ -70,7 +70,7 @@ class Moment(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Room for one simulated mission: its state, an observation and what follows from it."""
+    """Arrays of one simulated mission: its state, an observation and what follows from it."""
 
     state: WorldState
     commands: NDArray[np.void]
@@ -144,7 +144,7 @@ def simulate(
         change_at: Number of the decision at which another choice is drawn; NEVER for none.
         keep_on: Whether the plan is followed after that, as far as it fits; else, and where the
             plan has nothing for a UAS, the policy decides.
-        workspace: Room.
+        workspace: Written.
         rng: Random numbers.
         new: `TargetPlan`; what was flown is written.
 
@@ -213,9 +213,9 @@ def improve(
         assistants: See `simulate`.
         plan: The plan so far; may be empty.
         n_simulations: How many are tried.
-        workspace: Room.
+        workspace: Written.
         rng: Random numbers.
-        trial: `TargetPlan`, room.
+        trial: `TargetPlan`; written.
         best: `TargetPlan`; written.
 
     Returns:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs.pilot import LegPilot
+from uas_coverage_baselines.by_legs.follower import LegFollower
 from uas_coverage_baselines.routing import (
     RoutingTask,
     SearchEffort,
@@ -26,7 +26,7 @@ _RESERVE_S = 30.0
 
 
 class LegMission:
-    """Routes of the fleet, flown by a `LegPilot`.
+    """Routes of the fleet, flown by a `LegFollower`.
 
     Args:
         brief: A mission that an autopilot flies.
@@ -37,7 +37,7 @@ class LegMission:
 
     def __init__(self, brief: MissionBrief, searches: int, effort: SearchEffort, seed: int) -> None:
         self._brief, self._effort, self._seed = brief, effort, seed
-        self._pilot, self._handover = LegPilot(brief), Handover(brief)
+        self._follower, self._handover = LegFollower(brief), Handover(brief)
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         swarm = first_sight(brief)
         works = np.ones(len(brief.uas), np.bool_)
@@ -48,7 +48,7 @@ class LegMission:
         ]
         self._order = min(orders, key=lambda order: order.cost_s)
         self._worked = works
-        self._pilot.begin([route.tolist() for route in self._order.routes])
+        self._follower.begin([route.tolist() for route in self._order.routes])
 
     def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
         """A command for each active UAS.
@@ -56,7 +56,7 @@ class LegMission:
         Args:
             swarm: What is seen.
         """
-        works = self._handover.workers(swarm) & ~swarm.returning & ~self._pilot.returns
+        works = self._handover.workers(swarm) & ~swarm.returning & ~self._follower.returns
         routed = np.zeros(len(swarm.uncovered), np.bool_)
         routed[self._order.left_out] = True
         for u, route in enumerate(self._order.routes):
@@ -72,10 +72,10 @@ class LegMission:
             route[swarm.uncovered[route]].tolist() if works[u] else []
             for u, route in enumerate(self._order.routes)
         ]
-        return self._pilot.commands(swarm, routes)
+        return self._follower.commands(swarm, routes)
 
     def _task(self, swarm: SwarmState, works: BoolArray) -> RoutingTask:
-        brief, terrain, x = self._brief, self._pilot.planner.terrain, swarm.x
+        brief, terrain, x = self._brief, self._follower.planner.terrain, swarm.x
         uas = terrain.arena.uas
         share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         left_s = share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]

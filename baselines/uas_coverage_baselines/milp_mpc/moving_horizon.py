@@ -23,8 +23,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
+from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
 from uas_coverage_baselines.milp_mpc.steering import Steering
-from uas_coverage_baselines.milp_mpc.unheard import Unheard
 from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import (
@@ -114,7 +114,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
         self._attempts, self._handover = Attempts(brief), Handover(brief)
-        self._unheard = Unheard(brief, self.options.moving_margin_m)
+        self._silent_uas = SilentUas(brief, self.options.moving_margin_m)
         self._called = set[str]()  # UAS whose plans have left no charge but for the way home
         self.last_decision = None
 
@@ -140,7 +140,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         began, self._returning_home = time.perf_counter(), frozenset[str]()
         wanted = self._attempts.wanted(swarm.uncovered)
         seen = swarm if wanted is swarm.uncovered else dataclasses.replace(swarm, uncovered=wanted)
-        problem = self._unheard.beside(self.problem(seen), whole, silent)
+        problem = self._silent_uas.beside(self.problem(seen), whole, silent)
         if any(plan and set(problem.names) - set(plan.names) for plan in (self.plan, self._backup)):
             self.plan = self._backup = None  # one that is back has a part in neither
         if self._in_wind is not None:

@@ -45,7 +45,7 @@ class Around(NamedTuple):
         fence_m: (F,) distances from the faces of the fence.
         height_m: Above the ground, outside of the landing zone.
         others_m: (U, N+1, 3) where the others are going; NaN where none is flying.
-        path_m: (K, 3) room for a braking flight.
+        path_m: (K, 3) written: a braking flight.
     """
 
     keep_m: FloatArray
@@ -56,7 +56,7 @@ class Around(NamedTuple):
 
 
 @allocating_kernel
-def look_around(arena, i, x, others_m):
+def distances_kept(arena, i, x, others_m):
     """What is kept from obstacles, fence and ground: less where there is less already."""
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
     keep_m = np.empty(arena.obstacles.shape[0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, cost_s, look_around
+from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, cost_s, distances_kept
 from uas_coverage_baselines.tour.pursuit import LEGS, aim, begin, pull_clear, push_to_guidance
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
@@ -94,7 +94,7 @@ def improve(arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, comma
         Estimated flight time to the end [s]; above SAFE_BELOW_S where the plan is not safe.
     """
     x, reference = plan.x[0], plan.reference[0]
-    around = look_around(arena, i, x, others_m)
+    around = distances_kept(arena, i, x, others_m)
     n_legs = min(len(task.route), LEGS)
     begin(plan, x, reference)
     begin(trial, x, reference)

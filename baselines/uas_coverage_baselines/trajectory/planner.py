@@ -27,7 +27,7 @@ from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
-from uas_coverage_baselines.trajectory.waiting import opens_again, opens_first, who_waits
+from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
     Handover,
@@ -361,7 +361,7 @@ class Trajectory:
         unknown = (opens >= NEVER) & swarm.uncovered
         effort = Effort.of(self.options, moment, self.total_weight, first=first)
         self._latest_visit = np.full(len(unknown), NEVER)
-        self._waiting = who_waits(self._fleet, self._way_home, moment, unknown)
+        self._waiting = choose_waiting(self._fleet, self._way_home, moment, unknown)
         if unknown.any():
             latest = self._waiting.latest
             self._latest_visit[unknown] = swarm.step + latest[unknown]

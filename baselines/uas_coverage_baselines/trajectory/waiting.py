@@ -48,7 +48,9 @@ class Waiting(NamedTuple):
         return bool(self.barred[busy][:, asked].all(axis=0).any())
 
 
-def who_waits(fleet: Fleet, way_home: Range, moment: Moment, blocked: NDArray[np.bool_]) -> Waiting:
+def choose_waiting(
+    fleet: Fleet, way_home: Range, moment: Moment, blocked: NDArray[np.bool_]
+) -> Waiting:
     """The UAS that can wait longest, and all whose battery outlasts the mission.
 
     Were these to fly home while another one waits, none would be left when its charge runs out.

@@ -5,17 +5,19 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.style import printed, shade, width_in
 
 _MILLISECONDS_BELOW_S = 0.1
+_WIDE_IN = 4.5
 _OFF_SCALE = 1.3
 """Times the longest of the others, from which on the first decision does not set the axis."""
 
 
 def decision_time_figure(flight: Flight) -> Figure:
-    """Each decision's time at its step on the left, the share of decisions that are faster right.
+    """Each decision's time at its step, and the share of decisions that are faster.
 
     Raises:
         InputError: The flight holds no decision.
@@ -30,8 +32,13 @@ def decision_time_figure(flight: Flight) -> Figure:
     unit, scale = ("ms", 1e3) if fast else ("s", 1.0)
     times_s = flight.time_s[: len(durations_s)]
     with printed():
-        figure = Figure(figsize=(width_in(), 2.7), layout="constrained")
-        series, shares = figure.subplots(1, 2, width_ratios=[1.6, 1.0], sharey=True)
+        wide = width_in() >= _WIDE_IN
+        figure = Figure(figsize=(width_in(), 2.7 if wide else 4.4), layout="constrained")
+        if wide:
+            series, shares = figure.subplots(1, 2, width_ratios=[1.4, 1.0], sharey=True)
+        else:
+            series, shares = figure.subplots(2, 1, sharey=True)
+            shares.set_ylabel(f"Decision time, {unit}")
         ink = shade(colours.BLUE)
         series.plot(times_s, scale * durations_s, color=ink, linewidth=0.6, alpha=0.5)
         series.plot(times_s, scale * durations_s, "o", color=ink, markersize=2.2)
@@ -51,7 +58,7 @@ def decision_time_figure(flight: Flight) -> Figure:
             value = float(np.percentile(ordered, percent))
             shares.plot(percent / 100, value, "o", color=ink, markersize=3.5)
             shares.annotate(
-                f"{percent} %: {value:.3g} {unit}",
+                f"{percent} %: {three_digits(value)}",
                 (percent / 100, value),
                 xytext=(-6, 5),
                 textcoords="offset points",
@@ -79,7 +86,7 @@ def decision_time_figure(flight: Flight) -> Figure:
         series.set_ylim(bottom=0, top=1.12 * drawn)
         if durations_s[0] > _OFF_SCALE * later_s:
             series.annotate(
-                f"first: {scale * durations_s[0]:.3g} {unit} ↑",
+                f"first: {three_digits(scale * durations_s[0])} {unit} ↑",
                 (0.0, 1.0),
                 xycoords="axes fraction",
                 xytext=(6, -9),

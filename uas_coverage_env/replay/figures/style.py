@@ -122,7 +122,10 @@ def _set(read: Any, line: str, where: str) -> None:
 
 def printed() -> AbstractContextManager[None]:
     """Figures are made and saved within this context; what a person has set stays as it was."""
-    return mpl.rc_context({**mpl.rcParamsDefault, **_RC, **_style.get({})})
+    style = _style.get({})
+    # the grids of a style that does not draw them itself are not meant to be behind curves
+    grids: dict[Any, Any] = {"axes.grid": False} if "grid.color" in style else {}
+    return mpl.rc_context({**mpl.rcParamsDefault, **_RC, **grids, **style})
 
 
 def rows(height_in: float, heights: list[float]) -> tuple[Figure, list[Axes]]:

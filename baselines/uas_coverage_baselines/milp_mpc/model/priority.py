@@ -148,12 +148,12 @@ def _reconnected_m(places, along, taken, roots, in_order, first, last):
             if not outside or not first[taken] <= position < last[taken]:
                 w = in_order[position]
                 for side in (-1, 1):
-                    _look_aside(places, along, w, side, taken, mine, children, first, last, squared)
+                    _scan_side(places, along, w, side, taken, mine, children, first, last, squared)
     return _tree_m(squared)
 
 
 @allocating_kernel(nogil=True)
-def _look_aside(places, along, w, side, taken, mine, children, first, last, squared):
+def _scan_side(places, along, w, side, taken, mine, children, first, last, squared):
     """Shorten what joins branch `mine` to others by edges from one of its places to one side."""
     farthest = squared[mine].max()
     other = w + side

@@ -35,8 +35,11 @@ from uas_coverage_env.vehicle import (
     WZ,
     LinearModel,
 )
+from uas_coverage_env.vehicle.layout import VOLTAGE
 
 _BATTERY = [DOD, U_TH]
+_DOD = _BATTERY.index(DOD)
+_VOLTAGE, _CURRENT = range(2)  # of the outputs from VOLTAGE on
 _YAW = [PSI, WZ]
 _MOTION = [state for state in range(N_STATES) if state not in _BATTERY]
 _AT_REST = 1e-9  # far below the solver's tolerance
@@ -105,18 +108,18 @@ class BatteryFromThrust:
             start, gain = _response(model, problem.x0[uas, _BATTERY], problem.horizon)
             thrust = v.u[uas, :, DELTA_THRUST]
             per_dod = problem.weights.energy / model.E[DOD]
-            milp.minimize(per_dod * gain[1:, 0].sum(axis=0), thrust)
-            milp.add_constant(per_dod * float(start[1:, 0].sum()))
-            C, D = model.C[1:, _BATTERY], model.D[1:, DELTA_THRUST]
+            milp.minimize(per_dod * gain[1:, _DOD].sum(axis=0), thrust)
+            milp.add_constant(per_dod * float(start[1:, _DOD].sum()))
+            C, D = model.C[VOLTAGE:, _BATTERY], model.D[VOLTAGE:, DELTA_THRUST]
             own = np.eye(problem.horizon)[:, None, :]  # Delta T of the same step
             output = np.einsum("oz,nzk->nok", C, gain[:-1]) + D[:, None] * own
-            level = start[:-1] @ C.T + model.F[1:]
+            level = start[:-1] @ C.T + model.F[VOLTAGE:]
             battery, limits = vehicle.battery, vehicle.limits
             span = (limits.delta_thrust_min_N, limits.delta_thrust_max_N)
             for name, rows, at_rest, low, high in (
-                ("dod", gain[1:, 0], start[1:, 0], -np.inf, battery.dod_cutoff),
-                ("voltage", output[:, 0], level[:, 0], battery.voltage_min_V, np.inf),
-                ("current", output[:, 1], level[:, 1], 0.0, battery.current_max_A),
+                ("dod", gain[1:, _DOD], start[1:, _DOD], -np.inf, battery.dod_cutoff),
+                ("voltage", output[:, _VOLTAGE], level[:, _VOLTAGE], battery.voltage_min_V, np.inf),
+                ("current", output[:, _CURRENT], level[:, _CURRENT], 0.0, battery.current_max_A),
             ):
                 least = at_rest + np.minimum(rows * span[0], rows * span[1]).sum(axis=1)
                 most = at_rest + np.maximum(rows * span[0], rows * span[1]).sum(axis=1)

@@ -20,9 +20,9 @@ from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_baselines.milp_mpc.model.reductions.travel import (
     exclusive,
-    looked_at,
     partition,
     steps_between,
+    support_of_waypoints,
 )
 from uas_coverage_env.geometry import cylinder_faces, sphere_faces
 
@@ -62,7 +62,7 @@ class LiftedBoxes:
 def _directions(problem: PlanningProblem):
     """Faces of a waypoint's polyhedron; of a box the four horizontal diagonals, too."""
     faces = sphere_faces(problem.waypoint_sides)
-    known, support = looked_at(problem)
+    known, support = support_of_waypoints(problem)
     if problem.waypoint_sides > 4:
         return known, support
     diagonal = cylinder_faces(8)

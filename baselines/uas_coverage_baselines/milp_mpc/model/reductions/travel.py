@@ -23,7 +23,7 @@ from uas_coverage_env.geometry import cylinder_faces, sphere_faces
 FloatArray = NDArray[np.float64]
 
 
-def looked_at(problem: PlanningProblem) -> tuple[FloatArray, FloatArray]:
+def support_of_waypoints(problem: PlanningProblem) -> tuple[FloatArray, FloatArray]:
     """Directions (F, 3) in which a waypoint's polyhedron is known, and its support (W, F) [m].
 
     These are its faces; where it is a box, directions between the faces too.
@@ -40,7 +40,7 @@ def looked_at(problem: PlanningProblem) -> tuple[FloatArray, FloatArray]:
 
 def steps_between(problem: PlanningProblem) -> NDArray[np.int64]:
     """(U, W, W) least number of steps from a visit of one waypoint to one of another."""
-    directions, support = looked_at(problem)
+    directions, support = support_of_waypoints(problem)
     away = (problem.waypoints_m[None] - problem.waypoints_m[:, None]) @ directions.T
     opposite = np.array([np.argmin(np.abs(directions + f).sum(axis=1)) for f in directions])
     gap = away - support[:, None] - support[None][..., opposite]  # (W, W, F)

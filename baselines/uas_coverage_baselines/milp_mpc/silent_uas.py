@@ -13,7 +13,7 @@ from uas_coverage_env.vehicle import VX, VZ
 from uas_coverage_env.world import SwarmState
 
 
-class Unheard:
+class SilentUas:
     """Moving obstacles in place of UAS that take no commands.
 
     Args:

@@ -32,7 +32,7 @@ _MISSED = 3
 """So often a waypoint is missed before it is left out."""
 
 
-class LegPilot:
+class LegFollower:
     """Commands along routes.
 
     Args:
