@@ -40,7 +40,9 @@ WAY_HOME, MATE_FREE, TIME_LEFT, ENOUGH_MATES = range(10, 14)
 N_ORDER = CLOSER_HOME + 1
 """Numbers that are read about each choice."""
 
-_SPARE_S = 8.0
+SPARE_S = 8.0
+"""Flying time [s] that a route leaves at least."""
+
 _LEFT_OUT_S = 300.0
 
 
@@ -83,7 +85,7 @@ def _outlook(mission, u, first, ready_s, place, before_m, open_, trial_ready, tr
             if row[todo[t]] < row[todo[at]]:
                 at = t
         w = todo[at]
-        if trial_ready[j] + row[w] + mission.home_s[j, w] + _SPARE_S > mission.budget_s[j]:
+        if trial_ready[j] + row[w] + mission.home_s[j, w] + SPARE_S > mission.budget_s[j]:
             home_s = mission.here_home_s[j]
             if trial_place[j] != IN_THE_AIR:
                 home_s = mission.home_s[j, trial_place[j]]
@@ -185,7 +187,7 @@ def observe_choices(mission, u, ready_s, place, before_m, open_, workspace):
     best, n_legal = -1, 0
     for k in range(n):
         w = candidates[k]
-        legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + _SPARE_S <= mission.budget_s[u]
+        legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + SPARE_S <= mission.budget_s[u]
         n_legal += legal[k]
         total_s[k], longest_s[k], left[k] = _outlook(
             mission, u, w, ready_s, place, before_m, open_, room_ready, room_place, room_todo
