@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_agents.route.improvement import improve
 from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
-from uas_coverage_agents.route.order import build, no_record, route_workspace
+from uas_coverage_agents.route.order import SPARE_S, build, no_record, route_workspace
 from uas_coverage_env.mission import (
     GuidedFlight,
     Handover,
@@ -37,7 +38,8 @@ class FleetRoutes:
         seed: Of the noise of samples.
         score: `Layers` that score a waypoint.
         home_score: `Layers` that score home.
-        samples: Sets of routes that are built; the cheapest by estimated times are flown.
+        samples: Sets of routes that are built.
+        changes: By which the cheapest of these, by estimated times, is improved before it is flown.
 
     Attributes:
         view: The world as the planner sees it, at the latest update.
@@ -45,9 +47,16 @@ class FleetRoutes:
     """
 
     def __init__(
-        self, brief: MissionBrief, seed: int, score: Layers, home_score: Layers, samples: int
+        self,
+        brief: MissionBrief,
+        seed: int,
+        score: Layers,
+        home_score: Layers,
+        samples: int,
+        changes: int = 0,
     ) -> None:
-        self._score, self._home_score, self._samples = score, home_score, samples
+        self._score, self._home_score = score, home_score
+        self._samples, self._changes = samples, changes
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
         self._guided, self._handover = GuidedFlight(brief), Handover(brief)
         self.by_guidance = False
@@ -148,3 +157,4 @@ class FleetRoutes:
             if cost_s < best_s:
                 best_s = cost_s
                 self._routes[:], self._lengths[:] = routes, lengths
+        improve(mission, self._changes, SPARE_S, self._rng, self._routes, self._lengths)

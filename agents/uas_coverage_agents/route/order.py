@@ -40,7 +40,9 @@ WAY_HOME, MATE_FREE, TIME_LEFT, ENOUGH_MATES = range(10, 14)
 N_ORDER = CLOSER_HOME + 1
 """Numbers that are read about each choice."""
 
-_SPARE_S = 8.0
+SPARE_S = 8.0
+"""Flying time [s] that a route leaves at least."""
+
 _LEFT_OUT_S = 300.0
 
 
@@ -85,7 +87,7 @@ def _greedy_rollout(
             if row[todo[t]] < row[todo[at]]:
                 at = t
         w = todo[at]
-        if trial_ready[j] + row[w] + mission.home_s[j, w] + _SPARE_S > mission.budget_s[j]:
+        if trial_ready[j] + row[w] + mission.home_s[j, w] + SPARE_S > mission.budget_s[j]:
             home_s = mission.here_home_s[j]
             if trial_place[j] != IN_THE_AIR:
                 home_s = mission.home_s[j, trial_place[j]]
@@ -187,7 +189,7 @@ def observe_choices(mission, u, ready_s, place, before_m, open_, workspace):
     best, n_legal = -1, 0
     for k in range(n):
         w = candidates[k]
-        legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + _SPARE_S <= mission.budget_s[u]
+        legal[k] = ready_s[u] + leg_s[k] + mission.home_s[u, w] + SPARE_S <= mission.budget_s[u]
         n_legal += legal[k]
         total_s[k], longest_s[k], left[k] = _greedy_rollout(
             mission, u, w, ready_s, place, before_m, open_, room_ready, room_place, room_todo

@@ -5,6 +5,7 @@ from pathlib import Path
 from pydantic import Field
 
 from uas_coverage_agents.policy.planner import PolicyPlanner
+from uas_coverage_agents.route.improvement import CHANGES
 from uas_coverage_agents.route.policy_runner import SAMPLES, RouteRunner
 from uas_coverage_env.flight import AssistedOptions
 
@@ -22,7 +23,13 @@ class LearnedRouteOptions(AssistedOptions):
         default=SAMPLES,
         ge=1,
         le=100_000,
-        description="sets of routes drawn, the best of which is flown; 1: the first choices only",
+        description="sets of routes drawn, the best of which is taken; 1: the first choices only",
+    )
+    changes: int = Field(
+        default=CHANGES,
+        ge=0,
+        le=10_000_000,
+        description="changes tried on these routes to make them cheaper; 0: flown as drawn",
     )
 
 
@@ -33,8 +40,8 @@ class LearnedRoute(PolicyPlanner):
 
     def __init__(self, options: LearnedRouteOptions | None = None) -> None:
         options = options or LearnedRouteOptions()
-        self._samples = options.samples
+        self._samples, self._changes = options.samples, options.changes
         super().__init__(options, SHIPPED)
 
     def _make_runner(self) -> RouteRunner:
-        return RouteRunner(self.policy, self.assistants, self._samples)
+        return RouteRunner(self.policy, self.assistants, self._samples, self._changes)

@@ -10,6 +10,7 @@ from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.fleet_routes import SAMPLES, FleetRoutes
+from uas_coverage_agents.route.improvement import CHANGES
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
@@ -31,13 +32,20 @@ class RouteRunner:
     Args:
         policy: Of the interface "route".
         assistants: The assistants of the world that fly along.
-        samples: Routes that are built; the cheapest by estimated times are flown.
+        samples: Sets of routes that are built.
+        changes: By which the cheapest of these, by estimated times, is improved before it is flown.
 
     Raises:
         ValueError: The policy was trained on another observation, or has another network.
     """
 
-    def __init__(self, policy: Policy, assistants: Assistants, samples: int = SAMPLES) -> None:
+    def __init__(
+        self,
+        policy: Policy,
+        assistants: Assistants,
+        samples: int = SAMPLES,
+        changes: int = CHANGES,
+    ) -> None:
         described = policy.description
         if described.observation != observation():
             raise ValueError("its observation is not that of this version; train it anew")
@@ -49,7 +57,7 @@ class RouteRunner:
         self._score = layers_of(network.order, tensors, "order.")
         self._home_score = layers_of(network.home, tensors, "home.")
         self._flight = layers_of(network.flight, tensors, "flight.")
-        self._samples = samples
+        self._samples, self._changes = samples, changes
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
@@ -57,8 +65,10 @@ class RouteRunner:
         self.act(first_sight(brief))
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Build the first routes; samples draw from the seed."""
-        self._routes = FleetRoutes(brief, seed, self._score, self._home_score, self._samples)
+        """Build the first routes; samples and changes draw from the seed."""
+        self._routes = FleetRoutes(
+            brief, seed, self._score, self._home_score, self._samples, self._changes
+        )
         self._arena = self._routes.view.arena
         self._around = build_arena((raised(brief) or brief).as_scenario())
         self._learnt: LearntWind | None = None
