@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from uas_coverage_env.bound.prices import WITHIN, Prices
+from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.vehicle.governor import horizontal_axis
 
@@ -160,7 +160,9 @@ def turning_of(
         reach_from_rest_m=_reach_m(motion, at_rest=True),
         turns=(Turns(window, _chord_loss(prices, motion, per_m)),),
         start=np.array([window.start(n) for n in range(LONGEST_START + 1)]),
-        landing=np.array([-math.inf, *(window.landing(n, landing_mps) for n in range(1, LONGEST + 1))]),
+        landing=np.array(
+            [-math.inf, *(window.landing(n, landing_mps) for n in range(1, LONGEST + 1))]
+        ),
     )
 
 
