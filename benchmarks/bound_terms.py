@@ -22,7 +22,6 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from scipy.optimize import linprog
 from scipy.sparse import csr_matrix
 
 from uas_coverage_env import Flight, load_planner, rollout
@@ -31,6 +30,7 @@ from uas_coverage_env.bound.legs import Legs, straight_directions
 from uas_coverage_env.bound.prices import WITHIN, Prices
 from uas_coverage_env.bound.turning import Motion, Turning, motion_of
 from uas_coverage_env.flight import energy_Wh
+from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY
 

@@ -170,7 +170,7 @@ def test_a_short_training_saves_energy_and_time_on_towns_it_has_not_seen():
         return costs
 
     before = costs_Wh()
-    model.learn(40_000)
+    model.learn(30_000)
     gain = before - costs_Wh()
     assert gain.mean() > 0.04 * before.mean()
     assert gain.mean() > 2.0 * gain.std() / np.sqrt(len(gain))

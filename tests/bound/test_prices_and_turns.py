@@ -57,7 +57,9 @@ def test_what_holds_for_a_fleet_holds_for_each_of_it(vehicle, prices):
         turning_of_fleet(vehicles, 1.0, STEPS, 0.5)
         for vehicles in ([vehicle], [vehicle, load_vehicle("hexacopter")])
     )
-    assert (fleet.turn <= alone.turn + 1e-9).all()
+    before, after, half = np.meshgrid([1, LONGEST], [1, LONGEST], np.linspace(0.0, 1.5, 7))
+    costs = [one.turn_cost(before, after, half) for one in (fleet, alone)]
+    assert (costs[0] <= costs[1] + 1e-9).all()
     assert (fleet.reach_m >= alone.reach_m - 1e-9).all()
 
 

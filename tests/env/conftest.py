@@ -11,10 +11,11 @@ import simulated_gpu
 
 @pytest.fixture(scope="session")
 def flown_on_gpu():
-    """How missions on numba's simulated GPU compare with episodes; all in one process."""
+    """How missions on numba's simulated GPU compare with episodes; all in one process, as Python:
+    to compile what few steps need would take ten times as long."""
     done = subprocess.run(
         [sys.executable, simulated_gpu.__file__],
-        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
         text=True,
     )

@@ -1,6 +1,7 @@
 """Missions on numba's simulated GPU, and the same as episodes; prints how they compare, as JSON.
 
-Run as a program, with NUMBA_ENABLE_CUDASIM=1: see the fixture `flown_on_gpu`.
+Run as a program, with NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1: see the fixture
+`flown_on_gpu`.
 """
 
 import json

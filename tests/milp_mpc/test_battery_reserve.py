@@ -1,6 +1,7 @@
 """Plans end where the battery still suffices to come home."""
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,12 +35,17 @@ from uas_coverage_env.vehicle import (
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
 SKY = box((-2000.0, -2000.0, -100.0), (2000.0, 2000.0, 0.0))
 HOME = [(0.0, 0.0, -1.0)]
-AWAY = flight(S500, state((400.0, 0.0, -20.0)), [(6.0, 0.0, 0.0)] * 4)[-1]
+
+
+@cache
+def away():
+    """400 m from home and on the way on; not on import, for which nothing is compiled."""
+    return flight(S500, state((400.0, 0.0, -20.0)), [(6.0, 0.0, 0.0)] * 4)[-1]
 
 
 def with_seconds_to_spare(seconds, horizon=9, **fields):
     """A UAS 400 m from home that could fly on for so long, with its allowance, and be in time."""
-    x0 = AWAY.copy()
+    x0 = away().copy()
     x0[DOD] = 0.5
     problem = toy(x0, horizon=horizon, fence=SKY, home_m=HOME, dod_max=0.75, **fields)
     room = -short_s(problem, 0, x0)

@@ -1,5 +1,6 @@
 """The nonlinear plant: what it shares with the LPV model, its energy, and its robustness."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -366,6 +367,12 @@ def test_motors_give_the_thrust_and_torques_asked_for(n_motors):
         assert ratio * spin @ motors == pytest.approx(torque[2], abs=1e-12)
 
 
+@cache
+def with_rotors(n_motors: int) -> Any:
+    """The record of the vehicle with so many rotors."""
+    return compile_vehicle(rotors("s500_v2", n_motors), 1.0)[()]
+
+
 @settings(max_examples=80, deadline=None, derandomize=True)
 @given(
     st.sampled_from([3, 4, 5, 6, 8]),
@@ -373,7 +380,7 @@ def test_motors_give_the_thrust_and_torques_asked_for(n_motors):
     st.lists(st.floats(-100.0, 100.0), min_size=3, max_size=3),
 )
 def test_a_saturated_motor_stays_within_what_it_can_give(n_motors, thrust_N, torque_Nm):
-    record = MIXERS[n_motors]
+    record = with_rotors(n_motors)
     strongest = record.thrust_N_per_radps2 * record.motor_speed_max_radps**2
     torque, motors = np.array(torque_Nm), np.full(n_motors, np.nan)
     total = mix(record, thrust_N, torque, motors)
@@ -393,11 +400,6 @@ def test_a_tricopter_balances_its_yaw_torque_by_tilting_a_rotor():
     for _ in range(20):
         plant_step(record, x, u, x)
     np.testing.assert_allclose(x[RIGID], at(20.0)[RIGID], rtol=0, atol=1e-9)
-
-
-MIXERS: dict[int, Any] = {
-    n: compile_vehicle(rotors("s500_v2", n), 1.0)[()] for n in (3, 4, 5, 6, 8)
-}
 
 
 def test_torques_act_on_the_plant_as_on_the_lpv_model():

@@ -171,15 +171,18 @@ def triples(legs: Legs, turning: Turning, directions: FloatArray) -> Triples:
     size = np.linalg.norm(change, axis=3)
     half_angle = np.arcsin(np.clip(0.5 * size, 0.0, 1.0))
     way_m = half_m[:, :, None] + half_m[:, None] - legs.radius_m[waypoint] * size
-    turn = turning.turn_cost(legs.before[:, :, None], legs.after[:, None], half_angle)
-    cost = turning.per_m * way_m + turn
+    possible = np.ones(half_angle.shape, dtype=bool)
+    # from the end of a route to a waypoint, and from a waypoint to its start, nothing flies
+    possible[:, ends] = possible[:, :, starts] = False
+    possible[:, starts, ends] &= np.eye(uas, dtype=bool)
+    possible[np.arange(n), :, np.arange(n)] = possible[np.arange(n), np.arange(n)] = False
+    possible[:, np.arange(n), np.arange(n)] = False
+    before, after = np.broadcast_arrays(legs.before[:, :, None], legs.after[:, None])
+    cost = np.full(half_angle.shape, np.inf)
+    cost[possible] = turning.per_m * way_m[possible]
+    cost[possible] += turning.turn_cost(before[possible], after[possible], half_angle[possible])
     ends_cost = end_costs(legs, turning, directions)
     cost += ends_cost[:, :, None] + ends_cost[:, None]
-    # from the end of a route to a waypoint, and from a waypoint to its start, nothing flies
-    cost[:, ends] = cost[:, :, starts] = np.inf
-    cost[:, starts, ends] += np.where(np.eye(uas, dtype=bool), 0.0, np.inf)
-    cost[np.arange(n), :, np.arange(n)] = cost[np.arange(n), np.arange(n)] = np.inf
-    cost[:, np.arange(n), np.arange(n)] = np.inf
     away = np.divide(change, size[..., None], out=np.zeros_like(change), where=size[..., None] > 0)
     touched_m = legs.centre_m[:n, None, None] - legs.radius_m[waypoint][..., None] * away
     return Triples(np.minimum(cost, cost.transpose(0, 2, 1)), touched_m)

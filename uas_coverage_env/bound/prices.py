@@ -11,8 +11,8 @@ from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 
+from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
 from uas_coverage_env.vehicle.battery import (
     BatterySegment,

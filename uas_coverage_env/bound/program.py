@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+
+from uas_coverage_env.geometry.linear_programs import linprog
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

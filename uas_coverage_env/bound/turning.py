@@ -1,4 +1,4 @@
-"""What turning costs at least: small linear programs on the LPV model, tabulated by angle.
+"""What turning costs at least: small linear programs on the LPV model, by steps and angles.
 
 See docs/bound.md, "The price of a turn".
 """
@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from uas_coverage_env.bound.prices import WITHIN, Prices
+from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.vehicle.governor import horizontal_axis
 
@@ -31,6 +31,7 @@ _N_STATES = 3  # of an axis, see `Motion`; both axes come first among the variab
 _REACHED_STEPS = 16
 _SIDES = 24
 _ANGLES = 25  # from straight on to back, half the change of heading in steps of 3.75 degrees
+_HALF_ANGLES: list[float] = np.linspace(0.0, 0.5 * math.pi, _ANGLES).tolist()
 
 
 class Motion(NamedTuple):
@@ -54,6 +55,28 @@ class Motion(NamedTuple):
     """Tilt that holds a speed [rad per m/s]."""
 
 
+class Turns:
+    """Least costs of turns of a vehicle, each found when it is first asked for.
+
+    Args:
+        window: Finds them.
+        loss: (LONGEST + 1, LONGEST + 1) subtracted, by steps before and after the visit.
+    """
+
+    def __init__(self, window: _Window, loss: FloatArray) -> None:
+        self._window, self._loss = window, loss
+        self._known = np.full((*loss.shape, _ANGLES), np.nan)
+
+    def at(self, before: IntArray, after: IntArray, place: IntArray) -> FloatArray:
+        """By steps before and after the visit, and the number of the angle, of one shape."""
+        asked = np.zeros(self._known.shape, dtype=bool)
+        asked[before, after, place] = True
+        for n, m, angle in np.argwhere(asked & np.isnan(self._known)).tolist():
+            cost = self._window.turn(n, m, _HALF_ANGLES[angle])
+            self._known[n, m, angle] = cost - self._loss[n, m]
+        return self._known[before, after, place]
+
+
 class Turning(NamedTuple):
     """Least costs around a visit, beyond those of flying straight at full speed.
 
@@ -61,8 +84,7 @@ class Turning(NamedTuple):
         per_m: Cost of a metre, straight at full speed.
         reach_m: (n+1,) how far a UAS gets in so many steps, at most.
         reach_from_rest_m: (n+1,) the same from rest.
-        turn: (LONGEST + 1, LONGEST + 1, _ANGLES) cost by steps before and after a visit, and half
-            the change of heading.
+        turns: Costs of turns, of each kind of vehicle.
         start: (LONGEST_START + 1,) of setting off from rest, by steps.
         landing: (LONGEST + 1,) of coming to rest, by steps, one at least.
     """
@@ -70,18 +92,24 @@ class Turning(NamedTuple):
     per_m: float
     reach_m: FloatArray
     reach_from_rest_m: FloatArray
-    turn: FloatArray
+    turns: tuple[Turns, ...]
     start: FloatArray
     landing: FloatArray
 
     def turn_cost(
         self, before: IntArray, after: IntArray, half_angle_rad: FloatArray
     ) -> FloatArray:
-        """Interpolated so that it stays a bound; arguments are broadcast."""
+        """By steps before and after a visit, and half the change of heading, of one shape.
+
+        Interpolated so that it stays a bound.
+        """
         spacing = 0.5 * math.pi / (_ANGLES - 1)
         place = np.clip((half_angle_rad / spacing).astype(np.int64), 0, _ANGLES - 2)
         beyond = np.clip(half_angle_rad - spacing * place, 0.0, spacing)
-        low, high = self.turn[before, after, place], self.turn[before, after, place + 1]
+        low, high = (
+            np.min([turns.at(before, after, end) for turns in self.turns], axis=0)
+            for end in (place, place + 1)
+        )
         return (low * np.sin(spacing - beyond) + high * np.sin(beyond)) / math.sin(spacing)
 
 
@@ -104,7 +132,7 @@ def turning_of_fleet(
         per_m=found[0].per_m,
         reach_m=np.max([one.reach_m for one in found], axis=0),
         reach_from_rest_m=np.max([one.reach_from_rest_m for one in found], axis=0),
-        turn=np.min([one.turn for one in found], axis=0),
+        turns=tuple(turns for one in found for turns in one.turns),
         start=np.min([one.start for one in found], axis=0),
         landing=np.min([one.landing for one in found], axis=0),
     )
@@ -126,19 +154,15 @@ def turning_of(
     motion = motion_of(vehicle, dt_s)
     per_m = (prices.step / speed_mps + prices.mps) / dt_s
     window = _Window(motion, prices, speed_mps, per_m)
-    sizes = range(LONGEST + 1)
-    half_angles = np.linspace(0.0, 0.5 * math.pi, _ANGLES).tolist()
-    turn = [
-        [[window.turn(before, after, half) for half in half_angles] for after in sizes]
-        for before in sizes
-    ]
     return Turning(
         per_m=per_m,
         reach_m=_reach_m(motion),
         reach_from_rest_m=_reach_m(motion, at_rest=True),
-        turn=np.array(turn) - _chord_loss(prices, motion, per_m)[:, :, None],
+        turns=(Turns(window, _chord_loss(prices, motion, per_m)),),
         start=np.array([window.start(n) for n in range(LONGEST_START + 1)]),
-        landing=np.array([-math.inf, *(window.landing(n, landing_mps) for n in sizes[1:])]),
+        landing=np.array(
+            [-math.inf, *(window.landing(n, landing_mps) for n in range(1, LONGEST + 1))]
+        ),
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import Point, Polygon, box
+from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import nearest_points
 
@@ -19,6 +19,7 @@ from uas_coverage_env.files.errors import InputError
 MOST_WAYPOINTS = 2_000
 _DIVISIONS = 3
 _SLIVER_M2 = 1e-3
+_TOLERANCE_M = 1e-6
 
 
 @dataclass
@@ -96,12 +97,13 @@ def _look_at(
     west, south, east, north = part.bounds
     centre = Point(0.5 * (west + east), 0.5 * (south + north))
     place = centre if allowed.contains(centre) else nearest_points(allowed, centre)[0]
-    seen = box(
-        *(place.x - 0.5 * pitch_m[0], place.y - 0.5 * pitch_m[1]),
-        *(place.x + 0.5 * pitch_m[0], place.y + 0.5 * pitch_m[1]),
+    x, y = place.x, place.y
+    is_seen = (
+        max(east - x, x - west) <= 0.5 * pitch_m[0] + _TOLERANCE_M
+        and max(north - y, y - south) <= 0.5 * pitch_m[1] + _TOLERANCE_M
     )
-    if place is centre or seen.buffer(1e-6).contains(box(*part.bounds)):
-        layout.places_m.append((place.x, place.y))
+    if place is centre or is_seen:
+        layout.places_m.append((x, y))
     elif divisions:
         for quarter in _quarters(west, south, east, north):
             _look_at(area, quarter, pitch_m, allowed, divisions - 1, layout)
@@ -113,7 +115,7 @@ def _quarters(west: float, south: float, east: float, north: float) -> Iterator[
     x, y = 0.5 * (west + east), 0.5 * (south + north)
     for x0, x1 in ((west, x), (x, east)):
         for y0, y1 in ((south, y), (y, north)):
-            yield box(x0, y0, x1, y1)
+            yield shapely.box(x0, y0, x1, y1)
 
 
 Heights = Callable[[float, float], float]

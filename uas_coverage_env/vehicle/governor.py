@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
-from scipy.optimize import linprog
 
+from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle.layout import TAU_Y, THETA, VX, WY, X
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
