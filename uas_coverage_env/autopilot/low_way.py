@@ -20,9 +20,6 @@ from uas_coverage_env.world.state import WIND
 LITTLE_MPS = 2.0
 """Headway below which a UAS flies low: of a wind that is known to about a metre per second."""
 
-WINDY = 0.3
-"""Headway, of the highest airspeed, below which a UAS asks whether it is sooner beside a roof."""
-
 _HERE_M = 2.0
 """A place so near has been reached."""
 
@@ -169,8 +166,8 @@ def low_way(arena, i, x, belief, x1, y1, altitude_m, needed_m):
     Returns:
         (low, north [m], east [m]): a place beside a roof, or the end of the leg.
     """
-    headway_mps = _headway_mps(arena, i, x, belief, x1, y1, altitude_m)
-    x2, y2 = x1, y1
-    if needed_m > -math.inf and headway_mps < WINDY * arena.vehicles[i].reference_max_mps:
-        x2, y2 = _beside_roof(arena, i, x, belief, x1, y1, needed_m)
-    return headway_mps < LITTLE_MPS or x2 != x1 or y2 != y1, x2, y2
+    if _headway_mps(arena, i, x, belief, x1, y1, altitude_m) >= LITTLE_MPS:
+        return False, x1, y1
+    if needed_m > -math.inf:
+        x1, y1 = _beside_roof(arena, i, x, belief, x1, y1, needed_m)
+    return True, x1, y1
