@@ -134,9 +134,8 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
                     low,
                 )  # fmt: skip
                 onward_s[c] = min(onward_s[c], side_s + onward_s[beside])
-    best_s, best_x, best_y = (
-        _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low), x1, y1
-    )  # fmt: skip
+    best_s = _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low)
+    best_x, best_y = x1, y1
     for c in range(4):
         to_s = _seconds(arena, i, belief, x[X], x[Y], corner_x[c], corner_y[c], first)
         here = math.hypot(corner_x[c] - x[X], corner_y[c] - x[Y]) < _HERE_M

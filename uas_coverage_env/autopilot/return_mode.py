@@ -22,7 +22,7 @@ _FAR_FROM_EMPTY, _FAR_FROM_EMPTY_S = 2.0, 120.0
 _TOO_STRONG = 0.88
 """Of the highest airspeed: a UAS leaves a wind against which it soon could not hold its place."""
 
-_STEADY_M, _UNSTEADY_S = 2.0, 20.0
+_STEADY, _UNSTEADY_S = 2.0, 20.0
 """Over home a UAS waits for a moment in which it is near and slow enough to land, or for others to
 land first. Where its tube is wider than so many landing distances, charge for so many seconds is
 kept for each of them that it is wider."""
@@ -68,7 +68,7 @@ def seconds_to_keep(arena, i, x, left_s, belief=None):
 def _waiting_s(arena, i):
     """Time over home before a UAS can land, where disturbances lead it far off [s]."""
     widest_m = arena.tube_m[i, arena.tube_m.shape[1] - 1]
-    return _UNSTEADY_S * max(widest_m / arena.rules[0].landing_distance_m - _STEADY_M, 0.0)
+    return _UNSTEADY_S * max(widest_m / arena.rules[0].landing_distance_m - _STEADY, 0.0)
 
 
 @kernel

@@ -27,6 +27,7 @@ _STOPPING = 1.5
 _ON_WHILE_STOPPING = 0.6
 _PLACES_AROUND = 8
 _RINGS = 2
+
 _WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
 """Where disturbances are declared, the margin is more: this share of the time, and these seconds
 in a wind as fast as the UAS, in which it turns and stops the more slowly."""
