@@ -5,7 +5,6 @@ from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.guidance import guide, path_length_home_m, target_position
 from uas_coverage_env.autopilot.guided import velocity_of
 from uas_coverage_env.autopilot.return_mode import (
-    call_home,
     has_to_return,
     seconds_home,
     seconds_to_keep,
@@ -15,7 +14,6 @@ from uas_coverage_env.autopilot.way_home import flight_home
 __all__ = [
     "AssistantCode",
     "assistants",
-    "call_home",
     "flight_home",
     "guide",
     "has_to_return",

@@ -58,7 +58,7 @@ class FleetRoutes:
         self._rng = np.random.default_rng(seed)
         self._built_for: tuple[BoolArray, ...] | None = None
         self._built_at = -_AGAIN_STEPS
-        self._recall, self._returns = Recall(brief), np.zeros(n_uas, np.bool_)
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._blocked = self._renew(first_sight(brief))
 
     def update(self, swarm: SwarmState) -> None:

@@ -47,7 +47,7 @@ class LegPilot:
         self._courses: list[Course | None] = [None] * n_uas
         self._clock_s, self._held_s = np.zeros(n_uas), np.zeros(n_uas)
         self._view, self._begun = WorldView(brief), False
-        self._recall, self._returns = Recall(brief), np.zeros(n_uas, np.bool_)
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._guided: dict[int, tuple[int | None, float]] = {}
         self._missed = np.zeros((n_uas, len(brief.waypoints)), np.int64)
 

@@ -128,7 +128,7 @@ class Tour:
         self._guided, self._off_mps = GuidedFlight(brief), np.zeros(n_uas)
         self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
-        self._recall, self._returns = Recall(brief), np.zeros(n_uas, np.bool_)
+        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(brief, self._arena, self._effort)
         self._brief, self._has_order = brief, not may_go_on

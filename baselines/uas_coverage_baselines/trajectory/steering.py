@@ -83,7 +83,7 @@ class Steering:
         self._effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
         self._again = max(round(_AGAIN_S / brief.dt_s), 1)
         self._guided = GuidedFlight(brief)
-        self._recall, self._called = Recall(brief), np.zeros(len(brief.uas), np.bool_)
+        self._recall, self._called = Recall(len(brief.uas)), np.zeros(len(brief.uas), np.bool_)
         self._worked = np.zeros(len(brief.uas), np.bool_)
 
     def commands(self, swarm: SwarmState, world: WorldView) -> Mapping[str, Command]:
