@@ -1,9 +1,12 @@
 """Return mode in wind: a gust calls a UAS home for a while, a low charge for good."""
 
+import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
+from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.scenario.air import Gust, Wind
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
@@ -56,6 +59,24 @@ def test_a_wind_that_a_uas_cannot_hold_against_is_left_for_lower_air(return_mode
     world.state.x[0, DOD] = 0.05
     called(world, 400, 48.0)
     assert (world.state.status[0] == LOST) == is_lost
+
+
+def called_from_dod(level):
+    """Depth of discharge from which on a UAS 10 m above home is called, in air that rests now."""
+    world = World(with_disturbances(meadow([(100.0, 30.0, -1.0)], waypoints=FAR), level, 1))
+    world.state.x[0, :3] = 100.0, 30.0, -11.0
+    for dod in np.arange(0.6, 0.75, 5e-4):
+        world.state.x[0, DOD] = dod
+        if has_to_return(world.arena, world.state, 0):
+            return float(dod)
+    return 1.0
+
+
+def test_where_gusts_make_landing_long_charge_is_kept_for_waiting_over_home():
+    light, moderate, strong = map(called_from_dod, ("light", "moderate", "strong"))
+    assert light == moderate
+    seconds = (light - strong) / World(meadow()).arena.uas["dod_per_s"][0]
+    assert 10.0 < seconds < 30.0
 
 
 @pytest.mark.parametrize("wind_mps", [0.0, 3.0])

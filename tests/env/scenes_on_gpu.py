@@ -6,6 +6,7 @@ from changing_missions import AGAIN, EVENTS, STEPS, mission
 
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import GeneratedScenarios
 
 # guidance, which brings UAS home, does not run there
 EVERY_KIND = tuple(
@@ -43,6 +44,24 @@ def go_on_elsewhere():
     return {"different": different, "changes": n_changes, "refused": refused}
 
 
+def refusal_of(scenario):
+    """What is said of a scenario that does not run there."""
+    try:
+        CudaMissions(1, scenario)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def refusals():
+    """Of events that send UAS home, and of what draws missions."""
+    sent_home = ("radio_lost", "planner_lost")
+    events = [e | {"then": "return"} for e in EVENTS if e["kind"] in sent_home]
+    given = {event["kind"]: mission(event) for event in events}
+    given |= {"family": "generated-light", "drawn": GeneratedScenarios()}
+    return {name: refusal_of(scenario) for name, scenario in given.items()}
+
+
 def compare_all():
     """All kinds of events at once, and waypoints that are asked for again."""
     again = mission(relaunch=True, **AGAIN)
@@ -50,4 +69,5 @@ def compare_all():
         "all": compare(EVERYTHING, ASKED, STEPS + 8),
         "again": compare(again, np.zeros((2, 4)), STEPS + 8, action="wrench"),
         "checkpoint": go_on_elsewhere(),
+        "refusals": refusals(),
     }

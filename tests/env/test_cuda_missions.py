@@ -43,3 +43,13 @@ def test_missions_on_a_gpu_that_are_put_aside_go_on_in_their_scenes(flown_on_gpu
     assert min(result["changes"]) > 2
     assert "changes[0] is" in result["refused"]
     assert "which no mission here can have" in result["refused"]
+
+
+def test_what_does_not_run_on_a_gpu_is_refused_in_one_line(flown_on_gpu):
+    refusals = flown_on_gpu["scenes"]["refusals"]
+    assert len(refusals) == 4
+    for kind in ("radio_lost", "planner_lost"):
+        assert 'then = "hover"' in refusals[kind]
+    for given in ("family", "drawn"):
+        assert "give one scenario" in refusals[given]
+    assert not any("\n" in line for line in refusals.values())

@@ -43,6 +43,9 @@ MOST_WIND = 0.95
 LEAST_GROUND_MPS = 0.2
 """Estimates of flight times take no ground speed to be lower, however hard the wind blows."""
 
+_UNKNOWN_MPS, _UNKNOWN_SHARE = 0.5, 0.05
+"""The wind on the way may be stronger than believed by this, and this share of it."""
+
 GUSTS = 0.1
 """What is kept of the speed limit for gusts, of the wind believed in."""
 
@@ -77,6 +80,18 @@ def speed_along(most_mps, wind_north_mps, wind_east_mps, north, east):
     along = wind_north_mps * north + wind_east_mps * east
     across2 = wind_north_mps**2 + wind_east_mps**2 - along * along
     return along + math.sqrt(max(most_mps * most_mps - across2, 0.0))
+
+
+@inlined_kernel
+def estimated_speed(most_mps, limit_mps, wind_north_mps, wind_east_mps, north, east):
+    """The ground speed along a direction that estimates of flight times count on [m/s].
+
+    That at full airspeed against a wind that blows a little more than is believed, within limit_mps
+    however much it blows from behind; other arguments as above.
+    """
+    speed_mps = speed_along(most_mps, wind_north_mps, wind_east_mps, north, east)
+    speed_mps -= _UNKNOWN_MPS + _UNKNOWN_SHARE * math.hypot(wind_north_mps, wind_east_mps)
+    return min(max(speed_mps, LEAST_GROUND_MPS), limit_mps)
 
 
 @kernel

@@ -6,7 +6,7 @@ import numpy as np
 
 from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
-from uas_coverage_env.autopilot.low_way import beside_roofs, makes_little_headway
+from uas_coverage_env.autopilot.low_way import low_way
 from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
@@ -177,11 +177,9 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     if belief is not None and arena.rules[0].disturbed and target < 0:
         needed_m, _ = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
         altitude_m = _altitude(arena, i, x, -z1, way_m, needed_m)
-        low = makes_little_headway(arena, i, x, belief, end_x, end_y, altitude_m)
-        if low and needed_m > -math.inf:
-            beside_x, beside_y = beside_roofs(arena, i, x, belief, end_x, end_y)
-            if beside_x != end_x or beside_y != end_y:
-                end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
+        low, beside_x, beside_y = low_way(arena, i, x, belief, end_x, end_y, altitude_m, needed_m)
+        if beside_x != end_x or beside_y != end_y:
+            end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
     lead_s = LEAD_S
     if not stop or leg == ROUND_CORNER:
         # to look beyond what is flown by would turn the UAS round before it gets there

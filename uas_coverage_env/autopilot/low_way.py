@@ -2,15 +2,17 @@
 
 The mean wind grows with height, so what cannot be flown against up there often can below. A UAS
 that makes little headway on its way home, or would at the altitude to which guidance would climb,
-descends, and passes beside the roofs that would hold it up.
+descends. A roof in its way it passes where it is sooner past it: over it in the stronger wind, or
+beside it in the weaker. From above a roof it may have to go leeward first, away from home.
 """
 
 import math
 
-from uas_coverage_env.autopilot.belief import LEAST_GROUND_MPS, speed_along, wind_growth
+from uas_coverage_env.autopilot.belief import estimated_speed, speed_along, wind_growth
 from uas_coverage_env.compiled.kernels import kernel, stack_array
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.obstacles import NODE_MARGIN_M
 from uas_coverage_env.world.routes import crossing
 from uas_coverage_env.world.state import WIND
@@ -23,9 +25,13 @@ _HERE_M = 2.0
 
 
 @kernel
-def _headway_mps(arena, i, belief, north_m, east_m, share):
-    """Ground speed along a leg at full airspeed, in a share of the wind believed in [m/s]."""
+def _headway_mps(arena, i, x, belief, x1, y1, altitude_m):
+    """Ground speed at full airspeed along a leg, at an altitude or where the UAS is higher."""
+    north_m, east_m = x1 - x[X], y1 - x[Y]
     length_m = math.hypot(north_m, east_m)
+    if length_m < _HERE_M:
+        return math.inf
+    share = wind_growth(max(altitude_m, -x[Z]), -x[Z])
     return speed_along(
         arena.vehicles[i].reference_max_mps, share * belief[WIND], share * belief[WIND + 1],
         north_m / length_m, east_m / length_m,
@@ -33,33 +39,16 @@ def _headway_mps(arena, i, belief, north_m, east_m, share):
 
 
 @kernel
-def makes_little_headway(arena, i, x, belief, x1, y1, altitude_m):
-    """Whether a UAS gets ahead too slowly on a leg that guidance would fly at an altitude.
-
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x: (14,) its state.
-        belief: (N_BELIEF,) of its inner loop.
-        x1: Where the leg ends, north [m].
-        y1: Likewise, east [m].
-        altitude_m: At which it would be flown [m].
-    """
-    north_m, east_m = x1 - x[X], y1 - x[Y]
-    if math.hypot(north_m, east_m) < _HERE_M:
-        return False
-    share = wind_growth(max(altitude_m, -x[Z]), -x[Z])
-    return _headway_mps(arena, i, belief, north_m, east_m, share) < LITTLE_MPS
-
-
-@kernel
-def _seconds(arena, i, belief, x0, y0, x1, y1):
-    """Time that a leg takes in the wind believed in [s]."""
-    length_m = math.hypot(x1 - x0, y1 - y0)
+def _seconds(arena, i, belief, x0, y0, x1, y1, share):
+    """Time that a leg takes in a share of the wind believed in [s]."""
+    north_m, east_m = x1 - x0, y1 - y0
+    length_m = math.hypot(north_m, east_m)
     if length_m < _HERE_M:
         return 0.0
-    headway_mps = _headway_mps(arena, i, belief, x1 - x0, y1 - y0, 1.0)
-    return length_m / min(max(headway_mps, LEAST_GROUND_MPS), arena.uas[i].speed_mps)
+    return length_m / estimated_speed(
+        arena.vehicles[i].reference_max_mps, arena.uas[i].speed_mps,
+        share * belief[WIND], share * belief[WIND + 1], north_m / length_m, east_m / length_m,
+    )  # fmt: skip
 
 
 @kernel
@@ -80,7 +69,22 @@ def _is_free(arena, x0, y0, x1, y1, z):
 
 
 @kernel
-def beside_roofs(arena, i, x, belief, x1, y1):
+def _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low_share):
+    """Time to the end of a leg that climbs to needed_m, and is low once behind an obstacle [s]."""
+    climb_m = max(needed_m + x[Z], 0.0)
+    back, _, _ = crossing(obstacle, arena.normals, arena.offsets_m, x1, y1, x[X], x[Y])
+    past = 1.0 - min(back, 1.0)
+    past_x, past_y = x[X] + past * (x1 - x[X]), x[Y] + past * (y1 - x[Y])
+    over_share = wind_growth(max(needed_m, -x[Z]), -x[Z])
+    return (
+        climb_m / arena.uas[i].climb_mps
+        + _seconds(arena, i, belief, x[X], x[Y], past_x, past_y, over_share)
+        + _seconds(arena, i, belief, past_x, past_y, x1, y1, low_share)
+    )
+
+
+@kernel
+def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
     """Where to fly to pass beside the first obstacle that a leg home crosses.
 
     Args:
@@ -90,10 +94,11 @@ def beside_roofs(arena, i, x, belief, x1, y1):
         belief: (N_BELIEF,) of its inner loop.
         x1: Where the leg ends, north [m].
         y1: Likewise, east [m].
+        needed_m: Altitude at which it would pass over [m].
 
     Returns:
-        North and east [m] of the corner of its widened box by which the UAS is home first; of the
-        end of the leg where it crosses nothing, or no corner can be flown to.
+        North and east [m] of the corner of its widened box by which the UAS is at the end first;
+        of the end where it is sooner over the obstacle, or no corner can be flown to.
     """
     nearest, crossed = 2.0, -1
     for o in range(arena.obstacles.shape[0]):
@@ -104,6 +109,10 @@ def beside_roofs(arena, i, x, belief, x1, y1):
     if crossed < 0:
         return x1, y1
     obstacle = arena.obstacles[crossed]
+    low_m = max(-arena.uas[i].home_m[2], lowest_altitude(arena, i, x[X], x[Y]))
+    low = 1.0 / wind_growth(-x[Z], low_m)
+    # from above it, the wind up here is to be flown through first
+    first = 1.0 if nearest <= 0.0 else low
     corner_x, corner_y, onward_s = stack_array(4), stack_array(4), stack_array(4)
     for c in range(4):
         north, east = 2 * (c // 2) - 1, 2 * (c % 2) - 1
@@ -115,23 +124,49 @@ def beside_roofs(arena, i, x, belief, x1, y1):
         )
         onward_s[c] = math.inf
         if at > 1.0:
-            onward_s[c] = _seconds(arena, i, belief, corner_x[c], corner_y[c], x1, y1)
+            onward_s[c] = _seconds(arena, i, belief, corner_x[c], corner_y[c], x1, y1, low)
     # from the corners behind it on along its sides
     for _ in range(2):
         for c in range(4):
             for beside in (c ^ 1, c ^ 2):
                 side_s = _seconds(
-                    arena, i, belief, corner_x[c], corner_y[c], corner_x[beside], corner_y[beside]
-                )
+                    arena, i, belief, corner_x[c], corner_y[c], corner_x[beside], corner_y[beside],
+                    low,
+                )  # fmt: skip
                 onward_s[c] = min(onward_s[c], side_s + onward_s[beside])
-    best_s, best_x, best_y = math.inf, x1, y1
+    best_s = _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low)
+    best_x, best_y = x1, y1
     for c in range(4):
-        seconds = _seconds(arena, i, belief, x[X], x[Y], corner_x[c], corner_y[c]) + onward_s[c]
+        to_s = _seconds(arena, i, belief, x[X], x[Y], corner_x[c], corner_y[c], first)
         here = math.hypot(corner_x[c] - x[X], corner_y[c] - x[Y]) < _HERE_M
         if (
-            seconds < best_s
+            to_s + onward_s[c] < best_s
             and not here
             and _is_free(arena, x[X], x[Y], corner_x[c], corner_y[c], x[Z])
         ):
-            best_s, best_x, best_y = seconds, corner_x[c], corner_y[c]
+            best_s, best_x, best_y = to_s + onward_s[c], corner_x[c], corner_y[c]
     return best_x, best_y
+
+
+@kernel
+def low_way(arena, i, x, belief, x1, y1, altitude_m, needed_m):
+    """Whether a UAS flies a leg home low, and where to.
+
+    Args:
+        arena: The arena.
+        i: Index of the UAS.
+        x: (14,) its state.
+        belief: (N_BELIEF,) of its inner loop.
+        x1: Where the leg ends, north [m].
+        y1: Likewise, east [m].
+        altitude_m: At which guidance would fly it [m].
+        needed_m: Altitude needed over the low obstacles on it [m]; -inf without one.
+
+    Returns:
+        (low, north [m], east [m]): a place beside a roof, or the end of the leg.
+    """
+    if _headway_mps(arena, i, x, belief, x1, y1, altitude_m) >= LITTLE_MPS:
+        return False, x1, y1
+    if needed_m > -math.inf:
+        x1, y1 = _beside_roof(arena, i, x, belief, x1, y1, needed_m)
+    return True, x1, y1

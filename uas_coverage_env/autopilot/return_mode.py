@@ -22,6 +22,11 @@ _FAR_FROM_EMPTY, _FAR_FROM_EMPTY_S = 2.0, 120.0
 _TOO_STRONG = 0.88
 """Of the highest airspeed: a UAS leaves a wind against which it soon could not hold its place."""
 
+_STEADY, _UNSTEADY_S = 2.0, 20.0
+"""Over home a UAS waits for a moment in which it is near and slow enough to land, or for others to
+land first. Where its tube is wider than so many landing distances, charge for so many seconds is
+kept for each of them that it is wider."""
+
 _AMPLE, _AMPLE_S = 2.0, 60.0
 """With so many times the way home left, and so many seconds, what called a UAS home was a gust."""
 
@@ -60,6 +65,13 @@ def seconds_to_keep(arena, i, x, left_s, belief=None):
 
 
 @kernel
+def _waiting_s(arena, i):
+    """Time over home before a UAS can land, where disturbances lead it far off [s]."""
+    widest_m = arena.tube_m[i, arena.tube_m.shape[1] - 1]
+    return _UNSTEADY_S * max(widest_m / arena.rules[0].landing_distance_m - _STEADY, 0.0)
+
+
+@kernel
 def _calls_home(arena, state, i, share, more_s):
     """See `has_to_return`: for a way home that takes `share` times as long, and more_s [s]."""
     left = 0
@@ -87,7 +99,7 @@ def _calls_home(arena, state, i, share, more_s):
             return True
     # never less than the model says: what is saved now may be needed on the way
     per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
-    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s)
+    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s - _waiting_s(arena, i))
     return share * seconds_to_keep(arena, i, x, left_s, belief) + more_s >= left_s
 
 

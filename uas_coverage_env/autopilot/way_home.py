@@ -2,7 +2,7 @@
 
 import math
 
-from uas_coverage_env.autopilot.belief import LEAST_GROUND_MPS, speed_along, vertical_margin_mps
+from uas_coverage_env.autopilot.belief import estimated_speed, vertical_margin_mps
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.geometry import signed_distance
@@ -27,8 +27,6 @@ _STOPPING = 1.5
 _ON_WHILE_STOPPING = 0.6
 _PLACES_AROUND = 8
 _RINGS = 2
-_UNKNOWN_MPS, _UNKNOWN_SHARE = 0.5, 0.05
-"""The wind on the way may be stronger than believed by this, and this share of it."""
 
 _WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
 """Where disturbances are declared, the margin is more: this share of the time, and these seconds
@@ -75,18 +73,15 @@ def _out_of_overhangs_s(arena, i, x, y, z):
 def _more_in_wind_s(arena, i, belief, north_m, east_m):
     """By how much longer than in still air a leg takes in the wind believed in [s].
 
-    The leg is flown at full airspeed, against a wind that blows a little more than is believed; no
-    time is saved where it comes from behind.
+    No time is saved where it comes from behind.
     """
     length_m = math.hypot(north_m, east_m)
     if length_m <= 0.0:
         return 0.0
-    north_mps, east_mps = belief[WIND], belief[WIND + 1]
-    most_mps = arena.vehicles[i].reference_max_mps
-    speed_mps = speed_along(
-        most_mps, north_mps, east_mps, north_m / length_m, east_m / length_m
-    ) - (_UNKNOWN_MPS + _UNKNOWN_SHARE * math.hypot(north_mps, east_mps))
-    speed_mps = min(max(speed_mps, LEAST_GROUND_MPS), arena.uas[i].speed_mps)
+    speed_mps = estimated_speed(
+        arena.vehicles[i].reference_max_mps, arena.uas[i].speed_mps, belief[WIND], belief[WIND + 1],
+        north_m / length_m, east_m / length_m,
+    )  # fmt: skip
     return length_m / speed_mps - length_m / arena.uas[i].speed_mps
 
 

@@ -36,11 +36,25 @@ from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.scenes import SceneChanges, SceneLane, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like, check_values
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import FAMILIES, Scenario, installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 
 THREADS_PER_BLOCK = 64
+
+
+def _check_is_one(scenario: Any) -> None:
+    """Refuse what draws missions.
+
+    Raises:
+        ValueError: It is not one scenario.
+    """
+    families = (*FAMILIES, *installed_families())
+    if not isinstance(scenario, str | Path | Scenario) or scenario in families:
+        raise ValueError(
+            f"scenario is {str(scenario)[:80]!r}; missions that are drawn do not run on a GPU, "
+            "give one scenario, such as generate_scenario(seed=1)"
+        )
 
 
 class CudaMissions:
@@ -75,6 +89,7 @@ class CudaMissions:
         whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
         if not whole or not 0 <= seed <= SEEDS - num_envs:
             raise ValueError(f"seed is {seed!r}; give a whole number from 0 to 2**64 - num_envs")
+        _check_is_one(scenario)
         given = MissionSettings.of(settings)
         if given.kind.goes_to or given.return_mode or given.safety_filter:
             raise ValueError(
