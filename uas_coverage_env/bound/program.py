@@ -204,7 +204,7 @@ class Program:
             A_eq=equations[kept],
             b_eq=right[kept],
             bounds=bounds,
-            method="highs",
+            method="highs" if further is None else "highs-ipm",
         )
         if not found.success:
             return None
