@@ -25,16 +25,17 @@ from uas_coverage_env.bound.turning import Turning
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_ROUNDS = 30  # in which prices are sought
-_SURE = 8  # rounds in which triples that only seemed to matter are looked at
+_SEARCH = (2, 7), (4, 8)  # parts of a state whose prices are sought, in so many rounds
+_SURE = 6  # rounds in which triples that only seemed to matter are looked at
 _MORE = 2  # numbers of steps beyond the least that are told apart
 _MOST_STEPS = 5  # that are counted without a gap
 _VISIT, _MIDDLE = 4, 2  # steps next to either end of a gap, at most
 _LIKELY = 5.0  # J: a triple that misses the least reduced cost by more may be left out
 _WIDE = 2.0  # steps: a flight that costs so much more than its triple is not looked at closely
-_RANGE = 0.1  # steps: what a price in the first round is worth at most
-_NEAR = 2.0
+_RANGE = 0.06  # steps: what a change of a price in a first round is worth at most
 _GROW, _SHRINK = 1.3, 0.75
+_UNPAID = 0.03  # share of a part's scale that need not balance for its price to be kept
+_NEAR = 45.0  # J: flights that cost more than another of their triple are forgotten
 _PARTS = 4  # of a state: position, velocity, tilt and rate
 
 
@@ -48,9 +49,7 @@ class Carried:
         reach_m: (n+1,) how far so many steps lead at most.
     """
 
-    def __init__(
-        self, legs: Legs, passing: Passing, turning: Turning, reach_m: FloatArray
-    ) -> None:
+    def __init__(self, legs: Legs, passing: Passing, turning: Turning, reach_m: FloatArray) -> None:
         self._legs, self._passing, self._turning = legs, passing, turning
         self._reach_m = reach_m
         self._n, self._n_nodes = legs.before.shape
@@ -99,15 +98,16 @@ class Carried:
     def _seek(self, program: Program) -> None:
         """Find prices."""
         best, around = -math.inf, self._price
-        width = _RANGE * self._passing.costs.step
-        for _ in range(_ROUNDS):
-            value = self._solved(program, sure=False)
-            if value > best:
-                best, around, width = value, self._price, width * _GROW
-            else:
-                width *= _SHRINK
-            self._explore(program.likely(_LIKELY))
-            self._price = self._better_price(program, around, width)
+        for parts, rounds in _SEARCH:
+            width = _RANGE * self._passing.costs.step
+            for _ in range(rounds):
+                value = self._solved(program, sure=False)
+                if value > best:
+                    best, around, width = value, self._price, width * _GROW
+                else:
+                    width *= _SHRINK
+                self._explore(program.likely(_LIKELY))
+                self._price = self._better_price(program, parts, around, width)
         self._price = around
 
     def _solved(self, program: Program, sure: bool) -> float:
@@ -189,11 +189,6 @@ class Carried:
         before = np.where((i < self._n)[:, None, None], before, 0.0)
         return np.stack([before, price[j, k]], axis=1)
 
-    def _ahead(self, triple: IntArray) -> FloatArray:
-        """(M, 2, 2) unit vectors along both legs."""
-        j, i, k = triple.T
-        return np.stack([-self._along[j, i], self._along[j, k]], axis=1)
-
     def _cost_of_flights(self, sure: bool) -> FloatArray:
         """Lower bounds of all cases; those that may be the least of their triple are new."""
         price = self._prices_of(self._triple, self._price)
@@ -216,13 +211,13 @@ class Carried:
         sides = np.einsum("mesa,mesa->me", self._prices_of(self._flights, price), self._state)
         return self._paid + sides[:, 0] - sides[:, 1]
 
-    def _forget(self, around: FloatArray, most: float) -> None:
-        """Flights that cost more than others of their triple, by both last prices."""
+    def _forget(self, around: FloatArray) -> None:
+        """Flights that are far from the best of their triple, by both last prices."""
         near = np.zeros(len(self._paid), dtype=bool)
         for price in (around, self._price):
             cost, least = self._cost_by(price), np.full(self._plain.shape, np.inf)
             np.minimum.at(least, tuple(self._flights.T), cost)
-            near |= cost <= least[tuple(self._flights.T)] + most
+            near |= cost <= least[tuple(self._flights.T)] + _NEAR
         self._flights, self._paid = self._flights[near], self._paid[near]
         self._state = self._state[near]
 
@@ -231,7 +226,7 @@ class Carried:
     ) -> FloatArray:
         """Costs of cases with the same numbers of steps; flights that come close are kept."""
         j, i, k = self._triple[cases].T
-        along = self._ahead(self._triple[cases])
+        along = np.stack([-self._along[j, i], self._along[j, k]], axis=1)
         half_m = np.stack([self._half_m[j, i], self._half_m[j, k]], axis=1)
         straight = self._passing.costs.per_m * along
         ends = self._ends[j, i] + self._ends[j, k]
@@ -249,35 +244,44 @@ class Carried:
         self._cost[cases], self._at[cases] = passed.cost + ends, price
         return passed.cost + ends
 
-    def _better_price(self, program: Program, around: FloatArray, width: float) -> FloatArray:
-        """The best prices for the flights that are known, not far from others."""
+    def _better_price(
+        self, program: Program, parts: int, around: FloatArray, width: float
+    ) -> FloatArray:
+        """The best prices for the flights that are known, not far from others.
+
+        Args:
+            program: Of the routes.
+            parts: Of the state, so many of which get other prices.
+            around: Prices.
+            width: What a price may change by, times the scale of its part.
+        """
         if not len(self._paid):
             return around
-        self._forget(around, _NEAR * width)
+        self._forget(around)
         j, i, k = self._flights.T
-        parts = 2 * _PARTS
+        size, scale = 2 * parts, self._scale[:parts, None]
         columns, carried, legs = [], [], []
         for side, sign, a, b in ((0, -1.0, i, j), (1, 1.0, j, k)):
             flight = np.flatnonzero(self._priced[j, i if side == 0 else k])
             legs.append(self._n_nodes * a[flight] + b[flight])
             columns.append(flight)
-            carried.append(sign * self._state[flight, side] / self._scale[:, None])
+            carried.append(sign * self._state[flight, side, :parts] / scale)
         used, place = np.unique(np.concatenate(legs), return_inverse=True)
-        rows = (parts * place[:, None] + np.arange(parts)).ravel()
-        at = np.divmod(used, self._n_nodes)
-        middle = (around[at] * self._scale[:, None]).ravel()
+        rows = (size * place[:, None] + np.arange(size)).ravel()
+        before, after = np.divmod(used, self._n_nodes)
         triples = np.stack([j, np.minimum(i, k), np.maximum(i, k)], axis=1)
         found = program.prices(
             Columns(
                 self._plain,
                 triples,
                 self._paid,
-                (rows, np.repeat(np.concatenate(columns), parts), np.concatenate(carried).ravel()),
-                middle - width,
-                middle + width,
+                (rows, np.repeat(np.concatenate(columns), size), np.concatenate(carried).ravel()),
+                (around[before, after, :parts] * scale).ravel(),
+                width,
+                _UNPAID,
             )
         )
         price = around.copy()
         if found is not None:
-            price[at] = found.reshape(-1, _PARTS, 2) / self._scale[:, None]
+            price[before, after, :parts] = found.reshape(-1, parts, 2) / scale
         return price

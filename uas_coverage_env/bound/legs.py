@@ -145,9 +145,7 @@ def triples(legs: Legs, turning: Turning) -> FloatArray:
     return np.minimum(cost, cost.transpose(0, 2, 1))
 
 
-def directed_triples(
-    legs: Legs, turning: Turning, into: FloatArray, out: FloatArray
-) -> FloatArray:
+def directed_triples(legs: Legs, turning: Turning, into: FloatArray, out: FloatArray) -> FloatArray:
     """The cost of each triple: half of either leg, the radius, the turn, and the ends of a route.
 
     Args:
