@@ -97,17 +97,17 @@ class Carried:
 
     def _seek(self, program: Program) -> None:
         """Find prices."""
-        best, around = -math.inf, self._price
+        best, around = self._solved(program, sure=False), self._price
         for parts, rounds in _SEARCH:
             width = _RANGE * self._passing.costs.step
             for _ in range(rounds):
+                self._explore(program.likely(_LIKELY))
+                self._price = self._better_price(program, parts, around, width)
                 value = self._solved(program, sure=False)
                 if value > best:
                     best, around, width = value, self._price, width * _GROW
                 else:
                     width *= _SHRINK
-                self._explore(program.likely(_LIKELY))
-                self._price = self._better_price(program, parts, around, width)
         self._price = around
 
     def _solved(self, program: Program, sure: bool) -> float:
@@ -133,16 +133,17 @@ class Carried:
         """(W, N, N) what triples cost at least by the table, in the order of flight."""
         n, costs, motion = self._n, self._passing.costs, self._passing.motion
         across = np.stack([-self._along[..., 1], self._along[..., 0]], axis=2)
-        sine = np.einsum("ijx,ijx->ij", self._price[:, :, 0], across) / costs.per_m
-        turned = np.abs(sine) < 1.0
-        cosine = np.sqrt(np.where(turned, 1.0 - sine**2, 1.0))
-        out = cosine[..., None] * self._along + np.where(turned, sine, 0.0)[..., None] * across
-        ahead = np.einsum("ijx,ijx->ij", self._price[:, :, 0], self._along)
-        ahead -= costs.per_m * (cosine - 1.0)
+        beyond = np.stack(
+            [np.einsum("ijx,ijx->ij", self._price[:, :, 0], way) for way in (self._along, across)]
+        )
+        sine = np.clip(beyond[1] / costs.per_m, -1.0, 1.0)
+        cosine = np.sqrt(1.0 - sine**2)
+        out = cosine[..., None] * self._along + sine[..., None] * across
+        # what another direction leaves of the prices, and the most that it can be worth
+        ahead, aside = np.abs(beyond - costs.per_m * np.stack([cosine - 1.0, sine]))
         potential_m = float(np.abs(motion.potential) @ motion.largest)
-        worth = np.abs(ahead) * (costs.step_m + potential_m)
+        worth = ahead * (costs.step_m + potential_m) + aside * (costs.across_m + potential_m)
         worth += np.linalg.norm(self._price[:, :, 1:], axis=3) @ motion.largest
-        worth[~turned] = np.inf
         into, worth_into = -self._along, np.zeros_like(worth)
         into[:, :n] = out[:, :n].transpose(1, 0, 2)
         worth_into[:, :n] = worth[:, :n].T
@@ -190,7 +191,10 @@ class Carried:
         return np.stack([before, price[j, k]], axis=1)
 
     def _cost_of_flights(self, sure: bool) -> FloatArray:
-        """Lower bounds of all cases; those that may be the least of their triple are new."""
+        """Lower bounds of all cases; those that may be the least of their triple are new.
+
+        In the search, the others keep what they cost at earlier prices.
+        """
         price = self._prices_of(self._triple, self._price)
         other = (price != self._at).any(axis=(1, 2, 3))
         cost = np.where(other & sure, -np.inf, self._cost)
