@@ -95,9 +95,10 @@ class OfOrder(Carried):
     Args:
         bound: Of the mission.
         nodes: In this order, from the start to the end.
+        rounds: In which prices of whole states are sought.
     """
 
-    def __init__(self, bound: MissionBound, nodes: list[int]) -> None:
+    def __init__(self, bound: MissionBound, nodes: list[int], rounds: int) -> None:
         of_all = bound._carried
         assert of_all is not None, "one UAS is of one kind"
         super().__init__(of_all._legs, of_all._passing, of_all._turning, of_all._reach_m)
@@ -105,6 +106,7 @@ class OfOrder(Carried):
         self._flown[nodes[1:-1], nodes[:-2], nodes[2:]] = True
         self._directed[~self._flown] = np.inf
         self._plain = np.minimum(self._directed, self._directed.transpose(0, 2, 1))
+        self._search = ((2, 7), (4, rounds))
 
     def _by_the_table(self) -> FloatArray:
         return np.where(self._flown, super()._by_the_table(), np.inf)
@@ -232,6 +234,7 @@ def _with_fewer_steps(
 def main(
     towns: Annotated[str, typer.Option(help="seeds of towns with one UAS")] = "2004,2006",
     together: Annotated[str, typer.Option(help="so many visits in a row")] = "1,2,3",
+    rounds: Annotated[int, typer.Option(help="of prices of whole states, for one order")] = 8,
 ) -> None:
     """Shares of what is flown."""
     sizes = [int(size) for size in together.split(",")]
@@ -252,7 +255,7 @@ def main(
             float(cost[j, i, k]) for i, j, k in zip(nodes, nodes[1:], nodes[2:], strict=False)
         )
         step_J, once_J = known.prices.step, known.prices.once
-        priced_J = OfOrder(bound, nodes).least_routes(step_J, ()) + step_J - once_J
+        priced_J = OfOrder(bound, nodes, rounds).least_routes(step_J, ()) + step_J - once_J
         shares = [
             at_prices(bound, flight) / _J_PER_WH,
             bound.energy_Wh(),

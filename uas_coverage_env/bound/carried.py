@@ -6,7 +6,7 @@ See docs/bound.md, "From the middle of a leg to the next".
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _SEARCH = (2, 7), (4, 8)  # parts of a state whose prices are sought, in so many rounds
+_AGAIN = ((4, 5),)  # the same where routes are cut, from the prices without cuts
 _SURE = 6  # rounds in which triples that only seemed to matter are looked at
 _MORE = 2  # numbers of steps beyond the least that are told apart
 _MOST_STEPS = 5  # that are counted without a gap
@@ -66,7 +67,7 @@ class Carried:
         self._directed = directed_triples(legs, turning, -self._along, self._along)
         """(W, N, N) costs of all triples without these prices."""
         self._plain = np.minimum(self._directed, self._directed.transpose(0, 2, 1))
-        self._sought = False
+        self._search, self._sought = _SEARCH, False
         self._known: set[tuple[int, int, int]] = set()
         # triples in the order of flight, by numbers of steps, with what they cost at which prices
         self._triple: IntArray = np.zeros((0, 3), dtype=np.int64)
@@ -86,19 +87,23 @@ class Carried:
             cuts: What else is known of the routes.
         """
         if not self._sought:
-            self._seek(Program(self._plain, idle, ()))
+            self._seek(Program(self._plain, idle, ()), self._search)
             self._sought = True
-        program, best = Program(self._plain, idle, cuts), -math.inf
+        program, without_cuts = Program(self._plain, idle, cuts), self._price
+        if cuts:
+            self._seek(program, _AGAIN)
+        best = -math.inf
         for _ in range(_SURE):
             best = max(best, self._solved(program, sure=True))
             if not self._explore(program.likely(_LIKELY)):
                 break
+        self._price = without_cuts
         return best
 
-    def _seek(self, program: Program) -> None:
-        """Find prices."""
+    def _seek(self, program: Program, search: Iterable[tuple[int, int]]) -> None:
+        """Find prices, from those that there are."""
         best, around = self._solved(program, sure=False), self._price
-        for parts, rounds in _SEARCH:
+        for parts, rounds in search:
             width = _RANGE * self._passing.costs.step
             for _ in range(rounds):
                 self._explore(program.likely(_LIKELY))
