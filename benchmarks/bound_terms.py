@@ -4,11 +4,12 @@
     python benchmarks/bound_terms.py --towns 2004 --together 1,2,3,4
 
 `trajectory` flies each town. The rows are shares of what the flight takes: the flight at the prices
-of the bound, which is as far as any bound with these prices can come; the bound of all orders, and
-of the order that is flown; and that of programs in which several visits in a row are planned
-together, with all steps of the legs between them. The last are what tighter bounds could give, not
-bounds themselves: the numbers of steps of these legs are found by local search. Half a minute for
-each town. Only towns of one UAS, as the others need to know which UAS saves what.
+of the bound, which is as far as any bound with these prices can come; the bound of all orders; that
+of the order that is flown, with prices for the middles of its legs, and by the table of triples
+alone; and that of programs in which several visits in a row are planned together, with all steps
+of the legs between them. The last are what tighter bounds could give, not bounds themselves: the
+numbers of steps of these legs are found by local search. A minute for each town. Only towns of one
+UAS, as the others need to know which UAS saves what.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from scipy.sparse import csr_matrix
 
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.bound import MissionBound
+from uas_coverage_env.bound.carried import Carried
 from uas_coverage_env.bound.legs import Legs, straight_directions
 from uas_coverage_env.bound.prices import WITHIN, Prices
 from uas_coverage_env.bound.turning import Motion, Turning, motion_of
@@ -85,6 +87,29 @@ def order_of(bound: MissionBound, flight: Flight) -> list[tuple[int, int]]:
     first = (away_m <= radius_m + 1e-6).argmax(axis=0)
     rows = np.linalg.norm(covered[None, :, :2] - places[:, None], axis=2).argmin(axis=1)
     return sorted((int(first[row]), place) for place, row in enumerate(rows))
+
+
+class OfOrder(Carried):
+    """The bound with prices for the middles, of one order.
+
+    Args:
+        bound: Of the mission.
+        nodes: In this order, from the start to the end.
+        rounds: In which prices of whole states are sought.
+    """
+
+    def __init__(self, bound: MissionBound, nodes: list[int], rounds: int) -> None:
+        of_all = bound._carried
+        assert of_all is not None, "one UAS is of one kind"
+        super().__init__(of_all._legs, of_all._passing, of_all._turning, of_all._reach_m)
+        self._flown = np.zeros(self._directed.shape, dtype=bool)
+        self._flown[nodes[1:-1], nodes[:-2], nodes[2:]] = True
+        self._directed[~self._flown] = np.inf
+        self._plain = np.minimum(self._directed, self._directed.transpose(0, 2, 1))
+        self._search = ((2, 7), (4, rounds))
+
+    def _by_the_table(self) -> FloatArray:
+        return np.where(self._flown, super()._by_the_table(), np.inf)
 
 
 def in_a_row(
@@ -209,10 +234,11 @@ def _with_fewer_steps(
 def main(
     towns: Annotated[str, typer.Option(help="seeds of towns with one UAS")] = "2004,2006",
     together: Annotated[str, typer.Option(help="so many visits in a row")] = "1,2,3",
+    rounds: Annotated[int, typer.Option(help="of prices of whole states, for one order")] = 8,
 ) -> None:
     """Shares of what is flown."""
     sizes = [int(size) for size in together.split(",")]
-    table = Table("town", "Wh", "its prices", "all orders", "this order")
+    table = Table("town", "Wh", "its prices", "all orders", "this order", "its triples")
     for size in sizes:
         table.add_column(f"{size} together")
     for seed in towns.split(","):
@@ -228,10 +254,13 @@ def main(
         this_J = sum(
             float(cost[j, i, k]) for i, j, k in zip(nodes, nodes[1:], nodes[2:], strict=False)
         )
+        step_J, once_J = known.prices.step, known.prices.once
+        priced_J = OfOrder(bound, nodes, rounds).least_routes(step_J, ()) + step_J - once_J
         shares = [
             at_prices(bound, flight) / _J_PER_WH,
             bound.energy_Wh(),
-            (this_J - known.prices.once) / _J_PER_WH,
+            priced_J / _J_PER_WH,
+            (this_J - once_J) / _J_PER_WH,
         ]
         for size in sizes:  # where the groups begin is chance: the mean of two beginnings
             begins = (size, (size + 1) // 2) if size > 1 else (1,)

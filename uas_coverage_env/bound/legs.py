@@ -138,39 +138,34 @@ def end_costs(legs: Legs, turning: Turning, directions: FloatArray) -> FloatArra
     return cost
 
 
-class Triples(NamedTuple):
-    """What a visit costs by the nodes visited before and after.
-
-    Attributes:
-        cost: (W, N, N) symmetric; infinite where the two are no such pair.
-        touched_m: (W, N, N, 2) where the waypoint's radius is touched then, from above [m].
-    """
-
-    cost: FloatArray
-    touched_m: FloatArray
+def triples(legs: Legs, turning: Turning) -> FloatArray:
+    """(W, N, N) the least cost of each triple, in whichever direction it is flown; symmetric."""
+    out = straight_directions(legs)
+    cost = directed_triples(legs, turning, -out, out)
+    return np.minimum(cost, cost.transpose(0, 2, 1))
 
 
-def triples(legs: Legs, turning: Turning, directions: FloatArray) -> Triples:
+def directed_triples(legs: Legs, turning: Turning, into: FloatArray, out: FloatArray) -> FloatArray:
     """The cost of each triple: half of either leg, the radius, the turn, and the ends of a route.
 
     Args:
         legs: Of the mission.
         turning: Of the vehicle.
-        directions: (W, N, 2) unit vectors from each waypoint to each node, opposite from the
-            other end: any are valid, see docs/bound.md.
+        into: (W, N, 2) unit vectors for the way to each waypoint from each node: any are valid
+            between waypoints, see docs/bound.md, and straight ones are needed from and to homes.
+        out: (W, N, 2) the same for the way on.
+
+    Returns:
+        (W, N, N) by the nodes before and after; infinite where nothing flies so.
     """
     n, n_nodes = legs.before.shape
     uas = (n_nodes - n) // 2
     starts, ends = slice(n, n + uas), slice(n + uas, None)
-    waypoint = np.arange(n)[:, None, None]
-    half_m = 0.5 * np.einsum(
-        "ijx,ijx->ij", directions, legs.centre_m[None] - legs.centre_m[:n, None]
-    )
-    # directions of flight into and out of each waypoint, by the nodes before and after
-    change = -directions[:, :, None] - directions[:, None]
-    size = np.linalg.norm(change, axis=3)
+    half_m = 0.5 * (legs.centre_m[None] - legs.centre_m[:n, None])
+    into_m, out_m = -np.einsum("ijx,ijx->ij", into, half_m), np.einsum("ijx,ijx->ij", out, half_m)
+    size = np.linalg.norm(into[:, :, None] - out[:, None], axis=3)
     half_angle = np.arcsin(np.clip(0.5 * size, 0.0, 1.0))
-    way_m = half_m[:, :, None] + half_m[:, None] - legs.radius_m[waypoint] * size
+    way_m = into_m[:, :, None] + out_m[:, None] - legs.radius_m[:n, None, None] * size
     possible = np.ones(half_angle.shape, dtype=bool)
     # from the end of a route to a waypoint, and from a waypoint to its start, nothing flies
     possible[:, ends] = possible[:, :, starts] = False
@@ -181,8 +176,6 @@ def triples(legs: Legs, turning: Turning, directions: FloatArray) -> Triples:
     cost = np.full(half_angle.shape, np.inf)
     cost[possible] = turning.per_m * way_m[possible]
     cost[possible] += turning.turn_cost(before[possible], after[possible], half_angle[possible])
-    ends_cost = end_costs(legs, turning, directions)
+    ends_cost = end_costs(legs, turning, out)
     cost += ends_cost[:, :, None] + ends_cost[:, None]
-    away = np.divide(change, size[..., None], out=np.zeros_like(change), where=size[..., None] > 0)
-    touched_m = legs.centre_m[:n, None, None] - legs.radius_m[waypoint][..., None] * away
-    return Triples(np.minimum(cost, cost.transpose(0, 2, 1)), touched_m)
+    return cost

@@ -14,7 +14,6 @@ from uas_coverage_env.bound.legs import (
     Places,
     legs_between,
     steps_to_middles,
-    straight_directions,
     triples,
 )
 from uas_coverage_env.bound.passing import Costs, Passing
@@ -180,11 +179,10 @@ class MissionBound:
         costs = Costs(prices.step, prices.mps, prices.rad, turning.per_m, step_m, self._across_m)
         legs = steps_to_middles(self._legs, reach_m, step_m)
         passing = Passing(motion_of(self._vehicles[0], self._ends.dt_s), costs)
-        plain = triples(legs, turning, straight_directions(legs)).cost
-        return Carried(legs, passing, turning, plain, reach_m)
+        return Carried(legs, passing, turning, reach_m)
 
     def _cost(self, turning: Turning) -> FloatArray:
-        return triples(self._legs, turning, straight_directions(self._legs)).cost
+        return triples(self._legs, turning)
 
 
 @lru_cache(maxsize=256)

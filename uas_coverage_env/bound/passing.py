@@ -17,7 +17,7 @@ from uas_coverage_env.bound.turning import Motion
 
 FloatArray = NDArray[np.float64]
 
-_FIRST, _WARM = 30.0, 1.0  # weights of the barrier, in costs
+_FIRST = 30.0  # weight of the barrier, in costs
 _MISSED = 10.0  # price of missing a middle, over that of a metre: no higher ones are of use
 
 # the first pairs of variables: place of the visit, by what it misses both ends and the step before
@@ -64,8 +64,9 @@ class Passages(NamedTuple):
         radius_m: (N,) of the waypoint.
         along: (N, 2, 2) unit vectors along the leg before and the leg after.
         half_m: (N, 2) from the waypoint to the middle of each.
-        price: (N, 2, 2) of a metre, from above: a vector for each leg, of length per_m.
-        velocity_price: (N, 2, 2) of a m/s at each middle: a vector.
+        price: (N, 2, 4, 2) of the state at each middle, a vector for each of its parts: position
+            relative to the middle, less the potential, velocity, tilt and rate. Where a half does
+            not end at the middle, per_m straight ahead for the position and nothing for the others.
         enough: (N,) a bound above which it does not matter how good it is.
     """
 
@@ -73,7 +74,6 @@ class Passages(NamedTuple):
     along: FloatArray
     half_m: FloatArray
     price: FloatArray
-    velocity_price: FloatArray
     enough: FloatArray
 
 
@@ -82,17 +82,13 @@ class Passed(NamedTuple):
 
     Attributes:
         cost: (N,) lower bounds.
-        place_m: (N, 2, 2) position at each middle, relative to the middle, less the potential.
-        velocity_mps: (N, 2, 2) there.
+        state: (N, 2, 4, 2) at each middle, as in the prices.
         paid: (N,) what that flight pays for its steps.
-        z: (N, size) that flight, to begin the next search with.
     """
 
     cost: FloatArray
-    place_m: FloatArray
-    velocity_mps: FloatArray
+    state: FloatArray
     paid: FloatArray
-    z: FloatArray
 
 
 class Costs(NamedTuple):
@@ -127,10 +123,8 @@ class _Shape(NamedTuple):
     """(J,)"""
     place: FloatArray
     """(3, 2, size) position at both ends, and a step before the last, from the waypoint."""
-    carried: FloatArray
-    """(2, 2, size) the same less the potential."""
-    velocity: FloatArray
-    """(2, 2, size) at both ends."""
+    state: FloatArray
+    """(2, 4, 2, size) at both ends, position less the potential."""
     axis: FloatArray
     """(K + J, size / 2) the rows along one axis, of the variables along this axis."""
 
@@ -147,20 +141,17 @@ class Passing:
         self.motion, self.costs = motion, costs
         self._shapes: dict[tuple[Half, Half], _Shape] = {}
 
-    def least(
-        self, halves: tuple[Half, Half], passages: Passages, begin: FloatArray | None = None
-    ) -> Passed:
+    def least(self, halves: tuple[Half, Half], passages: Passages) -> Passed:
         """Bounds of passages.
 
         Args:
             halves: Steps counted before and after the visit.
             passages: N of them.
-            begin: (N, size) flights to begin the search with, from an earlier one.
         """
         if halves not in self._shapes:
             self._shapes[halves] = self._shape(halves)
         shape = self._shapes[halves]
-        return self._least(shape, halves, passages, begin)
+        return self._least(shape, halves, passages)
 
     def _shape(self, halves: tuple[Half, Half]) -> _Shape:
         """The flight, step by step."""
@@ -209,8 +200,9 @@ class Passing:
                 place = place + np.einsum("i,iax->ax", motion.position, x) + motion.input_m * push
                 x = np.einsum("ij,jax->iax", motion.A, x) + motion.B[:, None, None] * push
                 limits += zip(x, motion.largest, strict=True)
-        state = np.stack([first, x])
+        ends = np.stack([first, x])
         places = variables[_PLACE] + np.stack([-at_visit, place - at_visit, last - at_visit])
+        free = places[:2] - np.einsum("i,eiax->eax", motion.potential, ends)
         priced = [(row, weight) for row, weight in priced if weight > 0.0]
         rows = np.concatenate([variables, *(row[None] for row, _ in limits + priced)])
         axis = rows[:, 0, ::2]  # both axes alike
@@ -220,24 +212,18 @@ class Passing:
             np.append(largest, [most for _, most in limits]),
             np.array([weight for _, weight in priced]),
             places,
-            places[:2] - np.einsum("i,eiax->eax", motion.potential, state),
-            state[:, 0],
+            np.concatenate([free[:, None], ends], axis=1),
             np.ascontiguousarray(axis),
         )
 
-    def _least(
-        self,
-        shape: _Shape,
-        halves: tuple[Half, Half],
-        passages: Passages,
-        begin: FloatArray | None,
-    ) -> Passed:
+    def _least(self, shape: _Shape, halves: tuple[Half, Half], passages: Passages) -> Passed:
         costs, sides = self.costs, np.array([1.0, -1.0])
         n, size = len(passages.radius_m), shape.rows.shape[2]
-        cost = np.einsum("e,nea,eax->nx", sides, passages.price, shape.carried)
-        cost += np.einsum("e,nea,eax->nx", sides, passages.velocity_price, shape.velocity)
+        cost = np.einsum("e,nesa,esax->nx", sides, passages.price, shape.state)
         fixed = shape.steps * costs.step
-        fixed += np.einsum("nea,nea,ne->n", passages.price, passages.along, passages.half_m)
+        fixed += np.einsum(
+            "nea,nea,ne->n", passages.price[:, :, 0], passages.along, passages.half_m
+        )
         # the last step leads past the middle: the sample before it is short of it
         leg = np.array([0, 1, 1])
         middles = np.einsum("nea,eax->nex", passages.along[:, leg], shape.place)
@@ -247,11 +233,8 @@ class Passing:
         ending[2] &= halves[1].middle + halves[1].visit > 0
         largest = np.broadcast_to(shape.largest, (n, len(shape.largest))).copy()
         largest[:, _PLACE] = passages.radius_m
-        if begin is None:
-            z, barrier = np.zeros((n, size)), _FIRST
-            z[:, _MISSES_AHEAD] = np.where(ending, beyond_m, 0.0)
-        else:
-            z, barrier = begin.copy(), _WARM
+        z = np.zeros((n, size))
+        z[:, _MISSES_AHEAD] = np.where(ending, beyond_m, 0.0)
         value = np.zeros(n)
         least_costs(
             shape.axis,
@@ -262,17 +245,15 @@ class Passing:
             np.ascontiguousarray(beyond_m[:, ending]),
             0.5 * costs.step_m,
             passages.enough - fixed,
-            np.full(n, barrier),
+            np.full(n, _FIRST),
             z,
             value,
         )
         flown = np.einsum("jax,nx->nja", shape.rows[len(shape.largest) :], z)
-        place_m = np.einsum("eax,nx->nea", shape.carried, z)
-        place_m += sides[:, None] * passages.half_m[..., None] * passages.along
+        state = np.einsum("esax,nx->nesa", shape.state, z)
+        state[:, :, 0] += sides[:, None] * passages.half_m[..., None] * passages.along
         return Passed(
             value + fixed,
-            place_m,
-            np.einsum("eax,nx->nea", shape.velocity, z),
+            state,
             shape.steps * costs.step + np.linalg.norm(flown, axis=2) @ shape.weights,
-            z,
         )

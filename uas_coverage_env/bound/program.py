@@ -44,15 +44,18 @@ class Columns(NamedTuple):
         triples: (M, 3) of each.
         cost: (M,) without the prices of what it carries.
         carried: Rows below R, columns below M, and how much of it.
-        least, most: (R,) the range of its price.
+        around: (R,) prices of it.
+        width: How far from these a price is sought.
+        unpaid: A price is kept where no more than so much of it is left over.
     """
 
     plain: FloatArray
     triples: IntArray
     cost: FloatArray
     carried: tuple[IntArray, IntArray, FloatArray]
-    least: FloatArray
-    most: FloatArray
+    around: FloatArray
+    width: float
+    unpaid: float
 
 
 class _Solved(NamedTuple):
@@ -184,12 +187,13 @@ class Program:
         if further is not None:
             row, column, carried = further.carried
             entries.append((n_rows + row, len(triples) - len(further.cost) + column, carried))
-            slack = np.arange(2 * len(further.most))  # keeps the prices within their range
-            row = n_rows + slack % len(further.most)
-            sign = np.where(slack < len(further.most), 1.0, -1.0)
-            entries.append((row, n_basic + slack, sign))
-            cost = np.concatenate([cost, further.most, -further.least])
-            n_rows += len(further.most)
+            n_carried = len(further.around)
+            slack = np.arange(4 * n_carried)
+            sign = np.where(slack // n_carried % 2, -1.0, 1.0)
+            entries.append((n_rows + slack % n_carried, n_basic + slack, sign))
+            away = np.where(slack < 2 * n_carried, further.width, 0.0)
+            cost = np.append(cost, sign * np.tile(further.around, 4) + away)
+            n_rows += n_carried
         row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
         equations = coo_matrix((value, (row, column)), (n_rows, len(cost))).tocsr()
         right = np.zeros(n_rows)
@@ -198,6 +202,8 @@ class Program:
         bounds = np.zeros((len(cost), 2))
         bounds[:, 1] = 1.0
         bounds[n_basic - len(self._cuts) :, 1] = np.inf
+        if further is not None:
+            bounds[n_basic + 2 * len(further.around) :, 1] = further.unpaid
         found = linprog(
             cost,
             A_ub=self._inequalities(triples, len(cost)),
@@ -205,7 +211,7 @@ class Program:
             A_eq=equations[kept],
             b_eq=right[kept],
             bounds=bounds,
-            method="highs",
+            method="highs" if further is None else "highs-ipm",  # three times as fast for many
         )
         if not found.success:
             return None

@@ -221,7 +221,7 @@ def fly_sweep(
 def bounds_shown(
     rows: Sequence[Row], scenarios: Mapping[str, Scenario], screen: Console, jobs: int
 ) -> Bounds:
-    """The lower bounds of a sweep, some seconds each; shows how far they are.
+    """The lower bounds of a sweep, up to half a minute each; shows how far they are.
 
     Ctrl-C leaves them out: what was flown is told of without them.
     """
