@@ -1,6 +1,7 @@
 """`uas-coverage compare` in this process: what it says, writes, keeps and returns."""
 
 import json
+import re
 import sqlite3
 
 import numpy as np
@@ -73,6 +74,20 @@ def test_the_same_sweep_goes_on_and_flies_nothing_twice(yard, elsewhere, capsys,
     assert "4 of 4 flights are there" in capsys.readouterr().out
     assert flights().equals(first)
     assert (elsewhere / "sweep" / "table.md").read_text() == table
+
+
+def test_bounds_are_left_out_where_nobody_wants_to_wait_for_them(yard, elsewhere):
+    def above_the_bound():
+        text = (elsewhere / "sweep" / "table.md").read_text()
+        (row,) = re.findall(r"^\| nearest-waypoint \| [\d.]+ \[.*", text, re.MULTILINE)
+        return row.split("|")[3].strip(), "--no-bounds --out sweep" in text
+
+    assert compare(yard, "--no-bounds") == 0
+    assert above_the_bound() == ("–", True)
+    assert compare(yard) == 0
+    cell, without = above_the_bound()
+    assert float(cell.split()[0]) > 0.0
+    assert not without
 
 
 def test_another_sweep_in_the_same_directory_is_refused(yard, capsys):

@@ -102,6 +102,12 @@ def compare(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Delete the flights in --out.")
     ] = False,
+    no_bounds: Annotated[
+        bool,
+        typer.Option(
+            "--no-bounds", help="Leave out the lower bounds: up to a minute for each mission."
+        ),
+    ] = False,
 ) -> None:
     """Fly every planner on every scenario with every seed, and compare them.
 
@@ -132,6 +138,7 @@ def compare(
         *(() if dynamics == "lpv" else ("--dynamics", dynamics)),
         *(() if backend == "process" else ("--backend", backend)),
         *(() if jobs is None else ("--jobs", str(jobs))),
+        *(("--no-bounds",) if no_bounds else ()),
         *("--out", str(out)),
     )
     screen = console()
@@ -147,7 +154,7 @@ def compare(
         sys.stderr.write(f"error: nothing was flown: {one_line(trouble)}\n")
         raise typer.Exit(FAILED)
     how = f"{_all_or(side_by_side)} side by side"
-    bounds = bounds_shown(rows, sweep.scenarios, screen, side_by_side)
+    bounds = {} if no_bounds else bounds_shown(rows, sweep.scenarios, screen, side_by_side)
     comparison = Comparison.of(rows, len(entries), reference, command, how, bounds)
     names = write(comparison, out)
     _report(screen, comparison, out, names)
@@ -221,7 +228,7 @@ def fly_sweep(
 def bounds_shown(
     rows: Sequence[Row], scenarios: Mapping[str, Scenario], screen: Console, jobs: int
 ) -> Bounds:
-    """The lower bounds of a sweep, up to half a minute each; shows how far they are.
+    """The lower bounds of a sweep, up to a minute each; shows how far they are.
 
     Ctrl-C leaves them out: what was flown is told of without them.
     """
