@@ -25,8 +25,9 @@ def flight_hash(planner: str, level: str | None, seed: int) -> str:
     """SHA-256 of all states and inputs of a flight."""
     town = generate_scenario(seed, n_uas=2, n_waypoints=10, n_obstacles=5)
     town = with_disturbances(town, level, seed)
-    steps = _STEPS_OF.get(planner, _STEPS)
-    flight = rollout(town, load_planner(planner, OPTIONS[planner]), seed, max_steps=steps)
+    name = planner.split()[0]
+    steps = _STEPS_OF.get(name, _STEPS)
+    flight = rollout(town, load_planner(name, OPTIONS[planner]), seed, max_steps=steps)
     return hashlib.sha256(flight.x.tobytes() + flight.u.tobytes()).hexdigest()
 
 
@@ -64,17 +65,13 @@ def trials(quick: bool) -> list[Trial]:
     """Every planner and the batch, in still air and disturbed."""
     seeds = range(FIRST_SEED, FIRST_SEED + (1 if quick else 30))
     return [
-        *(
-            Trial(f"{planner} {level} {seed}", flights, (planner, level, seed))
-            for seed in seeds
-            for planner in OPTIONS
-            for level in (None, "moderate")
-        ),
-        *(
-            Trial(f"batch {level} {seed}", batches, (level, seed))
-            for seed in seeds
-            for level in (None, "moderate")
-        ),
+        trial
+        for seed in seeds
+        for level in (None, "moderate")
+        for trial in (
+            *(Trial(f"{name} {level} {seed}", flights, (name, level, seed)) for name in OPTIONS),
+            Trial(f"batch {level} {seed}", batches, (level, seed)),
+        )
     ]
 
 
