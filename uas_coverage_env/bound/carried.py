@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _SEARCH = (2, 7), (4, 8)  # parts of a state whose prices are sought, in so many rounds
-_AGAIN = ((4, 5),)  # the same where routes are cut, from the prices without cuts
+_AGAIN = ((4, 5),)  # the same once routes are cut, from the prices without cuts
 _SURE = 6  # rounds in which triples that only seemed to matter are looked at
 _MORE = 2  # numbers of steps beyond the least that are told apart
 _MOST_STEPS = 5  # that are counted without a gap
@@ -67,6 +67,7 @@ class Carried:
         self._directed = directed_triples(legs, turning, -self._along, self._along)
         """(W, N, N) costs of all triples without these prices."""
         self._plain = np.minimum(self._directed, self._directed.transpose(0, 2, 1))
+        self._price_with_cuts: FloatArray | None = None
         self._search, self._sought = _SEARCH, False
         self._known: set[tuple[int, int, int]] = set()
         # triples in the order of flight, by numbers of steps, with what they cost at which prices
@@ -90,8 +91,11 @@ class Carried:
             self._seek(Program(self._plain, idle, ()), self._search)
             self._sought = True
         program, without_cuts = Program(self._plain, idle, cuts), self._price
-        if cuts:
+        if cuts and self._price_with_cuts is None:
             self._seek(program, _AGAIN)
+            self._price_with_cuts = self._price
+        if cuts and self._price_with_cuts is not None:
+            self._price = self._price_with_cuts
         best = -math.inf
         for _ in range(_SURE):
             best = max(best, self._solved(program, sure=True))
