@@ -138,6 +138,23 @@ def test_two_threads_fly_the_missions_of_one():
         np.testing.assert_array_equal(shared[name], array)
 
 
+@pytest.mark.skipif(numba.get_num_threads() == 1, reason="numba has one thread here")
+def test_two_threads_share_no_memory_with_the_filter_in_wind():
+    """Once the braking that the filter tries was written to for a moment, by all lanes."""
+    town = generate_scenario(3, n_uas=2, n_waypoints=6, n_obstacles=2, disturbances="moderate")
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 4, 2, 3))
+
+    def observed(threads):
+        batch = CoverageBatch(4, town, threads=threads, safety_filter=True)
+        batch.reset(seed=0)
+        for action in actions:
+            batch.step(action)
+            yield batch.observation.copy()
+
+    for step, (alone, shared) in enumerate(zip(observed(1), observed(2), strict=True)):
+        np.testing.assert_array_equal(shared, alone, err_msg=f"step {step}")
+
+
 def test_all_scenarios_are_drawn_about_equally_often():
     draws = [drawn(np.uint64(seed), mission, 5) for seed in range(100) for mission in range(20)]
     counts = np.bincount(draws, minlength=5)

@@ -12,7 +12,7 @@ drag. Where no disturbance is declared, nothing here is flown.
 
 import math
 
-from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.autopilot.control import steered_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.vehicle import (
     DOD,
@@ -126,8 +126,7 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
     north_mps, east_mps = x[VX], x[VY]
     wind_north_mps, wind_east_mps = belief[WIND], belief[WIND + 1]
     first, second = command.values[0], command.values[1]
-    steers = command.kind == VELOCITY or command.kind == CLIMB
-    if steers:
+    if command.kind == VELOCITY or command.kind == CLIMB:
         speed_mps = math.sqrt(first * first + second * second)
         share = 0.0
         if speed_mps > 0.0:
@@ -137,18 +136,16 @@ def believed_wrench(vehicle, belief, x, reference, command, u):
                 wind_north_mps, wind_east_mps, first / speed_mps, second / speed_mps,
             )  # fmt: skip
             share = min(speed_mps, most_mps) / speed_mps
-        command.values[0] = share * first - wind_north_mps
-        command.values[1] = share * second - wind_east_mps
+        first = share * first - wind_north_mps
+        second = share * second - wind_east_mps
     x[VX] = north_mps - wind_north_mps
     x[VY] = east_mps - wind_east_mps
     reference[0] -= wind_north_mps
     reference[1] -= wind_east_mps
-    command_wrench(vehicle, x, reference, command, u)
+    steered_wrench(vehicle, x, reference, command, first, second, u)
     reference[0] += wind_north_mps
     reference[1] += wind_east_mps
     x[VX], x[VY] = north_mps, east_mps
-    if steers:
-        command.values[0], command.values[1] = first, second
     if command.kind != WRENCH:
         lift_N = u[LIFT] - belief[SINK] / vehicle.vertical_B[SPEED]
         # lift takes from the speed downwards: the lift of the fastest descent is the least

@@ -39,14 +39,23 @@ def command_wrench(vehicle, x, reference, command, u):
         command: A record of COMMAND_DTYPE, of any kind but GO_TO.
         u: (5,) inputs; lift and torques are written.
     """
+    steered_wrench(vehicle, x, reference, command, command.values[0], command.values[1], u)
+
+
+@inlined_kernel
+def steered_wrench(vehicle, x, reference, command, first, second, u):
+    """`command_wrench` with two other numbers in the place of the command's first two.
+
+    The command itself is not written: lanes that fly in several threads share some.
+    """
     kind = command.kind
     values = command.values
     if kind == VELOCITY:
-        velocity_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
+        velocity_wrench(vehicle, x, reference, first, second, values[2], u)
     elif kind == CLIMB:
-        velocity_climb_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
+        velocity_climb_wrench(vehicle, x, reference, first, second, values[2], u)
     elif kind == ACCELERATION:
-        acceleration_wrench(vehicle, x, reference, values[0], values[1], values[2], u)
+        acceleration_wrench(vehicle, x, reference, first, second, values[2], u)
     else:
         for k in range(LIFT, TAU_Z + 1):
             u[k] = values[k]
