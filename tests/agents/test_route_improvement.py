@@ -62,7 +62,7 @@ def test_a_fleet_shares_the_waypoints_anew_and_still_visits_each_once(seed):
 
 
 @pytest.mark.parametrize("changes", [0, 1, 10, 100])
-def test_few_changes_never_make_a_mission_dearer(changes):
+def test_few_changes_never_make_a_mission_costlier(changes):
     mission = _mission(2, 16)
     before = _improved(mission, [list(range(8)), list(range(8, 16))])
     for seed in range(20):

@@ -78,7 +78,7 @@ def test_the_fewer_steps_the_more_energy_but_for_what_the_search_for_prices_miss
     places = rng.uniform((100.0, 100.0, -30.0), (490.0, 490.0, -5.0), (7, 3)).tolist()
     bound = MissionBound(plain([HOME, OTHER_HOME], places))
     by_steps = [bound.energy_Wh(steps) for steps in (60, 100, 400)]
-    assert (np.diff(by_steps) < 0.01 * by_steps[-1]).all(), "prices are sought for each anew"
+    assert (np.diff(by_steps) < 0.01 * by_steps[-1]).all(), "prices with cuts are others"
     assert by_steps[0] > 1.03 * by_steps[-1], "one UAS does not suffice"
     assert by_steps[-1] == bound.energy_Wh()
 

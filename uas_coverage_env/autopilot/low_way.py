@@ -85,16 +85,7 @@ def _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low_share):
 
 @kernel
 def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
-    """Where to fly to pass beside the first obstacle that a leg home crosses.
-
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x: (14,) its state.
-        belief: (N_BELIEF,) of its inner loop.
-        x1: Where the leg ends, north [m].
-        y1: Likewise, east [m].
-        needed_m: Altitude at which it would pass over [m].
+    """Where to fly to pass beside the first obstacle that a leg home crosses; see `low_way`.
 
     Returns:
         North and east [m] of the corner of its widened box by which the UAS is at the end first;

@@ -68,6 +68,7 @@ class Carried:
         """(W, N, N) costs of all triples without these prices."""
         self._plain = np.minimum(self._directed, self._directed.transpose(0, 2, 1))
         self._price_with_cuts: FloatArray | None = None
+        """The same where routes are cut, sought for the first cuts that are asked for."""
         self._search, self._sought = _SEARCH, False
         self._known: set[tuple[int, int, int]] = set()
         # triples in the order of flight, by numbers of steps, with what they cost at which prices
@@ -91,10 +92,10 @@ class Carried:
             self._seek(Program(self._plain, idle, ()), self._search)
             self._sought = True
         program, without_cuts = Program(self._plain, idle, cuts), self._price
-        if cuts and self._price_with_cuts is None:
-            self._seek(program, _AGAIN)
-            self._price_with_cuts = self._price
-        if cuts and self._price_with_cuts is not None:
+        if cuts:
+            if self._price_with_cuts is None:
+                self._seek(program, _AGAIN)
+                self._price_with_cuts = self._price
             self._price = self._price_with_cuts
         best = -math.inf
         for _ in range(_SURE):

@@ -2,8 +2,8 @@
 
 A change turns a part of a route round, or moves up to three waypoints to another place in their
 route or in that of another UAS. What makes the mission cheaper is kept; so is, less and less often,
-what makes it a little dearer (simulated annealing). What the network saw is built step by step;
-here all of it is seen at once.
+what makes it a little costlier (simulated annealing). The network builds routes one choice after
+the other; a change is judged by whole routes.
 """
 
 import math
