@@ -37,6 +37,16 @@ T = TypeVar("T", bound=tuple)
 Axis = str | int
 
 
+def record_dtype(fields: list[tuple[Any, ...]]) -> np.dtype[np.void]:
+    """Type of structured arrays whose elements compiled code reads as attributes.
+
+    Args:
+        fields: Name, type and, where it is an array, shape of each, as numpy takes them.
+    """
+    # np.record: attributes work in plain Python too (NUMBA_DISABLE_JIT=1)
+    return np.dtype((np.record, np.dtype(fields, align=True)))
+
+
 @dataclass(frozen=True)
 class Values:
     """What the elements of an array may be, where not every number of its type is meant.

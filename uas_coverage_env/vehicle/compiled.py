@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
 from uas_coverage_env.vehicle.governor import (
@@ -32,95 +33,89 @@ PHYSICAL_SIDES = 8
 _DT_MIN_S = 0.1  # so that MAX_GOVERNOR_ROWS suffice
 
 _f8, _i8 = "f8", "i8"
-VEHICLE_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("dt_s", _f8),
-                # one-step map of the axes; a horizontal axis is position, velocity, tilt, rate
-                # with the angular acceleration as input, tilt positive forward
-                ("axis_A", _f8, (4, 4)),
-                ("axis_B", _f8, (4,)),
-                ("vertical_A", _f8, (2, 2)),
-                ("vertical_B", _f8, (2,)),
-                # position and velocity under a horizontal force
-                ("horizontal_force_B", _f8, (2,)),
-                ("yaw_B", _f8, (2,)),
-                ("inertia_kgm2", _f8, (3,)),
-                ("mass_kg", _f8),
-                ("weight_N", _f8),
-                # battery: a row per segment of the discharge curve
-                ("n_segments", _i8),
-                ("dod_end", _f8, (MAX_SEGMENTS,)),
-                ("ocv_V", _f8, (MAX_SEGMENTS,)),
-                ("ocv_slope_V", _f8, (MAX_SEGMENTS,)),
-                ("current_A", _f8, (MAX_SEGMENTS,)),
-                ("current_A_per_V", _f8, (MAX_SEGMENTS,)),
-                ("current_A_per_N", _f8, (MAX_SEGMENTS,)),
-                ("drop_V", _f8, (MAX_SEGMENTS,)),
-                ("capacity_As", _f8),
-                ("resistance_0_ohm", _f8),
-                ("resistance_th_ohm", _f8),
-                ("time_constant_th_s", _f8),
-                ("polarisation_decay", _f8),
-                # thrust correction
-                ("faces", _f8, (PHYSICAL_SIDES, 2)),
-                ("speed_N_per_mps", _f8),
-                ("climb_N_per_mps", _f8),
-                ("descent_N_per_mps", _f8),
-                ("tilt_N_per_rad", _f8),
-                ("trim_rad_per_mps", _f8),
-                # limits
-                ("v_xy_max_mps", _f8),
-                ("v_up_max_mps", _f8),
-                ("v_down_max_mps", _f8),
-                ("tilt_max_rad", _f8),
-                ("rate_max_radps", _f8),
-                ("lift_min_N", _f8),
-                ("lift_max_N", _f8),
-                ("delta_thrust_min_N", _f8),
-                ("torque_max_Nm", _f8, (3,)),
-                ("alpha_xy_max_radps2", _f8),
-                ("alpha_z_max_radps2", _f8),
-                ("yaw_rate_max_radps", _f8),
-                # a UAS that looks where it flies, see `layout`; the arena says which do
-                ("follows_course", "?"),
-                # what a sample must not exceed, see `limits`
-                ("bounds", _f8, (N_LIMITS,)),
-                # velocity loop
-                ("reference_max_mps", _f8),
-                ("gain", _f8, (3,)),
-                ("n_governor_rows", _i8),
-                # row by row side by side, so that a processor takes several at a time; zero beyond
-                ("governor_rows", _f8, (N_ROW_COLUMNS, MAX_GOVERNOR_ROWS)),
-                # nonlinear plant
-                ("n_motors", _i8),
-                # motor thrusts from (thrust, torques), and torques from each motor's thrust
-                ("mixer", _f8, (MAX_MOTORS, N_MIXED)),
-                ("rotor_map", _f8, (MAX_MOTORS, 3)),
-                ("drag_kgps", _f8),
-                ("drag_vertical_kgps", _f8),
-                ("gravity_mps2", _f8),
-                ("arm_m", _f8),
-                ("thrust_N_per_radps2", _f8),
-                ("torque_Nm_per_radps2", _f8),
-                ("propeller_radius_m", _f8),
-                ("induced_power_factor", _f8),
-                ("profile_power_advance_factor", _f8),
-                ("air_density_kgpm3", _f8),
-                ("motor_speed_max_radps", _f8),
-                ("back_emf_Vs_per_rad", _f8),
-                ("motor_resistance_ohm", _f8),
-                ("no_load_current_A", _f8),
-                ("esc_loss_W", _f8),
-                ("esc_efficiency", _f8),
-                ("auxiliary_W", _f8),
-                ("hover_W", _f8),
-            ],
-            align=True,
-        ),
-    )
+VEHICLE_DTYPE = record_dtype(
+    [
+        ("dt_s", _f8),
+        # one-step map of the axes; a horizontal axis is position, velocity, tilt, rate
+        # with the angular acceleration as input, tilt positive forward
+        ("axis_A", _f8, (4, 4)),
+        ("axis_B", _f8, (4,)),
+        ("vertical_A", _f8, (2, 2)),
+        ("vertical_B", _f8, (2,)),
+        # position and velocity under a horizontal force
+        ("horizontal_force_B", _f8, (2,)),
+        ("yaw_B", _f8, (2,)),
+        ("inertia_kgm2", _f8, (3,)),
+        ("mass_kg", _f8),
+        ("weight_N", _f8),
+        # battery: a row per segment of the discharge curve
+        ("n_segments", _i8),
+        ("dod_end", _f8, (MAX_SEGMENTS,)),
+        ("ocv_V", _f8, (MAX_SEGMENTS,)),
+        ("ocv_slope_V", _f8, (MAX_SEGMENTS,)),
+        ("current_A", _f8, (MAX_SEGMENTS,)),
+        ("current_A_per_V", _f8, (MAX_SEGMENTS,)),
+        ("current_A_per_N", _f8, (MAX_SEGMENTS,)),
+        ("drop_V", _f8, (MAX_SEGMENTS,)),
+        ("capacity_As", _f8),
+        ("resistance_0_ohm", _f8),
+        ("resistance_th_ohm", _f8),
+        ("time_constant_th_s", _f8),
+        ("polarisation_decay", _f8),
+        # thrust correction
+        ("faces", _f8, (PHYSICAL_SIDES, 2)),
+        ("speed_N_per_mps", _f8),
+        ("climb_N_per_mps", _f8),
+        ("descent_N_per_mps", _f8),
+        ("tilt_N_per_rad", _f8),
+        ("trim_rad_per_mps", _f8),
+        # limits
+        ("v_xy_max_mps", _f8),
+        ("v_up_max_mps", _f8),
+        ("v_down_max_mps", _f8),
+        ("tilt_max_rad", _f8),
+        ("rate_max_radps", _f8),
+        ("lift_min_N", _f8),
+        ("lift_max_N", _f8),
+        ("delta_thrust_min_N", _f8),
+        ("torque_max_Nm", _f8, (3,)),
+        ("alpha_xy_max_radps2", _f8),
+        ("alpha_z_max_radps2", _f8),
+        ("yaw_rate_max_radps", _f8),
+        # a UAS that looks where it flies, see `layout`; the arena says which do
+        ("follows_course", "?"),
+        # what a sample must not exceed, see `limits`
+        ("bounds", _f8, (N_LIMITS,)),
+        # velocity loop
+        ("reference_max_mps", _f8),
+        ("gain", _f8, (3,)),
+        ("n_governor_rows", _i8),
+        # row by row side by side, so that a processor takes several at a time; zero beyond
+        ("governor_rows", _f8, (N_ROW_COLUMNS, MAX_GOVERNOR_ROWS)),
+        # nonlinear plant
+        ("n_motors", _i8),
+        # motor thrusts from (thrust, torques), and torques from each motor's thrust
+        ("mixer", _f8, (MAX_MOTORS, N_MIXED)),
+        ("rotor_map", _f8, (MAX_MOTORS, 3)),
+        ("drag_kgps", _f8),
+        ("drag_vertical_kgps", _f8),
+        ("gravity_mps2", _f8),
+        ("arm_m", _f8),
+        ("thrust_N_per_radps2", _f8),
+        ("torque_Nm_per_radps2", _f8),
+        ("propeller_radius_m", _f8),
+        ("induced_power_factor", _f8),
+        ("profile_power_advance_factor", _f8),
+        ("air_density_kgpm3", _f8),
+        ("motor_speed_max_radps", _f8),
+        ("back_emf_Vs_per_rad", _f8),
+        ("motor_resistance_ohm", _f8),
+        ("no_load_current_A", _f8),
+        ("esc_loss_W", _f8),
+        ("esc_efficiency", _f8),
+        ("auxiliary_W", _f8),
+        ("hover_W", _f8),
+    ]
 )
 """A vehicle at one sampling time."""
 

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.memory import Memory
+from uas_coverage_env.compiled.memory import Memory, record_dtype
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
@@ -53,12 +53,7 @@ SAMPLES_AFTER_END = 64
 """Moving obstacles are known this long after max_steps, for missions flown over time."""
 
 
-def _record(fields: list) -> np.dtype:
-    # np.record: attributes work in plain Python too (NUMBA_DISABLE_JIT=1)
-    return np.dtype((np.record, np.dtype(fields, align=True)))
-
-
-UAS_DTYPE = _record(
+UAS_DTYPE = record_dtype(
     [
         ("home_m", "f8", (3,)),
         ("radius_m", "f8"),
@@ -73,11 +68,11 @@ UAS_DTYPE = _record(
     ]
 )
 
-MOVING_DTYPE = _record(
+MOVING_DTYPE = record_dtype(
     [("radius_m", "f8"), ("half_height_m", "f8"), ("safe_distance_m", "f8")],
 )
 
-RULES_DTYPE = _record(
+RULES_DTYPE = record_dtype(
     [
         ("dt_s", "f8"),
         ("max_steps", "i8"),

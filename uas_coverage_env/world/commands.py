@@ -9,6 +9,8 @@ from typing import Any, Literal, NoReturn, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.memory import record_dtype
+
 Mode = Literal["covering", "transit", "return"]
 
 VELOCITY, ACCELERATION, WRENCH, GO_TO, CLIMB = range(5)
@@ -21,12 +23,7 @@ KIND_NAMES = ("velocity", "acceleration", "wrench", "goto", "climb")
 HOME = -1
 """The GO_TO index of a UAS's own start."""
 
-COMMAND_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype([("kind", "i8"), ("values", "f8", (4,)), ("returning", "?")], align=True),
-    )
-)
+COMMAND_DTYPE = record_dtype([("kind", "i8"), ("values", "f8", (4,)), ("returning", "?")])
 """One command: its kind, up to four numbers in the order of the dataclass, whether it returns."""
 
 _MODES = get_args(Mode)

@@ -9,29 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.blocks import check_parameters, checked_blocks
+from uas_coverage_env.compiled.memory import record_dtype
 
 DISTURBANCE_MEMORY = 16
 """Numbers that a disturbance may keep for each UAS from step to step."""
 
-DISTURBANCE_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                # it is part of the scenario; in a batch, others may have disturbances that this
-                # one has not
-                ("acts", "?"),
-                # all UAS draw the same random numbers
-                ("common", "?"),
-                # tells its random numbers from those of other disturbances
-                ("key", "u8"),
-                # of `Arena.disturbance_parameters`
-                ("first", "i8"),
-                ("n", "i8"),
-            ],
-            align=True,
-        ),
-    )
+DISTURBANCE_DTYPE = record_dtype(
+    [
+        # it is part of the scenario; in a batch, others may have disturbances that this
+        # one has not
+        ("acts", "?"),
+        # all UAS draw the same random numbers
+        ("common", "?"),
+        # tells its random numbers from those of other disturbances
+        ("key", "u8"),
+        # of `Arena.disturbance_parameters`
+        ("first", "i8"),
+        ("n", "i8"),
+    ]
 )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.compiled.random import counted, normal, uniform
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.events import EFFECTS, OfUas
@@ -46,43 +47,31 @@ N_DELAYED = 8
 
 _EVENT_KEY, _SENSING_KEY = np.uint64(0x6576656E74730001), np.uint64(0x73656E73696E6701)
 
-EVENT_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                # one of the effects above
-                ("effect", "i8"),
-                # index, BY_LOT or EVERY
-                ("uas", "i8"),
-                # its sample; or how often it happens in a step, and then the sample is drawn
-                ("at_step", "i8"),
-                ("per_step", "f8"),
-                # how many steps it lasts
-                ("for_steps", "i8"),
-                ("values", "f8", (4,)),
-            ],
-            align=True,
-        ),
-    )
+EVENT_DTYPE = record_dtype(
+    [
+        # one of the effects above
+        ("effect", "i8"),
+        # index, BY_LOT or EVERY
+        ("uas", "i8"),
+        # its sample; or how often it happens in a step, and then the sample is drawn
+        ("at_step", "i8"),
+        ("per_step", "f8"),
+        # how many steps it lasts
+        ("for_steps", "i8"),
+        ("values", "f8", (4,)),
+    ]
 )
 
-SENSING_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                # standard deviations; of what a mission draws once (bias), or at each sample
-                ("position_noise_m", "f8"),
-                ("position_bias_m", "f8"),
-                ("velocity_noise_mps", "f8"),
-                ("velocity_bias_mps", "f8"),
-                ("charge_bias", "f8"),
-                ("delay_steps", "i8"),
-            ],
-            align=True,
-        ),
-    )
+SENSING_DTYPE = record_dtype(
+    [
+        # standard deviations; of what a mission draws once (bias), or at each sample
+        ("position_noise_m", "f8"),
+        ("position_bias_m", "f8"),
+        ("velocity_noise_mps", "f8"),
+        ("velocity_bias_mps", "f8"),
+        ("charge_bias", "f8"),
+        ("delay_steps", "i8"),
+    ]
 )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.geometry import ConvexPolytope, corners_of
 from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.world.broad_phase import EPS_M
@@ -57,8 +58,7 @@ _FIELDS = [
     ("no_fly_zone", "?"),
 ]
 
-# np.record: attributes work in plain Python too (NUMBA_DISABLE_JIT=1)
-OBSTACLE_DTYPE = np.dtype((np.record, np.dtype(_FIELDS, align=True)))
+OBSTACLE_DTYPE = record_dtype(_FIELDS)
 
 
 def overfly_limit(target_altitudes_m: NDArray[np.float64], ceiling_m: float) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.geometry import cylinder_clearance, outside_cylinder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
@@ -30,21 +31,15 @@ AHEAD_S = 5.0
 NOTHING, NOW, LATER = 0, 1, 2
 """When there is something to do; now and later add up."""
 
-PACKS_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                # how many packs it has, and the steps from a landing to its next take-off
-                ("number", "i8"),
-                ("swap_steps", "i8"),
-                # a fresh one at the start
-                ("dod", "f8"),
-                ("u_th_V", "f8"),
-            ],
-            align=True,
-        ),
-    )
+PACKS_DTYPE = record_dtype(
+    [
+        # how many packs it has, and the steps from a landing to its next take-off
+        ("number", "i8"),
+        ("swap_steps", "i8"),
+        # a fresh one at the start
+        ("dod", "f8"),
+        ("u_th_V", "f8"),
+    ]
 )
 
 

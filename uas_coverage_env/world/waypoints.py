@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.scenario import Scenario, Uas
 from uas_coverage_env.scenario.payload import asks
 from uas_coverage_env.world.events import steps_until
@@ -20,25 +21,19 @@ N_WAYPOINT_COLUMNS = SHARE_EAST + 1
 
 _NOT_CARRIED = 1 << 62
 
-WAYPOINT_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("position_m", "f8", (3,)),
-                ("radius_m", "f8"),
-                ("weight", "f8"),
-                # whether more is asked than to come near, and what: the bit of a sensor, or none;
-                # heights above the ground, and a speed
-                ("asks", "?"),
-                ("sensor", "i8"),
-                ("lowest_m", "f8"),
-                ("highest_m", "f8"),
-                ("max_speed_mps", "f8"),
-            ],
-            align=True,
-        ),
-    )
+WAYPOINT_DTYPE = record_dtype(
+    [
+        ("position_m", "f8", (3,)),
+        ("radius_m", "f8"),
+        ("weight", "f8"),
+        # whether more is asked than to come near, and what: the bit of a sensor, or none;
+        # heights above the ground, and a speed
+        ("asks", "?"),
+        ("sensor", "i8"),
+        ("lowest_m", "f8"),
+        ("highest_m", "f8"),
+        ("max_speed_mps", "f8"),
+    ]
 )
 
 

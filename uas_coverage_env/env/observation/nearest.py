@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 
 from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, stack_array
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.scales import DENSEST, DENSITY_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
@@ -29,13 +30,8 @@ N_AROUND = DENSITY + 1
 _WORD = 63
 """As many waypoints are asked at once: their answers are the bits of one number that has a sign."""
 
-NEIGHBOURS_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [("index", "i8", (N_NEIGHBOURS,)), ("distance_m", "f8", (N_NEIGHBOURS,))], align=True
-        ),
-    )
+NEIGHBOURS_DTYPE = record_dtype(
+    [("index", "i8", (N_NEIGHBOURS,)), ("distance_m", "f8", (N_NEIGHBOURS,))]
 )
 """The waypoints next to a waypoint, nearest first; -1 and infinity where there are no more."""
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.scenario import Scenario
 
 K_WAYPOINTS = 12
@@ -54,28 +55,22 @@ SCALES = {
 FORMER_NAMES = {"crowd": "density", "crowd_m": "density_m", "rival": "nearest_uas"}
 """What scales and features of waypoints are called now that had other names in version 0.2."""
 
-SCALES_DTYPE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                # one over the limits of the vehicle
-                ("per_v_xy", "f8"),
-                ("per_v_z", "f8"),
-                ("per_tilt", "f8"),
-                ("per_yaw", "f8"),
-                ("per_rate", "f8"),
-                ("per_yaw_rate", "f8"),
-                ("rank", "f8"),
-                # the box around the fence: its centre and one over half its sides
-                ("centre_m", "f8", (3,)),
-                ("per_half_side", "f8", (3,)),
-                # one over the heaviest weight
-                ("per_heaviest", "f8"),
-            ],
-            align=True,
-        ),
-    )
+SCALES_DTYPE = record_dtype(
+    [
+        # one over the limits of the vehicle
+        ("per_v_xy", "f8"),
+        ("per_v_z", "f8"),
+        ("per_tilt", "f8"),
+        ("per_yaw", "f8"),
+        ("per_rate", "f8"),
+        ("per_yaw_rate", "f8"),
+        ("rank", "f8"),
+        # the box around the fence: its centre and one over half its sides
+        ("centre_m", "f8", (3,)),
+        ("per_half_side", "f8", (3,)),
+        # one over the heaviest weight
+        ("per_heaviest", "f8"),
+    ]
 )
 """What one UAS's numbers are divided by."""
 
