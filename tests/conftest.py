@@ -47,6 +47,17 @@ def python_handles_interrupts():
 
 
 @pytest.fixture
+def bounds_found_soon(monkeypatch):
+    """Valid but looser lower bounds: prices are sought once instead of in a dozen rounds."""
+    from uas_coverage_env.bound import bound_of, carried
+
+    monkeypatch.setattr(carried, "_SEARCH", ((2, 1),))
+    monkeypatch.setattr(carried, "_AGAIN", ())
+    yield
+    bound_of.cache_clear()
+
+
+@pytest.fixture
 def user_environment():
     """The environment variables with which a user starts what is installed."""
     return {**os.environ, "PYTHONPATH": os.environ[PATH_BEFORE]}

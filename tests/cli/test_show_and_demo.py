@@ -63,8 +63,9 @@ def test_show_gives_machines_what_the_summary_says(flown, capsys):
     assert [entry["accomplished"] for entry in json.loads(capsys.readouterr().out)] == [True, False]
 
 
-def test_show_puts_the_least_energy_beside_a_flight_that_has_one(elsewhere, capsys):
-    # of few waypoints: a bound takes the longer the more there are
+def test_show_puts_the_least_energy_beside_a_flight_that_has_one(
+    elsewhere, capsys, bounds_found_soon
+):
     scenario = generate_scenario(1, n_uas=1, n_waypoints=4, n_obstacles=2)
     scenario.to_file("area.toml")
     fly = ["run", "area.toml", "--quiet"]

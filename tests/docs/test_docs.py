@@ -55,6 +55,7 @@ def test_formulas_are_drawn_by_the_browser(site):
     assert "$$" not in text
 
 
+@pytest.mark.usefixtures("bounds_found_soon")
 @pytest.mark.parametrize("page", WITH_CODE, ids=shown)
 def test_the_python_blocks_of_a_page_run_one_after_the_other(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

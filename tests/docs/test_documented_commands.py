@@ -52,6 +52,7 @@ PAGES_WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bounds_found_soon")
 @pytest.mark.parametrize("page", PAGES_WITH_COMMANDS, ids=lambda p: str(p.relative_to(ROOT)))
 def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
