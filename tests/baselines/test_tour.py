@@ -171,7 +171,7 @@ def test_a_predicted_flight_begins_where_the_uas_is_and_comes_true(small_town):
 
 
 def test_it_flies_with_the_filter_and_brings_every_uas_home_itself():
-    assert Tour().assistants == Assistants(return_mode=False, safety_filter=True)
+    assert Tour().assistants == Assistants(return_mode=None, safety_filter=True)
 
 
 @pytest.mark.parametrize("mean_mps", [3.0, 6.0])

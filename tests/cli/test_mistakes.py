@@ -158,9 +158,11 @@ def test_a_terminal_that_is_full_or_gone_is_one_line(elsewhere, capsys, monkeypa
     assert err.count("\n") == 1
 
 
-def test_a_name_that_the_terminal_cannot_show_is_shown_as_it_can(elsewhere, monkeypatch):
+@pytest.mark.parametrize("errors", ["strict", "surrogateescape"])  # the latter in the C locale
+def test_a_name_that_the_terminal_cannot_show_is_shown_as_it_can(elsewhere, monkeypatch, errors):
     terminal = io.BytesIO()
-    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(terminal, encoding="ascii"))
+    stream = io.TextIOWrapper(terminal, encoding="ascii", errors=errors)
+    monkeypatch.setattr(sys, "stdout", stream)
     assert main(["scenarios", "check", "village", "--picture", "dörfer.png"]) == 0
     sys.stdout.flush()
     assert b"drawn in d\\xf6rfer.png" in terminal.getvalue()

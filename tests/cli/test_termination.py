@@ -31,6 +31,20 @@ def test_sigterm_ends_a_flight_as_ctrl_c_does_and_keeps_what_was_flown(elsewhere
 
 
 @pytest.mark.usefixtures("python_handles_interrupts")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_a_flight_is_written_does_not_lose_it(elsewhere, monkeypatch, number):
+    save = Flight.save
+
+    def interrupted(*args, **kwargs):
+        signal.raise_signal(number)
+        save(*args, **kwargs)
+
+    monkeypatch.setattr(Flight, "save", interrupted)
+    main(["run", "open_field", "--planner", "hover", "--steps", "2", "--out", "mine"])
+    assert Flight.load("mine").steps == 2
+
+
+@pytest.mark.usefixtures("python_handles_interrupts")
 @pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
 def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
     monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))

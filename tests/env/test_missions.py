@@ -375,6 +375,8 @@ def test_unknown_names_are_refused_with_those_that_exist(make):
         env.reset(options={"scenarios": "village"})
     with pytest.raises(InputError, match="unknown scenario 'vilage'"):
         env.reset(options={"scenario": "vilage"})
+    with pytest.raises(ValueError, match=r"are 'village'; give a mapping"):
+        env.reset(options="village")
 
 
 @pytest.mark.parametrize("wrong", [{"n_uas": 0}, {"n_uas": 2.0}, {"n_waypoints": "3"}])

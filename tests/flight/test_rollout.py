@@ -10,6 +10,7 @@ from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight import (
     MODES,
     Assistants,
+    AssistedOptions,
     Decision,
     PlannerError,
     PlannerOptions,
@@ -404,6 +405,17 @@ def test_where_something_pushes_back_assistants_fly_along_unless_they_are_refuse
     assert (flight.return_mode, flight.safety_filter) == (True, True)
     flight = rollout(scenario, Still(), max_steps=2, return_mode=False, safety_filter=False)
     assert (flight.return_mode, flight.safety_filter) == (False, False)
+
+
+def test_an_assistant_that_options_take_away_stays_away_where_something_pushes_back(yard):
+    windy = changed(yard, wind=WIND)
+    planner: Any = Still()
+    planner.assistants = AssistedOptions(filter=False).assistants
+    flight = rollout(windy, planner, max_steps=1)
+    assert (flight.return_mode, flight.safety_filter) == (True, False)
+    planner.assistants = AssistedOptions(return_mode=False).assistants
+    flight = rollout(windy, planner, max_steps=1)
+    assert (flight.return_mode, flight.safety_filter) == (False, True)
 
 
 def test_in_still_air_a_planner_without_assistants_flies_without(yard):

@@ -102,6 +102,14 @@ def test_areas_have_weights_and_the_heavier_one_takes_what_overlaps():
         assert (waypoint.position_m[1] > split_m) == (waypoint.weight == 2.5)
 
 
+@pytest.mark.parametrize("weight", [1, 3])
+def test_an_area_within_another_that_weighs_as_much_changes_nothing(weight):
+    within = [[10.001, 50.0005], [10.002, 50.0005], [10.002, 50.0015], [10.001, 50.0015]]
+    alone = imported(collection(feature(SQUARE, weight=weight)), *HOME)
+    both = collection(feature(SQUARE, weight=weight), feature([*within, within[0]], weight=1))
+    assert imported(both, *HOME).waypoints == alone.waypoints
+
+
 def test_a_hole_is_not_searched():
     hole = [[10.001, 50.0005], [10.002, 50.0005], [10.002, 50.0015], [10.001, 50.0015]]
     whole = imported(collection(feature(SQUARE)), *HOME)

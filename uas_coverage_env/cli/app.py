@@ -186,7 +186,9 @@ def _run(argv: Sequence[str] | None) -> int:
 
 def _never_stop_at_a_letter() -> None:
     r"""Names of files may hold what the terminal cannot show: it is written as `\xfc` then."""
-    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+    # the latter in the C locale
+    stops = ("strict", "surrogateescape")
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors in stops:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 

@@ -15,12 +15,14 @@ from uas_coverage_env.flight import (
     packs_used,
     summary,
 )
+from uas_coverage_env.flight.interruption import interruptions_noted
 
 
 def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> None:
-    """Write a flight directory with its map."""
-    flight.save(directory, overwrite=overwrite)
-    draw_flight(flight, directory / "map.png")
+    """Write a flight directory with its map; one Ctrl-C meanwhile does not lose the flight."""
+    with interruptions_noted():
+        flight.save(directory, overwrite=overwrite)
+        draw_flight(flight, directory / "map.png")
 
 
 def report_flight(screen: Console, flight: Flight, directory: Path) -> None:

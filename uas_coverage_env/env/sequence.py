@@ -92,8 +92,10 @@ def check_options(options: Mapping[str, Any], *known: str) -> None:
     """Refuse misspelt options of `reset`; others are ignored, as PettingZoo's tests demand.
 
     Raises:
-        ValueError: One is close to a known one; says which.
+        ValueError: One is close to a known one; says which. Or they are no mapping.
     """
+    if not isinstance(options, Mapping):
+        raise ValueError(f"options of reset() are {options!r}; give a mapping from name to value")
     for name in options:
         close = meant(str(name), known)
         if close and name not in known:

@@ -15,10 +15,14 @@ from uas_coverage_env.world import Command, SwarmState
 
 @dataclass(frozen=True)
 class Assistants:
-    """The assistants of the world that fly along, see `World`."""
+    """Which assistants of the world fly along, see `World`.
 
-    return_mode: bool = False
-    safety_filter: bool = False
+    True: always; False: never; None: where something pushes back or a mission needs them
+    otherwise, see `rollout`.
+    """
+
+    return_mode: bool | None = None
+    safety_filter: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -113,5 +117,10 @@ class AssistedOptions(PlannerOptions):
 
     @property
     def assistants(self) -> Assistants:
-        """The assistants that these options ask for."""
-        return Assistants(return_mode=self.return_mode, safety_filter=self.filter)
+        """The assistants that these options ask for, or take away."""
+        return Assistants(self._wish("return_mode"), self._wish("filter"))
+
+    def _wish(self, name: str) -> bool | None:
+        # off by default: the planner does without where nothing pushes back
+        off_anyway = type(self).model_fields[name].default is False
+        return getattr(self, name) or (None if off_anyway else False)

@@ -57,7 +57,8 @@ class PolicyFunction:
         self._policy = policy
         self._settings = settings
         self._swarm_of = swarm_of
-        self.assistants = Assistants(settings.return_mode, settings.safety_filter)
+        # what it was trained without it may need in wind
+        self.assistants = Assistants(settings.return_mode or None, settings.safety_filter or None)
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile observation and action."""

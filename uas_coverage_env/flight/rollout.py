@@ -80,9 +80,9 @@ def rollout(
         planner: A planner, or the name of an installed one (flown with its default options).
         seed: The seed of the planner and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
-        return_mode: Let the world bring UAS home in time; None: as the planner asks, and where
-            something pushes back (wind, wrong models, sensors, events) or UAS swap packs while the
-            others fly on.
+        return_mode: Let the world bring UAS home in time; None: as the planner asks, and unless it
+            refuses, where something pushes back (wind, wrong models, sensors, events) or UAS swap
+            packs while the others fly on.
         safety_filter: Let the world keep commands clear of harm; None: likewise.
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
@@ -112,11 +112,15 @@ def rollout(
     made_anew = swaps_alone(scenario) and not plans_on
     uncertain = _is_uncertain(scenario, disturbances) or made_anew
     if return_mode is None:
+        return_mode = assistants.return_mode
         # return mode would fly home another way than the file
         comes_home = by_legs and getattr(planner, "comes_home_by_legs", False)
-        return_mode = uncertain or (assistants.return_mode and not comes_home)
+        if return_mode is None or (return_mode and comes_home):
+            return_mode = uncertain
     if safety_filter is None:
-        safety_filter = assistants.safety_filter or uncertain or by_legs
+        safety_filter = assistants.safety_filter
+        if safety_filter is None:
+            safety_filter = uncertain or by_legs
     with compiling_for(f"planner {name_of(planner)}"):
         world = World(
             scenario,

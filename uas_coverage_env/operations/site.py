@@ -188,7 +188,8 @@ def _apart(areas: list[Area]) -> tuple[Area, ...]:
             left = left.difference(taken)
             # what is thinner than can be drawn is where two edges nearly agree
             left = left.buffer(-_EDGE_M, join_style="mitre").buffer(_EDGE_M, join_style="mitre")
-        result.append(area._replace(shape=left))
+        if not left.is_empty:
+            result.append(area._replace(shape=left))
         taken_by[area.camera] = taken.union(area.shape)
     return tuple(result)
 

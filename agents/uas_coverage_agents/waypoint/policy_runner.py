@@ -86,7 +86,8 @@ class WaypointRunner:
         if described.network != network(described.network.hidden, described.network.prior):
             raise ValueError("its network does not fit to its observation; train it anew")
         self._weights = weights_of(described.network, policy.tensors)
-        self._assistants = assistants
+        self._return_mode = bool(assistants.return_mode)
+        self._safety_filter = bool(assistants.safety_filter)
         self._simulations = simulations
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -147,7 +148,7 @@ class WaypointRunner:
         looked_ahead = self._simulations == 0
         while True:
             i = next_to_decide(
-                arena, self._legs, state, self._assistants.return_mode, self._blocked,
+                arena, self._legs, state, self._return_mode, self._blocked,
                 self._targets, choices,
             )  # fmt: skip
             if i == NO_UAS:
@@ -171,10 +172,10 @@ class WaypointRunner:
         """Make the plan better; the observation in the workspace is lost."""
         choices = self._workspace.choices
         kept = choices.candidates.copy(), choices.legal.copy()
-        return_mode = self._assistants.return_mode
+        return_mode = self._return_mode
         improve(
             self._still, self._legs, self._weights, Moment(state, self._targets, self._blocked),
-            return_mode, assistants(return_mode, self._assistants.safety_filter), self._plan,
+            return_mode, assistants(return_mode, self._safety_filter), self._plan,
             self._simulations, self._workspace._replace(flight=flight_code()), self._rng,
             self._trial, self._best,
         )  # fmt: skip
