@@ -12,6 +12,7 @@ from chromium import (
     cards,
     colours,
     complaints,
+    emulate,
     map_pixels,
     needs_chromium,
     opened,
@@ -258,3 +259,32 @@ def test_what_is_going_on_fits_the_screen(browser, page, troubled, size):
     for part in browser.find_elements(By.CSS_SELECTOR, ".now li, .legend"):
         assert part.rect["x"] >= stage["x"]
         assert part.rect["x"] + part.rect["width"] <= stage["x"] + stage["width"] + 1
+
+
+def test_a_name_that_lies_on_its_curve_has_an_edge(browser, flight, tmp_path):
+    """A name longer than the margin begins on the curve."""
+    fleet = flight.scenario.uas
+    named = [
+        uas.model_copy(update={"name": name})
+        for name, uas in zip(("alpha", "bravo"), fleet, strict=True)
+    ]
+    scouts = flight.scenario.model_copy(update={"uas": tuple(named)})
+    renamed = dataclasses.replace(flight, scenario=scouts, violations=())
+    opened(browser, write_replay([renamed], tmp_path / "replay.html"), DESKTOP, "dark")
+    edge = browser.execute_script(
+        "return getComputedStyle(document.documentElement).getPropertyValue('--halo')"
+    )
+    charge = pixels(browser, ".charts .chart")[:, -60:]
+    assert (charge == tuple(bytes.fromhex(edge.strip("# ")))).all(axis=2).sum() > 30
+
+
+def test_a_page_that_is_shown_later_draws_its_curves_then(browser, page):
+    opened(browser, page)
+    browser.execute_script("document.querySelector('.charts').style.display = 'none'")
+    emulate(browser, DESKTOP, "light")
+    settled(browser)
+    assert complaints(browser) == []
+    browser.execute_script("document.querySelector('.charts').style.display = ''")
+    emulate(browser, SMALL, "light")
+    settled(browser)
+    assert colours(pixels(browser, ".charts .chart")) > 20

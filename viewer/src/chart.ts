@@ -2,7 +2,7 @@
 // and a cursor at the time of the page.
 
 import { BAND_WORDS, bandOf, drawBand } from "./band";
-import { noReturn, stroke } from "./marks";
+import { noReturn, stroke, words } from "./marks";
 import { bright, colour, legible } from "./palette";
 import { roundStep } from "./round_step";
 
@@ -96,6 +96,8 @@ export abstract class TimeCanvas {
       canvas.width = Math.round(this.width * ratio);
       canvas.height = Math.round(this.height * ratio);
     }
+    // a canvas of a page that is not laid out yet cannot be copied
+    if (this.width === 0 || this.height === 0) return;
     this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.pen.clearRect(0, 0, this.width, this.height);
     this.drawStill();
@@ -327,9 +329,9 @@ export class Chart extends TimeCanvas {
       const apart = Math.min(y, room);
       room = apart - 11;
       this.pen.font = "600 11px system-ui, sans-serif";
-      // a long name that begins at the end of a flight would leave the picture
+      // a long name that begins at the end of a flight would leave the picture; it lies on the curve
       const left = Math.min(x, this.width - 1 - this.pen.measureText(line.label).width);
-      this.write(line.label, left, apart, legible(line.colour), "left", 600);
+      words(this.pen, line.label, left, apart, 11, legible(line.colour), "left");
     }
   }
 
