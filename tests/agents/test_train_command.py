@@ -9,6 +9,7 @@ import sys
 import time
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import filelock
 import numpy as np
@@ -16,7 +17,7 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 from uas_coverage_agents.policy import load_policy
-from uas_coverage_agents.training import command
+from uas_coverage_agents.training import command, loop
 from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.training.loop import curve_scenarios
 from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
@@ -139,9 +140,24 @@ def test_another_seed_gives_other_weights(trained, tmp_path):
     assert other.description.weights_sha256 != first.description.weights_sha256
 
 
-def test_a_training_by_the_clock_ends_and_improves_nothing_it_should_not(tmp_path):
-    assert train(tmp_path / "run", "--minutes", "0.01") == 0
-    assert load_policy(tmp_path / "run" / "policy").description.training.steps >= 0
+def test_the_minutes_of_a_training_begin_with_its_first_step(tmp_path, monkeypatch):
+    now_s, fly = [0.0], TrainingRun.flights
+
+    def monotonic() -> float:
+        now_s[0] += 0.1
+        return now_s[0]
+
+    def slowly_at_first(self, scenarios):
+        now_s[0] += 0.0 if self.model.num_timesteps else 3600.0
+        return fly(self, scenarios)
+
+    clock = SimpleNamespace(monotonic=monotonic, process_time=monotonic)
+    monkeypatch.setattr(loop, "time", clock)
+    monkeypatch.setattr(TrainingRun, "flights", slowly_at_first)
+    assert train(tmp_path / "run", "--minutes", "0.05") == 0
+    training = load_policy(tmp_path / "run" / "policy").description.training
+    assert training.steps > 4 * 128  # a rollout: two missions of up to two UAS, 32 steps
+    assert 3.0 <= training.wall_s < 60.0
 
 
 def test_other_settings_are_not_mixed_into_a_training(trained, capsys):

@@ -53,7 +53,7 @@ def train(
         int | None, typer.Option(min=1, help="Environment steps to train on; repeatable.")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="Stop after this time instead of --steps.")
+        float | None, typer.Option(min=0.01, help="Train for this time instead of --steps.")
     ] = None,
     change: Annotated[
         list[str] | None,

@@ -117,8 +117,7 @@ class _TrainingCallback(BaseCallback):
         )
         job = training_run.job
         self._points = list(state.curve) if state else []
-        self._process_before_s = (state.process_s if state else 0.0) - time.process_time()
-        self._wall_before_s = (state.wall_s if state else 0.0) - time.monotonic()
+        self._start_the_clock(state.process_s if state else 0.0, state.wall_s if state else 0.0)
         self._saved_at_s = time.monotonic()
         self._scenarios = curve_scenarios(job)
         self._share = 0.0
@@ -139,6 +138,9 @@ class _TrainingCallback(BaseCallback):
         self._tell()
 
     def _on_rollout_start(self) -> None:
+        if not self._points:  # compiling and flights of what has learned nothing are no training
+            self._fly()
+            self._start_the_clock(0.0, 0.0)
         self._look_at_the_clock()
         job = self._training_run.job
         if job.minutes is None:
@@ -154,6 +156,10 @@ class _TrainingCallback(BaseCallback):
     def _on_step(self) -> bool:
         # the clock is looked at before a rollout, so that none is thrown away
         return self._training_run.job.minutes is None or self._share < 1.0
+
+    def _start_the_clock(self, process_s: float, wall_s: float) -> None:
+        self._process_before_s = process_s - time.process_time()
+        self._wall_before_s = wall_s - time.monotonic()
 
     def _look_at_the_clock(self) -> None:
         self._training_run.process_s = self._process_before_s + time.process_time()
