@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,17 +35,16 @@ class AlongRunner(RouteRunner):
 
     routes: Sequence[NDArray[np.int64]] = ()
 
-    def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Take the given routes."""
-        super().reset(brief, seed)
-        self._routes.take(self.routes)
+    def candidates(self) -> Iterator[list[NDArray[np.int64]]]:
+        """The given routes, and no others."""
+        yield list(self.routes)
 
 
 class Along(LearnedRoute):
     """`learned-route` along the routes of its `runner`."""
 
     def _make_runner(self) -> AlongRunner:
-        self.runner = AlongRunner(self.policy, self.assistants, samples=1)
+        self.runner = AlongRunner(self.policy, self.assistants, samples=1, changes=0)
         return self.runner
 
 

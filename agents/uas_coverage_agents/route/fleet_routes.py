@@ -82,6 +82,14 @@ class FleetRoutes:
             self._routes[u, : len(route)] = route
             self._lengths[u] = len(route)
 
+    def draw_again(self) -> None:
+        """Draw and improve other routes for where the UAS were when these were built."""
+        self._build(*self._situation)
+
+    def of_all(self) -> list[NDArray[np.int64]]:
+        """A copy of the routes of all UAS."""
+        return [self.of(u).copy() for u in range(len(self._lengths))]
+
     def of(self, u: int) -> NDArray[np.int64]:
         """The waypoints that UAS u still has to visit, in order; home comes after them."""
         return self._routes[u, : self._lengths[u]]
@@ -115,7 +123,8 @@ class FleetRoutes:
         works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
         self._forget_covered(swarm.uncovered, works)
         if self._has_to_build(swarm, wanted, blocked, works):
-            self._build(swarm, wanted, blocked, works)
+            self._situation = swarm, wanted, blocked, works
+            self._build(*self._situation)
             self._built_for, self._built_at = (wanted & blocked, works), swarm.step
         return blocked
 

@@ -48,7 +48,7 @@ HORIZON = 24
 """Steps of a plan at most."""
 
 TRIES = 300
-"""Changes that are tried in each step."""
+"""Changes that are tried in each step of a flight."""
 
 STRAIGHT, OVER, ROUND = range(3)
 """Ways to aim: at the place itself, as the world's routes lead, or round what could be passed
@@ -59,6 +59,7 @@ _BRAKING, _STANDS_MPS = 12, 0.1
 _LEAD_S = 1.2
 _BEGIN_SPEEDS = (1.0, 0.7)
 _BASE_HELD = 3
+_BRAKED, _SLOW_SPEEDS = 5, (1.0, 0.4)  # where nothing else is clear
 _LONGEST = 4  # steps that a change concerns
 _DECADES = 1.5  # over which the sizes of changes are spread
 _TURN_RAD, _RISE_M = 1.5, 3.0  # largest changes
@@ -283,11 +284,29 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspa
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
+    if best_s < np.inf:
+        return best_s, used, way
+    for held in range(_BRAKED):
+        trial[:held, :2] = 0.0
+        trial[:held, 2] = -x[Z]
+        for begins in (OVER, ROUND, STRAIGHT):
+            for share in _SLOW_SPEEDS:
+                _aim(
+                    arena, around, i, x, reference, trial, held, begins, share, workspace, belief
+                )
+                cost_s, steps = _weigh(
+                    arena, around, i, x, reference, trial, layers, best_s, workspace, belief
+                )
+                if cost_s < best_s:
+                    best_s, used, way = cost_s, steps, begins
+                    best[:] = trial
     return best_s, used, way
 
 
 @allocating_kernel
-def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief):
+def _search(
+    arena, around, i, x, reference, layers, plan, kept, has_base, tries, rng, workspace, belief
+):
     """Write the best plan found to the first of `workspace.ahead`; whether there is one."""
     trial, best, speed_mps = workspace.trial, workspace.best, arena.uas[i].speed_mps
     aim_ahead(arena.vehicles[i], x, workspace.ahead, workspace.aims_m)
@@ -296,7 +315,7 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, w
     )
     if best_s == np.inf:
         return False
-    for _ in range(TRIES):
+    for _ in range(tries):
         trial[:] = best
         end = _change(trial, used, speed_mps, rng)
         if rng.random() < _ANEW:
@@ -313,7 +332,7 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, w
 
 @allocating_kernel
 def plan_along(
-    arena, around, i, x, reference, targets, layers, plan, kept, rng, workspace, belief=None
+    arena, around, i, x, reference, targets, layers, plan, kept, tries, rng, workspace, belief=None
 ):
     """Write the plan whose first row is to be flown by UAS i.
 
@@ -328,6 +347,7 @@ def plan_along(
         plan: (HORIZON, 3) velocity north and east [m/s] and altitude [m]; what is left of the plan
             of the step before, written.
         kept: Whether there is one.
+        tries: Changes that are tried.
         rng: Of the changes.
         workspace: `Workspace`.
         belief: (N_BELIEF,) of its inner loop, where a wind is known; None: in still air.
@@ -348,8 +368,9 @@ def plan_along(
         for k in range(AHEAD):
             workspace.rows[k] = write_place(arena, i, targets, n_targets, k, workspace.ahead[k])
         if _search(
-            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief
-        ):
+            arena, around, i, x, reference, layers, plan, kept, has_base, tries, rng, workspace,
+            belief,
+        ):  # fmt: skip
             return True
     plan[:] = workspace.base
     # of one step only, weighed as in still air

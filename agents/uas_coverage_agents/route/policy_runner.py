@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
@@ -14,7 +15,9 @@ from uas_coverage_agents.route.improvement import CHANGES
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
-from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
+from uas_coverage_agents.route.leg_search import HORIZON, TRIES, plan_along, search_workspace
+from uas_coverage_agents.route.mission import WEIGHT
+from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import LearntWind, MissionBrief, first_sight, in_disturbances
 from uas_coverage_env.mission.raised import raised
@@ -34,6 +37,7 @@ class RouteRunner:
         assistants: The assistants of the world that fly along.
         samples: Sets of routes that are built.
         changes: By which the cheapest of these, by estimated times, is improved before it is flown.
+        rehearsed: Sets of routes that are drawn and improved in this way, and then rehearsed.
 
     Raises:
         ValueError: The policy was trained on another observation, or has another network.
@@ -45,6 +49,7 @@ class RouteRunner:
         assistants: Assistants,
         samples: int = SAMPLES,
         changes: int = CHANGES,
+        rehearsed: int = CANDIDATES,
     ) -> None:
         described = policy.description
         if described.observation != observation():
@@ -57,7 +62,7 @@ class RouteRunner:
         self._score = layers_of(network.order, tensors, "order.")
         self._home_score = layers_of(network.home, tensors, "home.")
         self._flight = layers_of(network.flight, tensors, "flight.")
-        self._samples, self._changes = samples, changes
+        self._samples, self._changes, self._rehearsed = samples, changes, rehearsed
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
@@ -76,8 +81,31 @@ class RouteRunner:
             self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
         self._workspace = search_workspace(int(self._arena.rules[0].lookahead_steps))
         self._rng = np.random.default_rng(seed)
+        self._rehearsal: Rehearsal | None = None
+        if self._rehearsed and not brief.moving_obstacles and brief.conditions is None:
+            self._rehearsal = Rehearsal(
+                self._arena, self._around, self._flight, self._routes.view.state.x, self._rng
+            )
+            self._rehearse(self._rehearsal)
         n_uas = len(brief.uas)
         self._plans, self._kept = np.zeros((n_uas, HORIZON, 3)), np.zeros(n_uas, np.bool_)
+
+    def candidates(self) -> Iterator[list[NDArray[np.int64]]]:
+        """Sets of routes that may be flown."""
+        for _ in range(self._rehearsed):
+            yield self._routes.of_all()
+            self._routes.draw_again()
+
+    def _rehearse(self, rehearsal: Rehearsal) -> None:
+        """Take the cheapest routes, as rehearsed."""
+        best, best_s = [], np.inf
+        for routes in self.candidates():
+            times_s = rehearsal.times_s(routes)
+            cost_s = max(times_s) + WEIGHT * sum(times_s)
+            if cost_s < best_s:
+                best, best_s = routes, cost_s
+        self._routes.take(best)
+        rehearsal.take(best)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on along the routes; build them again where they are no longer right."""
@@ -91,7 +119,11 @@ class RouteRunner:
         kept, self._kept[u] = bool(self._kept[u]), False
         if (guided := routes.guided(swarm, u)) is not None:
             return guided
-        velocity = self._searched(u, kept)
+        velocity = None
+        if self._rehearsal is not None:
+            velocity = self._rehearsal.next(u, swarm.x[u], routes.of(u))
+        if velocity is None:
+            velocity = self._searched(u, kept)
         if velocity is None:
             return routes.onwards(u)
         north_mps, east_mps, altitude_m = velocity
@@ -103,7 +135,7 @@ class RouteRunner:
         belief = None if self._learnt is None else self._learnt.belief[u]
         if not plan_along(
             self._arena, self._around, u, state.x[u], state.reference[u],
-            self._routes.of(u)[:AHEAD], self._flight, plan, kept, self._rng, self._workspace,
+            self._routes.of(u)[:AHEAD], self._flight, plan, kept, TRIES, self._rng, self._workspace,
             belief,
         ):  # fmt: skip
             return None
