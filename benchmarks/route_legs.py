@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.route.policy_runner import RouteRunner
+from uas_coverage_agents.route.rehearsal import Rehearsal
 from uas_coverage_agents.training.route_labels import town_of
 
 from uas_coverage_env import MissionBrief, Scenario, load_planner, rollout
@@ -35,9 +36,9 @@ class AlongRunner(RouteRunner):
 
     routes: Sequence[NDArray[np.int64]] = ()
 
-    def candidates(self) -> Iterator[list[NDArray[np.int64]]]:
-        """The given routes, and no others."""
-        yield list(self.routes)
+    def choose_routes(self, rehearsal: Rehearsal) -> None:
+        """Take the given routes."""
+        self.take(list(self.routes), rehearsal)
 
 
 class Along(LearnedRoute):

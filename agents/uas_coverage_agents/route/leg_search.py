@@ -291,9 +291,7 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspa
         trial[:held, 2] = -x[Z]
         for begins in (OVER, ROUND, STRAIGHT):
             for share in _SLOW_SPEEDS:
-                _aim(
-                    arena, around, i, x, reference, trial, held, begins, share, workspace, belief
-                )
+                _aim(arena, around, i, x, reference, trial, held, begins, share, workspace, belief)
                 cost_s, steps = _weigh(
                     arena, around, i, x, reference, trial, layers, best_s, workspace, belief
                 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,8 @@ class RouteRunner:
         assistants: The assistants of the world that fly along.
         samples: Sets of routes that are built.
         changes: By which the cheapest of these, by estimated times, is improved before it is flown.
-        rehearsed: Sets of routes that are drawn and improved in this way, and then rehearsed.
+        rehearsed: Sets of routes that are built in this way and rehearsed; 0: none is, and flights
+            are searched step by step.
 
     Raises:
         ValueError: The policy was trained on another observation, or has another network.
@@ -86,26 +87,28 @@ class RouteRunner:
             self._rehearsal = Rehearsal(
                 self._arena, self._around, self._flight, self._routes.view.state.x, self._rng
             )
-            self._rehearse(self._rehearsal)
+            self.choose_routes(self._rehearsal)
         n_uas = len(brief.uas)
         self._plans, self._kept = np.zeros((n_uas, HORIZON, 3)), np.zeros(n_uas, np.bool_)
 
-    def candidates(self) -> Iterator[list[NDArray[np.int64]]]:
-        """Sets of routes that may be flown."""
-        for _ in range(self._rehearsed):
-            yield self._routes.of_all()
-            self._routes.draw_again()
-
-    def _rehearse(self, rehearsal: Rehearsal) -> None:
-        """Take the cheapest routes, as rehearsed."""
-        best, best_s = [], np.inf
-        for routes in self.candidates():
-            times_s = rehearsal.times_s(routes)
+    def choose_routes(self, rehearsal: Rehearsal) -> None:
+        """Fly the cheapest of some sets of routes; each is built with what legs took before."""
+        best, best_s = self._routes.of_all(), np.inf
+        for candidate in range(self._rehearsed):
+            routes = self._routes.of_all()
+            reached_s = [rehearsal.reached_s(u, route) for u, route in enumerate(routes)]
+            times_s = [float(at_s[-1]) for at_s in reached_s]
             cost_s = max(times_s) + WEIGHT * sum(times_s)
             if cost_s < best_s:
                 best, best_s = routes, cost_s
-        self._routes.take(best)
-        rehearsal.take(best)
+            if candidate + 1 < self._rehearsed:
+                self._routes.build_again(reached_s)
+        self.take(best, rehearsal)
+
+    def take(self, routes: list[NDArray[np.int64]], rehearsal: Rehearsal) -> None:
+        """Fly along routes as they are rehearsed."""
+        self._routes.take(routes)
+        rehearsal.take(routes)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on along the routes; build them again where they are no longer right."""

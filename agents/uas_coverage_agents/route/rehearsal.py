@@ -28,7 +28,9 @@ from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 CANDIDATES = 2
 """Sets of routes that are rehearsed, the cheapest of which is flown."""
 
-_FLIGHTS, _TRIES = 8, 50
+_FLIGHTS = 8  # of a UAS side by side, in missions of up to:
+_WAYPOINTS = 100
+_CHANGES = 400  # in each step, shared by these flights
 _STUCK_S = 20.0  # what is charged where guidance would have to fly
 _SAME = 1e-6  # metres, metres per second
 
@@ -115,9 +117,7 @@ def _rest_s(arena, around, i, x, reference, left, n, layers, workspace):
     ahead, speed_mps = workspace.ahead, arena.uas[i].speed_mps
     for k in range(AHEAD):
         workspace.rows[k] = write_place(arena, i, left, n, k, ahead[k])
-    seconds = observe_places(
-        x, reference, speed_mps, ahead[0], ahead[1], ahead[2], workspace.row
-    )
+    seconds = observe_places(x, reference, speed_mps, ahead[0], ahead[1], ahead[2], workspace.row)
     seconds += value_of(layers, workspace.row)
     seconds += detour_s(arena, around, i, workspace.rows[0], x, ahead[0])
     for k in range(3, n + 1):
@@ -139,8 +139,18 @@ def _fly_until(arena, around, i, flights, f, goal, layers, tries, rng, workspace
         step = flights.steps[f]
         plan = flights.plan[f]
         if step == flights.commands.shape[1] or not plan_along(
-            arena, around, i, x, reference, left[: min(flights.n_left[f], AHEAD)], layers, plan,
-            flights.kept[f], tries, rng, workspace,
+            arena,
+            around,
+            i,
+            x,
+            reference,
+            left[: min(flights.n_left[f], AHEAD)],
+            layers,
+            plan,
+            flights.kept[f],
+            tries,
+            rng,
+            workspace,
         ):
             return False
         flights.commands[f, step] = plan[0]
@@ -239,13 +249,30 @@ class Rehearsal:
         self._arena, self._around, self._layers = arena, around, layers
         self._x, self._rng = x.copy(), rng
         self._workspace = search_workspace(int(arena.rules[0].lookahead_steps))
-        self._room = _room(_FLIGHTS, len(arena.waypoints), int(arena.rules[0].max_steps))
+        n_waypoints = len(arena.waypoints)
+        n_flights = max(1, min(_FLIGHTS, _FLIGHTS * _WAYPOINTS // n_waypoints))
+        self._room = _room(n_flights, n_waypoints, int(arena.rules[0].max_steps))
+        self._tries = _CHANGES // n_flights
         self._known: dict[tuple[int, ...], tuple[float, NDArray[np.float64]]] = {}
         self._flights: list[Rehearsed | None] = [None] * len(x)
 
-    def times_s(self, routes: Sequence[NDArray[np.int64]]) -> list[float]:
-        """How long flights along these routes take [s]; 0 for a UAS without waypoints."""
-        return [self._flown(u, route)[0] if len(route) else 0.0 for u, route in enumerate(routes)]
+    def reached_s(self, u: int, route: NDArray[np.int64]) -> NDArray[np.float64]:
+        """When UAS u reaches each waypoint of a route, and home [s]; (0,) if it has no waypoints.
+
+        Where guidance would have to fly, the rest is reached with an estimate of the end.
+        """
+        if len(route) == 0:
+            return np.zeros(1)
+        seconds, commands = self._flown(u, route)
+        x, reference, left = self._x[u].copy(), np.zeros(2), route.copy()
+        dt_s, n, at_s = self._arena.rules[0].dt_s, len(route), {}
+        for step, values in enumerate(commands):
+            n_left = _fly_step(self._arena, u, x, reference, left, n, values, self._workspace)
+            if n_left < n:
+                now = set(left[:n_left].tolist())
+                at_s |= {w: (step + 1) * dt_s for w in route.tolist() if w not in now | set(at_s)}
+                n = n_left
+        return np.array([*(at_s.get(w, seconds) for w in route.tolist()), seconds])
 
     def take(self, routes: Sequence[NDArray[np.int64]]) -> None:
         """Fly along these routes as rehearsed."""
@@ -266,7 +293,7 @@ class Rehearsal:
         goes_as_rehearsed = (
             len(commands) > 0
             and np.array_equal(route, left)
-            and np.abs(x[:VZ + 1] - expected[:VZ + 1]).max() < _SAME
+            and np.abs(x[: VZ + 1] - expected[: VZ + 1]).max() < _SAME
         )
         if not goes_as_rehearsed:
             self._flights[u] = None
@@ -283,8 +310,8 @@ class Rehearsal:
         if key not in self._known:
             room = self._room
             seconds = _rehearse(
-                self._arena, self._around, u, self._x[u], route, self._layers, _TRIES, self._rng,
-                self._workspace, room,
+                self._arena, self._around, u, self._x[u], route, self._layers, self._tries,
+                self._rng, self._workspace, room,
             )  # fmt: skip
             self._known[key] = float(seconds), room.commands[0, : room.steps[0]].copy()
         return self._known[key]
