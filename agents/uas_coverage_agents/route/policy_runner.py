@@ -17,7 +17,7 @@ from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_netw
 from uas_coverage_agents.route.leg_flight import AHEAD
 from uas_coverage_agents.route.leg_search import HORIZON, TRIES, plan_along, search_workspace
 from uas_coverage_agents.route.mission import WEIGHT
-from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal
+from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_missions
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import LearntWind, MissionBrief, first_sight, in_disturbances
 from uas_coverage_env.mission.raised import raised
@@ -67,8 +67,11 @@ class RouteRunner:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
+        rehearsed, self._rehearsed = self._rehearsed, min(self._rehearsed, 1)
         self.reset(brief, 0)
+        self._rehearsal = None
         self.act(first_sight(brief))
+        self._rehearsed = rehearsed
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples and changes draw from the seed."""
@@ -94,14 +97,15 @@ class RouteRunner:
     def choose_routes(self, rehearsal: Rehearsal) -> None:
         """Fly the cheapest of some sets of routes; each is built with what legs took before."""
         best, best_s = self._routes.of_all(), np.inf
-        for candidate in range(self._rehearsed):
+        candidates = in_large_missions(self._rehearsed, len(self._arena.waypoints))
+        for candidate in range(candidates):
             routes = self._routes.of_all()
             reached_s = [rehearsal.reached_s(u, route) for u, route in enumerate(routes)]
             times_s = [float(at_s[-1]) for at_s in reached_s]
             cost_s = max(times_s) + WEIGHT * sum(times_s)
             if cost_s < best_s:
                 best, best_s = routes, cost_s
-            if candidate + 1 < self._rehearsed:
+            if candidate + 1 < candidates:
                 self._routes.build_again(reached_s)
         self.take(best, rehearsal)
 

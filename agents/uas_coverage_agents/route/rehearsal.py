@@ -25,14 +25,19 @@ from uas_coverage_env.world import Arena
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
-CANDIDATES = 2
+CANDIDATES = 4
 """Sets of routes that are rehearsed, the cheapest of which is flown."""
 
-_FLIGHTS = 8  # of a UAS side by side, in missions of up to:
-_WAYPOINTS = 100
+_FLIGHTS = 8  # of a UAS side by side
 _CHANGES = 400  # in each step, shared by these flights
+_WAYPOINTS = 100  # larger missions get fewer candidates and flights
 _STUCK_S = 20.0  # what is charged where guidance would have to fly
 _SAME = 1e-6  # metres, metres per second
+
+
+def in_large_missions(count: int, n_waypoints: int) -> int:
+    """What is left of a count of candidates or flights in a mission of so many waypoints."""
+    return max(1, min(count, count * _WAYPOINTS // n_waypoints))
 
 
 class Flights(NamedTuple):
@@ -250,7 +255,7 @@ class Rehearsal:
         self._x, self._rng = x.copy(), rng
         self._workspace = search_workspace(int(arena.rules[0].lookahead_steps))
         n_waypoints = len(arena.waypoints)
-        n_flights = max(1, min(_FLIGHTS, _FLIGHTS * _WAYPOINTS // n_waypoints))
+        n_flights = in_large_missions(_FLIGHTS, n_waypoints)
         self._room = _room(n_flights, n_waypoints, int(arena.rules[0].max_steps))
         self._tries = _CHANGES // n_flights
         self._known: dict[tuple[int, ...], tuple[float, NDArray[np.float64]]] = {}
