@@ -40,7 +40,7 @@ def searched(monkeypatch):
 def test_in_still_air_nothing_is_searched_after_take_off(town, searched):
     flight = rollout(town, "learned-route")
     assert flight.covered[-1].all()
-    assert searched == []
+    assert len(searched) == 1  # the warm-up
 
 
 @pytest.mark.parametrize("kind", ["wind", "helicopter"])
@@ -50,7 +50,7 @@ def test_in_wind_and_near_what_moves_every_step_is_searched(town, searched, kind
     else:
         scenario = "village"
     rollout(scenario, "learned-route", max_steps=3)
-    assert searched
+    assert len(searched) > 3
 
 
 def _rehearsal(scenario):
