@@ -14,7 +14,7 @@ from uas_coverage_agents.route.leg_flight import (
     places_ahead,
     steer_along,
 )
-from uas_coverage_agents.route.leg_search import HORIZON, TRIES, plan_along, search_workspace
+from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, no_record, route_workspace
 from uas_coverage_agents.route.places import detour_s, places_along
@@ -204,7 +204,7 @@ def test_a_plan_covers_the_waypoint_behind_a_house_and_stays_clear(behind_a_hous
     workspace = search_workspace(int(arena.rules[0].lookahead_steps))
     assert plan_along(
         arena, around, 0, x, reference, np.arange(2), layers, plan, False,
-        TRIES, np.random.default_rng(0), workspace,
+        np.random.default_rng(0), workspace,
     )  # fmt: skip
     command, u, path_m = np.zeros(1, COMMAND_DTYPE)[0], np.zeros(5), [x[:3].copy()]
     while np.linalg.norm(x[:3] - (90.0, 50.0, -14.0)) > 10.0 and len(path_m) <= HORIZON:

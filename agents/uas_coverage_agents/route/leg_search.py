@@ -67,9 +67,10 @@ _SPEED, _ALTITUDE, _ANEW = 0.4, 0.2, 0.1  # how often they concern speed, altitu
 
 
 class Workspace(NamedTuple):
-    """Arrays that a search writes to.
+    """How long a search goes on, and arrays that it writes to.
 
     Attributes:
+        tries: Changes that are tried in each step.
         x: (14,) a state.
         reference: (2,) of the inner loop.
         u: (5,) inputs.
@@ -86,6 +87,7 @@ class Workspace(NamedTuple):
         base: (3,) what `leg_flight` would fly.
     """
 
+    tries: int
     x: NDArray[np.float64]
     reference: NDArray[np.float64]
     u: NDArray[np.float64]
@@ -102,9 +104,10 @@ class Workspace(NamedTuple):
     base: NDArray[np.float64]
 
 
-def search_workspace(lookahead_steps: int) -> Workspace:
+def search_workspace(lookahead_steps: int, tries: int = TRIES) -> Workspace:
     """An empty one; `lookahead_steps` are those of the arena's rules."""
     return Workspace(
+        tries=tries,
         x=np.zeros(14),
         reference=np.zeros(2),
         u=np.zeros(5),
@@ -302,9 +305,7 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspa
 
 
 @allocating_kernel
-def _search(
-    arena, around, i, x, reference, layers, plan, kept, has_base, tries, rng, workspace, belief
-):
+def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief):
     """Write the best plan found to the first of `workspace.ahead`; whether there is one."""
     trial, best, speed_mps = workspace.trial, workspace.best, arena.uas[i].speed_mps
     aim_ahead(arena.vehicles[i], x, workspace.ahead, workspace.aims_m)
@@ -313,7 +314,7 @@ def _search(
     )
     if best_s == np.inf:
         return False
-    for _ in range(tries):
+    for _ in range(workspace.tries):
         trial[:] = best
         end = _change(trial, used, speed_mps, rng)
         if rng.random() < _ANEW:
@@ -330,7 +331,7 @@ def _search(
 
 @allocating_kernel
 def plan_along(
-    arena, around, i, x, reference, targets, layers, plan, kept, tries, rng, workspace, belief=None
+    arena, around, i, x, reference, targets, layers, plan, kept, rng, workspace, belief=None
 ):
     """Write the plan whose first row is to be flown by UAS i.
 
@@ -345,7 +346,6 @@ def plan_along(
         plan: (HORIZON, 3) velocity north and east [m/s] and altitude [m]; what is left of the plan
             of the step before, written.
         kept: Whether there is one.
-        tries: Changes that are tried.
         rng: Of the changes.
         workspace: `Workspace`.
         belief: (N_BELIEF,) of its inner loop, where a wind is known; None: in still air.
@@ -366,7 +366,7 @@ def plan_along(
         for k in range(AHEAD):
             workspace.rows[k] = write_place(arena, i, targets, n_targets, k, workspace.ahead[k])
         if _search(
-            arena, around, i, x, reference, layers, plan, kept, has_base, tries, rng, workspace,
+            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace,
             belief,
         ):  # fmt: skip
             return True

@@ -15,7 +15,7 @@ from uas_coverage_agents.route.improvement import CHANGES
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
-from uas_coverage_agents.route.leg_search import HORIZON, TRIES, plan_along, search_workspace
+from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
 from uas_coverage_agents.route.mission import WEIGHT
 from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_missions
 from uas_coverage_env.flight import Assistants
@@ -142,7 +142,7 @@ class RouteRunner:
         belief = None if self._learnt is None else self._learnt.belief[u]
         if not plan_along(
             self._arena, self._around, u, state.x[u], state.reference[u],
-            self._routes.of(u)[:AHEAD], self._flight, plan, kept, TRIES, self._rng, self._workspace,
+            self._routes.of(u)[:AHEAD], self._flight, plan, kept, self._rng, self._workspace,
             belief,
         ):  # fmt: skip
             return None

@@ -136,7 +136,7 @@ def _rest_s(arena, around, i, x, reference, left, n, layers, workspace):
 
 
 @allocating_kernel
-def _fly_until(arena, around, i, flights, f, goal, layers, tries, rng, workspace):
+def _fly_until(arena, around, i, flights, f, goal, layers, rng, workspace):
     """Fly flight f on until less than so many waypoints are left, -1: until it has landed."""
     x, reference, left = flights.x[f], flights.reference[f], flights.left[f]
     rules, uas = arena.rules[0], arena.uas[i]
@@ -153,7 +153,6 @@ def _fly_until(arena, around, i, flights, f, goal, layers, tries, rng, workspace
             layers,
             plan,
             flights.kept[f],
-            tries,
             rng,
             workspace,
         ):
@@ -175,7 +174,7 @@ def _fly_until(arena, around, i, flights, f, goal, layers, tries, rng, workspace
 
 
 @allocating_kernel
-def _rehearse(arena, around, i, x, route, layers, tries, rng, workspace, flights):
+def _rehearse(arena, around, i, x, route, layers, rng, workspace, flights):
     """Simulate flights of UAS i along a route, from rest; the quickest becomes the first of them.
 
     Returns:
@@ -194,7 +193,7 @@ def _rehearse(arena, around, i, x, route, layers, tries, rng, workspace, flights
         goal -= 1
         flew = False
         for f in range(n_flights):
-            done = _fly_until(arena, around, i, flights, f, goal, layers, tries, rng, workspace)
+            done = _fly_until(arena, around, i, flights, f, goal, layers, rng, workspace)
             flights.cost_s[f] = flights.steps[f] * dt_s
             if goal >= 0 or not done:
                 flights.cost_s[f] += _rest_s(
@@ -253,11 +252,12 @@ class Rehearsal:
     ) -> None:
         self._arena, self._around, self._layers = arena, around, layers
         self._x, self._rng = x.copy(), rng
-        self._workspace = search_workspace(int(arena.rules[0].lookahead_steps))
         n_waypoints = len(arena.waypoints)
         n_flights = in_large_missions(_FLIGHTS, n_waypoints)
         self._room = _room(n_flights, n_waypoints, int(arena.rules[0].max_steps))
-        self._tries = _CHANGES // n_flights
+        self._workspace = search_workspace(
+            int(arena.rules[0].lookahead_steps), _CHANGES // n_flights
+        )
         self._known: dict[tuple[int, ...], tuple[float, NDArray[np.float64]]] = {}
         self._flights: list[Rehearsed | None] = [None] * len(x)
 
@@ -315,8 +315,8 @@ class Rehearsal:
         if key not in self._known:
             room = self._room
             seconds = _rehearse(
-                self._arena, self._around, u, self._x[u], route, self._layers, self._tries,
-                self._rng, self._workspace, room,
+                self._arena, self._around, u, self._x[u], route, self._layers, self._rng,
+                self._workspace, room,
             )  # fmt: skip
             self._known[key] = float(seconds), room.commands[0, : room.steps[0]].copy()
         return self._known[key]
