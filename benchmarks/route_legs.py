@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.route.policy_runner import RouteRunner
+from uas_coverage_agents.route.rehearsal import Rehearsal
 from uas_coverage_agents.training.route_labels import town_of
 
 from uas_coverage_env import MissionBrief, Scenario, load_planner, rollout
@@ -35,17 +36,16 @@ class AlongRunner(RouteRunner):
 
     routes: Sequence[NDArray[np.int64]] = ()
 
-    def reset(self, brief: MissionBrief, seed: int) -> None:
+    def choose_routes(self, rehearsal: Rehearsal) -> None:
         """Take the given routes."""
-        super().reset(brief, seed)
-        self._routes.take(self.routes)
+        self.take(list(self.routes), rehearsal)
 
 
 class Along(LearnedRoute):
     """`learned-route` along the routes of its `runner`."""
 
     def _make_runner(self) -> AlongRunner:
-        self.runner = AlongRunner(self.policy, self.assistants, samples=1)
+        self.runner = AlongRunner(self.policy, self.assistants, samples=1, changes=0)
         return self.runner
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_agents.route.clock import IN_THE_AIR, home_seconds, leg_seconds
 from uas_coverage_agents.route.improvement import improve
 from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
@@ -64,6 +65,8 @@ class FleetRoutes:
         self._workspace, self._record = route_workspace(), no_record()
         self._routes = np.full((n_uas, n_waypoints), -1)
         self._lengths = np.zeros(n_uas, np.int64)
+        self._more_s = np.zeros((n_waypoints, n_waypoints))
+        self._more_home_s = np.zeros((n_uas, n_waypoints))
         self._rng = np.random.default_rng(seed)
         self._built_for: tuple[BoolArray, ...] | None = None
         self._built_at = -_AGAIN_STEPS
@@ -81,6 +84,30 @@ class FleetRoutes:
         for u, route in enumerate(routes):
             self._routes[u, : len(route)] = route
             self._lengths[u] = len(route)
+
+    def build_again(self, reached_s: Sequence[NDArray[np.float64]]) -> None:
+        """Build routes again for where the UAS were, by a clock that has learnt what legs take.
+
+        Args:
+            reached_s: When each UAS reaches the waypoints of its route, and home [s].
+        """
+        for u, at_s in enumerate(reached_s):
+            place, before_m = IN_THE_AIR, self._mission.here_m[u]
+            took_s = np.diff(at_s, prepend=0.0)
+            for w, seconds in zip(self.of(u).tolist(), took_s, strict=False):
+                leg_s = leg_seconds(self._mission, u, place, before_m, w)
+                if place != IN_THE_AIR:
+                    self._more_s[place, w] += max(seconds - leg_s, 0.0)
+                before_m = before_m if place == IN_THE_AIR else self._mission.place_m[place]
+                place = w
+            if place != IN_THE_AIR:
+                home_s = home_seconds(self._mission, u, place, before_m)
+                self._more_home_s[u, place] += max(took_s[-1] - home_s, 0.0)
+        self._build(*self._situation)
+
+    def of_all(self) -> list[NDArray[np.int64]]:
+        """A copy of the routes of all UAS."""
+        return [self.of(u).copy() for u in range(len(self._lengths))]
 
     def of(self, u: int) -> NDArray[np.int64]:
         """The waypoints that UAS u still has to visit, in order; home comes after them."""
@@ -115,7 +142,8 @@ class FleetRoutes:
         works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
         self._forget_covered(swarm.uncovered, works)
         if self._has_to_build(swarm, wanted, blocked, works):
-            self._build(swarm, wanted, blocked, works)
+            self._situation = swarm, wanted, blocked, works
+            self._build(*self._situation)
             self._built_for, self._built_at = (wanted & blocked, works), swarm.step
         return blocked
 
@@ -147,6 +175,9 @@ class FleetRoutes:
         self, swarm: SwarmState, wanted: BoolArray, blocked: BoolArray, works: BoolArray
     ) -> None:
         mission = self._missions.mission(swarm, works, blocked)
+        mission = self._mission = mission._replace(
+            between_s=mission.between_s + self._more_s, home_s=mission.home_s + self._more_home_s
+        )
         routes, lengths = self._routes.copy(), self._lengths.copy()
         best_s = np.inf
         for sample in range(max(self._samples, 1)):

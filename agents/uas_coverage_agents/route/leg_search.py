@@ -48,7 +48,7 @@ HORIZON = 24
 """Steps of a plan at most."""
 
 TRIES = 300
-"""Changes that are tried in each step."""
+"""Changes that are tried in each step of a flight."""
 
 STRAIGHT, OVER, ROUND = range(3)
 """Ways to aim: at the place itself, as the world's routes lead, or round what could be passed
@@ -59,6 +59,7 @@ _BRAKING, _STANDS_MPS = 12, 0.1
 _LEAD_S = 1.2
 _BEGIN_SPEEDS = (1.0, 0.7)
 _BASE_HELD = 3
+_BRAKED, _SLOW_SPEEDS = 5, (1.0, 0.4)  # where nothing else is clear
 _LONGEST = 4  # steps that a change concerns
 _DECADES = 1.5  # over which the sizes of changes are spread
 _TURN_RAD, _RISE_M = 1.5, 3.0  # largest changes
@@ -66,9 +67,10 @@ _SPEED, _ALTITUDE, _ANEW = 0.4, 0.2, 0.1  # how often they concern speed, altitu
 
 
 class Workspace(NamedTuple):
-    """Arrays that a search writes to.
+    """How long a search goes on, and arrays that it writes to.
 
     Attributes:
+        tries: Changes that are tried in each step.
         x: (14,) a state.
         reference: (2,) of the inner loop.
         u: (5,) inputs.
@@ -85,6 +87,7 @@ class Workspace(NamedTuple):
         base: (3,) what `leg_flight` would fly.
     """
 
+    tries: int
     x: NDArray[np.float64]
     reference: NDArray[np.float64]
     u: NDArray[np.float64]
@@ -101,9 +104,10 @@ class Workspace(NamedTuple):
     base: NDArray[np.float64]
 
 
-def search_workspace(lookahead_steps: int) -> Workspace:
+def search_workspace(lookahead_steps: int, tries: int = TRIES) -> Workspace:
     """An empty one; `lookahead_steps` are those of the arena's rules."""
     return Workspace(
+        tries=tries,
         x=np.zeros(14),
         reference=np.zeros(2),
         u=np.zeros(5),
@@ -283,6 +287,20 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspa
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
+    if best_s < np.inf:
+        return best_s, used, way
+    for held in range(_BRAKED):
+        trial[:held, :2] = 0.0
+        trial[:held, 2] = -x[Z]
+        for begins in (OVER, ROUND, STRAIGHT):
+            for share in _SLOW_SPEEDS:
+                _aim(arena, around, i, x, reference, trial, held, begins, share, workspace, belief)
+                cost_s, steps = _weigh(
+                    arena, around, i, x, reference, trial, layers, best_s, workspace, belief
+                )
+                if cost_s < best_s:
+                    best_s, used, way = cost_s, steps, begins
+                    best[:] = trial
     return best_s, used, way
 
 
@@ -296,7 +314,7 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, w
     )
     if best_s == np.inf:
         return False
-    for _ in range(TRIES):
+    for _ in range(workspace.tries):
         trial[:] = best
         end = _change(trial, used, speed_mps, rng)
         if rng.random() < _ANEW:
@@ -348,8 +366,9 @@ def plan_along(
         for k in range(AHEAD):
             workspace.rows[k] = write_place(arena, i, targets, n_targets, k, workspace.ahead[k])
         if _search(
-            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief
-        ):
+            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace,
+            belief,
+        ):  # fmt: skip
             return True
     plan[:] = workspace.base
     # of one step only, weighed as in still air

@@ -7,6 +7,7 @@ from pydantic import Field
 from uas_coverage_agents.policy.planner import PolicyPlanner
 from uas_coverage_agents.route.improvement import CHANGES
 from uas_coverage_agents.route.policy_runner import SAMPLES, RouteRunner
+from uas_coverage_agents.route.rehearsal import CANDIDATES
 from uas_coverage_env.flight import AssistedOptions
 
 SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-route"
@@ -31,6 +32,13 @@ class LearnedRouteOptions(AssistedOptions):
         le=10_000_000,
         description="changes tried on these routes to make them cheaper; 0: flown as drawn",
     )
+    rehearsed: int = Field(
+        default=CANDIDATES,
+        ge=0,
+        le=1000,
+        description="sets of such routes whose flights are simulated before take-off, the cheapest "
+        "of which is flown as it was simulated; 0: none",
+    )
 
 
 class LearnedRoute(PolicyPlanner):
@@ -41,7 +49,10 @@ class LearnedRoute(PolicyPlanner):
     def __init__(self, options: LearnedRouteOptions | None = None) -> None:
         options = options or LearnedRouteOptions()
         self._samples, self._changes = options.samples, options.changes
+        self._rehearsed = options.rehearsed
         super().__init__(options, SHIPPED)
 
     def _make_runner(self) -> RouteRunner:
-        return RouteRunner(self.policy, self.assistants, self._samples, self._changes)
+        return RouteRunner(
+            self.policy, self.assistants, self._samples, self._changes, self._rehearsed
+        )

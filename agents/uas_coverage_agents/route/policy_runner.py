@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
@@ -15,6 +16,8 @@ from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
 from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
+from uas_coverage_agents.route.mission import WEIGHT
+from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_missions
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import LearntWind, MissionBrief, first_sight, in_disturbances
 from uas_coverage_env.mission.raised import raised
@@ -34,6 +37,8 @@ class RouteRunner:
         assistants: The assistants of the world that fly along.
         samples: Sets of routes that are built.
         changes: By which the cheapest of these, by estimated times, is improved before it is flown.
+        rehearsed: Sets of routes that are built in this way and rehearsed; 0: none is, and flights
+            are searched step by step.
 
     Raises:
         ValueError: The policy was trained on another observation, or has another network.
@@ -45,6 +50,7 @@ class RouteRunner:
         assistants: Assistants,
         samples: int = SAMPLES,
         changes: int = CHANGES,
+        rehearsed: int = CANDIDATES,
     ) -> None:
         described = policy.description
         if described.observation != observation():
@@ -57,12 +63,15 @@ class RouteRunner:
         self._score = layers_of(network.order, tensors, "order.")
         self._home_score = layers_of(network.home, tensors, "home.")
         self._flight = layers_of(network.flight, tensors, "flight.")
-        self._samples, self._changes = samples, changes
+        self._samples, self._changes, self._rehearsed = samples, changes, rehearsed
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
+        rehearsed, self._rehearsed = self._rehearsed, min(self._rehearsed, 1)
         self.reset(brief, 0)
+        self._rehearsal = None
         self.act(first_sight(brief))
+        self._rehearsed = rehearsed
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples and changes draw from the seed."""
@@ -76,8 +85,34 @@ class RouteRunner:
             self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
         self._workspace = search_workspace(int(self._arena.rules[0].lookahead_steps))
         self._rng = np.random.default_rng(seed)
+        self._rehearsal: Rehearsal | None = None
+        if self._rehearsed and not brief.moving_obstacles and brief.conditions is None:
+            self._rehearsal = Rehearsal(
+                self._arena, self._around, self._flight, self._routes.view.state.x, self._rng
+            )
+            self.choose_routes(self._rehearsal)
         n_uas = len(brief.uas)
         self._plans, self._kept = np.zeros((n_uas, HORIZON, 3)), np.zeros(n_uas, np.bool_)
+
+    def choose_routes(self, rehearsal: Rehearsal) -> None:
+        """Fly the cheapest of some sets of routes; each is built with what legs took before."""
+        best, best_s = self._routes.of_all(), np.inf
+        candidates = in_large_missions(self._rehearsed, len(self._arena.waypoints))
+        for candidate in range(candidates):
+            routes = self._routes.of_all()
+            reached_s = [rehearsal.reached_s(u, route) for u, route in enumerate(routes)]
+            times_s = [float(at_s[-1]) for at_s in reached_s]
+            cost_s = max(times_s) + WEIGHT * sum(times_s)
+            if cost_s < best_s:
+                best, best_s = routes, cost_s
+            if candidate + 1 < candidates:
+                self._routes.build_again(reached_s)
+        self.take(best, rehearsal)
+
+    def take(self, routes: list[NDArray[np.int64]], rehearsal: Rehearsal) -> None:
+        """Fly along routes as they are rehearsed."""
+        self._routes.take(routes)
+        rehearsal.take(routes)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on along the routes; build them again where they are no longer right."""
@@ -91,7 +126,11 @@ class RouteRunner:
         kept, self._kept[u] = bool(self._kept[u]), False
         if (guided := routes.guided(swarm, u)) is not None:
             return guided
-        velocity = self._searched(u, kept)
+        velocity = None
+        if self._rehearsal is not None:
+            velocity = self._rehearsal.next(u, swarm.x[u], routes.of(u))
+        if velocity is None:
+            velocity = self._searched(u, kept)
         if velocity is None:
             return routes.onwards(u)
         north_mps, east_mps, altitude_m = velocity
