@@ -1,10 +1,10 @@
 """Publish the scores of `uas-coverage score`: anchors and the tables of docs/levels.md.
 
-    uas-coverage score --level easy,medium,hard,extreme --missions 20 --out scores
+    uas-coverage score --level easy,medium,hard,extreme --missions 50 --out scores
     python benchmarks/levels.py scores
 
-Writes the mean values of the random policy and of the best planner on the test missions to
-`uas_coverage_env/tasks/anchors.json`, and one table per level between the marks
+Writes the interquartile means of the values of the random policy and of the best planner on the
+test missions to `uas_coverage_env/tasks/anchors.json`, and one table per level between the marks
 `<!-- scores -->` of docs/levels.md.
 """
 
@@ -15,6 +15,9 @@ import dataclasses
 import json
 from pathlib import Path
 
+import numpy as np
+
+from uas_coverage_env.leaderboard.statistics import iqm
 from uas_coverage_env.tasks import LEVELS, Anchors, scored
 from uas_coverage_env.tasks.scoring import RANDOM
 from uas_coverage_env.tasks.store import ScoreStore
@@ -43,12 +46,12 @@ def main() -> None:
 
 def anchors_from(store: ScoreStore, level: str) -> dict[str, object]:
     """The anchors of a level, over the missions that all of its planners have flown."""
-    means = {
-        planner: scored(level, store.missions(level, planner)).mean("value")
+    middle = {
+        planner: float(iqm(np.array([flown.value for flown in store.missions(level, planner)])))
         for planner in store.planners(level)
     }
-    best = max((planner for planner in means if planner != RANDOM), key=means.__getitem__)
-    flown = Anchors(means[RANDOM], means[best], best, len(store.missions(level, best)))
+    best = max((planner for planner in middle if planner != RANDOM), key=middle.__getitem__)
+    flown = Anchors(middle[RANDOM], middle[best], best, len(store.missions(level, best)))
     return dataclasses.asdict(flown)
 
 

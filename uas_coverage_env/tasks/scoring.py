@@ -6,14 +6,15 @@ The value of a mission is
 
 with c the share of waypoints covered, h the share of the fleet that is home at the end, and e the
 energy drawn over what all batteries may give. The score is v between that of the random policy (0)
-and that of the best planner (1), means over the test missions of the level:
+and that of the best planner (1):
 
     score = (v - v_random) / (v_best - v_random)
 
-It may be above 1 or below 0. Both anchors are published with the package (`anchors.json`). Scores
-of several missions are summed up by the interquartile mean with a 95 % bootstrap interval over
-missions, or over trainings where several policies of one learner are given (R. Agarwal et al.,
-NeurIPS 2021).
+It may be above 1 or below 0. Scores of several missions are summed up by the interquartile mean
+with a 95 % bootstrap interval over missions, or over trainings where several policies of one
+learner are given (R. Agarwal et al., NeurIPS 2021). Both anchors are interquartile means over the
+test missions of the level, so that random policy and best planner have exactly 0 and 1 there; they
+are published with the package (`anchors.json`).
 """
 
 import json
@@ -43,10 +44,10 @@ class Anchors:
     """Between which values scores lie.
 
     Attributes:
-        random: Mean value of the random policy: score 0.
-        best: Mean value of the best planner: score 1.
+        random: Interquartile mean of the values of the random policy: score 0.
+        best: That of the best planner: score 1.
         best_planner: Which planner that is.
-        missions: Of how many test missions these are means.
+        missions: Over how many test missions.
     """
 
     random: float
