@@ -69,6 +69,15 @@ def test_a_score_is_the_interquartile_mean_with_an_interval(monkeypatch):
     assert found.low <= found.value <= found.high
 
 
+def test_the_interval_of_several_trainings_is_over_trainings(monkeypatch):
+    monkeypatch.setattr(module, "anchors_of", lambda level: module.Anchors(0.0, 1.0, "tour", 4))
+    trainings = [(0.2, 0.3, 0.2, 0.3), (0.7, 0.8, 0.7, 0.8)]
+    flown = [mission(k, value) for values in trainings for k, value in enumerate(values)]
+    found = scored("easy", flown).score
+    assert found.value == pytest.approx(0.5)
+    assert (found.low, found.high) == (pytest.approx(0.25), pytest.approx(0.75))
+
+
 def test_a_policy_is_scored_and_what_is_known_is_not_flown_again():
     flown = []
     first = score(lambda seen: 0, "easy", missions=1, split="validation", on_mission=flown.append)

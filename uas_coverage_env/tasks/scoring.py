@@ -18,6 +18,7 @@ are published with the package (`anchors.json`).
 """
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
@@ -172,19 +173,38 @@ def score(
 
 
 def scored(level: str, missions: Sequence[MissionScore]) -> Score:
-    """Missions of a planner, summed up."""
+    """Missions of a planner, summed up.
+
+    Args:
+        level: Its name.
+        missions: Where a seed comes again, it was flown by another training of the same learner:
+            the first by the first, and so on; the interval is over trainings then.
+    """
     anchors = anchors_of(level)
-    values = np.array([mission.value for mission in missions])
     if anchors is None or not anchors.best > anchors.random:
         return Score(level, tuple(missions), Estimate(None, None, None, len(missions)))
-    shares = (values - anchors.random) / (anchors.best - anchors.random)
-    found = estimate([shares[k : k + 1] for k in range(len(shares))], "scenarios")
-    return Score(level, tuple(missions), found)
+    drawn = _by_training(missions)
+    if len(drawn) == 1:
+        drawn = [[mission] for mission in missions]
+    values = [np.array([mission.value for mission in each]) for each in drawn]
+    shares = [(each - anchors.random) / (anchors.best - anchors.random) for each in values]
+    return Score(level, tuple(missions), estimate(shares, "scenarios"))
 
 
 def as_row(mission: MissionScore) -> dict[str, Any]:
     """A mission as plain data."""
     return asdict(mission)
+
+
+def _by_training(missions: Sequence[MissionScore]) -> list[list[MissionScore]]:
+    trainings: list[list[MissionScore]] = []
+    flown: Counter[int] = Counter()
+    for mission in missions:
+        if flown[mission.seed] == len(trainings):
+            trainings.append([])
+        trainings[flown[mission.seed]].append(mission)
+        flown[mission.seed] += 1
+    return trainings
 
 
 def _flown(
