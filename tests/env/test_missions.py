@@ -375,8 +375,18 @@ def test_unknown_names_are_refused_with_those_that_exist(make):
         env.reset(options={"scenarios": "village"})
     with pytest.raises(InputError, match="unknown scenario 'vilage'"):
         env.reset(options={"scenario": "vilage"})
+    with pytest.raises(InputError, match="unknown scenario 'streets'; did you mean streets:SEED"):
+        env.reset(options={"scenario": "streets"})
     with pytest.raises(ValueError, match=r"are 'village'; give a mapping"):
         env.reset(options="village")
+
+
+def test_one_mission_of_a_family_is_flown_by_its_name_and_seed():
+    env = parallel("open-field:7")
+    assert env.scenario == load_scenario("open-field:7")
+    many = parallel("generated")
+    many.reset(options={"scenario": "generated:7"})
+    assert many.scenario.waypoints == load_scenario("generated:7").waypoints
 
 
 @pytest.mark.parametrize("wrong", [{"n_uas": 0}, {"n_uas": 2.0}, {"n_waypoints": "3"}])
