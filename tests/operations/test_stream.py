@@ -181,6 +181,7 @@ PORT = "udpout:127.0.0.1:9"
         (["--connect", f"uas_1={PORT}", "--on-abort", "dive"], "take hold, rtl, land"),
         (["--connect", f"uas_1={PORT}", "--lag", "nan"], "--lag nan: should be between"),
         (["--connect", f"uas_1={PORT}", "--place", "1,2"], "has a [place] already"),
+        (["--connect", f"uas_1={PORT}", "--track", "nowhere/flown.csv"], "nowhere: is no folder"),
     ],
 )
 def test_what_cannot_be_streamed_is_refused_in_one_line(flight, tmp_path, capsys, arguments, line):
