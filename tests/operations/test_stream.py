@@ -1,6 +1,7 @@
 """A plan streamed to simulated autopilots over loopback, in time that they drive."""
 
 import io
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -140,6 +141,24 @@ def test_one_that_is_not_heard_stops_time_and_is_given_up_after_the_patience(fli
     assert ended.reason == "uas_2 is not heard from"
     assert any("all hold" in line for line in loop.said)
     assert ended.late_s > 9.0
+    assert loop.vehicles[0].modes[-1] == BRAKE
+
+
+def test_a_connection_that_breaks_in_flight_counts_as_not_heard(flight, monkeypatch):
+    mavutil = import_module(
+        "pymavlink.mavutil"
+    )  # once the simulated vehicles have chosen MAVLink 2
+    loop = Loopback(flight, patience_s=10.0)
+    port, recv = loop.vehicles[1].port, mavutil.mavudp.recv
+
+    def broken(link, n=None):
+        if loop.clock.now_s() > 18.0 and link.destination_addr[1] == port:
+            raise ConnectionResetError
+        return recv(link, n)
+
+    monkeypatch.setattr(mavutil.mavudp, "recv", broken)
+    ended, _ = loop.fly()
+    assert ended.reason == "uas_2 is not heard from"
     assert loop.vehicles[0].modes[-1] == BRAKE
 
 
