@@ -145,9 +145,7 @@ def test_one_that_is_not_heard_stops_time_and_is_given_up_after_the_patience(fli
 
 
 def test_a_connection_that_breaks_in_flight_counts_as_not_heard(flight, monkeypatch):
-    mavutil = import_module(
-        "pymavlink.mavutil"
-    )  # once the simulated vehicles have chosen MAVLink 2
+    mavutil = import_module("pymavlink.mavutil")  # not before MAVLink 2 is chosen
     loop = Loopback(flight, patience_s=10.0)
     port, recv = loop.vehicles[1].port, mavutil.mavudp.recv
 
