@@ -373,8 +373,6 @@ def test_unknown_names_are_refused_with_those_that_exist(make):
     env = make("generated")
     with pytest.raises(ValueError, match="no option 'scenarios'; did you mean 'scenario'"):
         env.reset(options={"scenarios": "village"})
-    with pytest.raises(InputError, match="unknown scenario 'vilage'"):
-        env.reset(options={"scenario": "vilage"})
     with pytest.raises(InputError, match="unknown scenario 'streets'; did you mean streets:SEED"):
         env.reset(options={"scenario": "streets"})
     with pytest.raises(ValueError, match=r"are 'village'; give a mapping"):
@@ -382,8 +380,7 @@ def test_unknown_names_are_refused_with_those_that_exist(make):
 
 
 def test_one_mission_of_a_family_is_flown_by_its_name_and_seed():
-    env = parallel("open-field:7")
-    assert env.scenario == load_scenario("open-field:7")
+    assert parallel("open-field:7").scenario == load_scenario("open-field:7")
     many = parallel("generated")
     many.reset(options={"scenario": "generated:7"})
     assert many.scenario.waypoints == load_scenario("generated:7").waypoints
