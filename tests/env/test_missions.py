@@ -379,25 +379,10 @@ def test_unknown_names_are_refused_with_those_that_exist(make):
         env.reset(options="village")
 
 
-def test_one_mission_of_a_family_is_flown_by_its_name_and_seed():
-    assert parallel("open-field:7").scenario == load_scenario("open-field:7")
-    many = parallel("generated")
-    many.reset(options={"scenario": "generated:7"})
-    assert many.scenario.waypoints == load_scenario("generated:7").waypoints
-
-
 @pytest.mark.parametrize("wrong", [{"n_uas": 0}, {"n_uas": 2.0}, {"n_waypoints": "3"}])
 def test_bounds_are_whole_numbers(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         MissionSource(grounds, **wrong)
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"n_uas": (3, 1)}, {"n_obstacles": 4}, {"n_waypoints": (1.0, 2)}]
-)
-def test_ranges_are_two_whole_numbers(wrong):
-    with pytest.raises(ValueError, match="least and most"):
-        GeneratedScenarios(**wrong)
 
 
 def test_a_pool_holds_scenarios_and_nothing_that_draws_them():

@@ -191,7 +191,7 @@ def test_seeds_and_switches_of_numpy_are_kept_with_the_flight(yard, tmp_path):
     assert (kept.seed, kept.return_mode, kept.safety_filter, kept.steps) == (3, True, False, 1)
 
 
-@pytest.mark.parametrize("steps", [1.5, math.nan, "2"])
+@pytest.mark.parametrize("steps", [0, 1.5, math.nan, "2"])
 def test_a_limit_that_is_no_number_of_steps_is_refused(yard, steps):
     with pytest.raises(ValueError, match=r"max_steps is .*; give a whole number from 1 on"):
         rollout(yard, Still(), max_steps=steps)
@@ -382,8 +382,6 @@ def test_scenario_and_planner_may_be_names_or_files(yard, tmp_path):
 
 
 def test_what_cannot_be_flown_is_refused_at_the_door(yard):
-    with pytest.raises(ValueError, match="max_steps is 0"):
-        rollout(yard, Still(), max_steps=0)
     with pytest.raises(InputError, match="unknown planner 'nobody'"):
         rollout(yard, "nobody")
     with pytest.raises(ValueError, match="newtonian"):
