@@ -45,12 +45,23 @@ def test_a_signal_while_a_flight_is_written_does_not_lose_it(elsewhere, monkeypa
 
 
 @pytest.mark.usefixtures("python_handles_interrupts")
+def test_ctrl_c_during_the_report_does_not_say_that_nothing_was_kept(
+    elsewhere, monkeypatch, capsys
+):
+    monkeypatch.setattr(run, "report_flight", lambda *_: signal.raise_signal(signal.SIGINT))
+    assert main(["run", "open_field", "--planner", "hover", "--steps", "2", "--out", "mine"]) == 1
+    assert Flight.load("mine").steps == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == "error: stopped by hand; what was finished before is kept"
+
+
+@pytest.mark.usefixtures("python_handles_interrupts")
 @pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
 def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
     monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))
     assert main(["planners"]) == 1
     said = capsys.readouterr().err
-    assert said == "error: stopped by hand before there was anything to keep\n"
+    assert said == "error: stopped by hand; what was finished before is kept\n"
 
 
 def test_an_error_without_an_interruption_is_none_of_these(monkeypatch):

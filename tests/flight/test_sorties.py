@@ -1,6 +1,7 @@
 """A mission larger than one charge is flown in sorties, each of them a flight like any other."""
 
 import json
+import signal
 from functools import partial
 from itertools import pairwise
 
@@ -128,6 +129,25 @@ def test_packs_count_against_the_warning_of_small_batteries(mission):
     assert not any("batteries will hardly" in line for line in warnings(mission))
     one = mission.model_copy(update={"sorties": {"packs": 1}})
     assert warnings(one) == warnings(small)
+
+
+@pytest.mark.usefixtures("python_handles_interrupts")
+def test_ctrl_c_while_a_sortie_is_written_ends_the_sorties(mission, tmp_path, monkeypatch):
+    save = Flight.save
+
+    def interrupted(*args, **kwargs):
+        signal.raise_signal(signal.SIGINT)
+        save(*args, **kwargs)
+
+    monkeypatch.setattr(Flight, "save", interrupted)
+    mission.to_file(tmp_path / "mission.toml")
+    out = tmp_path / "out"
+    command = ["run", str(tmp_path / "mission.toml"), "--planner", "nearest-waypoint"]
+    assert main([*command, "--sorties", "9", "--out", str(out)]) == 1
+    result = json.loads((out / "sorties.json").read_text())
+    assert result["ended"] == "stopped"
+    assert len(result["sorties"]) == 1
+    assert Flight.load(out / "sortie_1").ended == "complete"
 
 
 def test_the_command_keeps_a_flight_for_each_and_a_summary(mission, sorties, tmp_path, capsys):

@@ -40,8 +40,12 @@ class SimulatedVehicle:
         self._parser.robust_parsing = True
 
     @property
+    def port(self):
+        return self._socket.getsockname()[1]
+
+    @property
     def address(self):
-        return f"udpout:127.0.0.1:{self._socket.getsockname()[1]}"
+        return f"udpout:127.0.0.1:{self.port}"
 
     def step(self, dt_s):
         self._hear()

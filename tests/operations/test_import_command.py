@@ -229,6 +229,11 @@ HOSTILE = {
     "null for rings": ("a.geojson", '{"type":"Polygon","coordinates":null}', "has no rings"),
     "a list": ("a.geojson", "[1, 2]", "holds no JSON object"),
     "a line": ("a.geojson", '{"type":"LineString","coordinates":[[1,2],[3,4]]}', "no area"),
+    "a line to keep out of": (
+        "a.geojson",
+        '{"type":"Feature","properties":{"role":"no_fly"},"geometry":{"type":"LineString"}}',
+        "has the role 'no_fly' but is a LineString; draw a polygon",
+    ),
     "a bow tie": ("a.geojson", geojson(BOW_TIE), "self-intersection at 50.001000, 10.001500"),
     "two corners": ("a.geojson", geojson([[1, 2], [2, 3], [1, 2]]), "fewer than three corners"),
     "no area": ("a.geojson", geojson([[1, 2], [1.001, 2], [1.002, 2], [1, 2]]), "has no area"),

@@ -1,6 +1,7 @@
 """A plan streamed to simulated autopilots over loopback, in time that they drive."""
 
 import io
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -143,6 +144,22 @@ def test_one_that_is_not_heard_stops_time_and_is_given_up_after_the_patience(fli
     assert loop.vehicles[0].modes[-1] == BRAKE
 
 
+def test_a_connection_that_breaks_in_flight_counts_as_not_heard(flight, monkeypatch):
+    mavutil = import_module("pymavlink.mavutil")  # not before MAVLink 2 is chosen
+    loop = Loopback(flight, patience_s=10.0)
+    port, recv = loop.vehicles[1].port, mavutil.mavudp.recv
+
+    def broken(link, n=None):
+        if loop.clock.now_s() > 18.0 and link.destination_addr[1] == port:
+            raise ConnectionResetError
+        return recv(link, n)
+
+    monkeypatch.setattr(mavutil.mavudp, "recv", broken)
+    ended, _ = loop.fly()
+    assert ended.reason == "uas_2 is not heard from"
+    assert loop.vehicles[0].modes[-1] == BRAKE
+
+
 def test_a_pilot_who_takes_over_gets_no_more_targets_and_the_other_holds(flight):
     loop = Loopback(flight, vehicles=({"taken_s": 18.0}, {}), patience_s=10.0)
     ended, _ = loop.fly()
@@ -181,6 +198,7 @@ PORT = "udpout:127.0.0.1:9"
         (["--connect", f"uas_1={PORT}", "--on-abort", "dive"], "take hold, rtl, land"),
         (["--connect", f"uas_1={PORT}", "--lag", "nan"], "--lag nan: should be between"),
         (["--connect", f"uas_1={PORT}", "--place", "1,2"], "has a [place] already"),
+        (["--connect", f"uas_1={PORT}", "--track", "nowhere/flown.csv"], "nowhere: is no folder"),
     ],
 )
 def test_what_cannot_be_streamed_is_refused_in_one_line(flight, tmp_path, capsys, arguments, line):

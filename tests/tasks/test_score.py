@@ -180,6 +180,8 @@ def test_the_former_name_of_the_option_says_what_it_is_called_now(tmp_path, caps
     ("arguments", "reason"),
     [
         (("--level", "none"), "--level 'none'"),
+        (("--level", ""), "--level '': names none"),
+        (("--planners", ","), "--planners ',': names none"),
         (("--planners", "nobody"), "unknown planner 'nobody'"),
         (("--split", "training"), "--split 'training'"),
         (("--missions", "51"), "--missions 51"),

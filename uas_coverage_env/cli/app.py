@@ -19,7 +19,7 @@ PROGRAM = "uas-coverage"
 
 # what typer makes of Ctrl-C that no command has caught
 _CTRL_C = 130
-_NOTHING_TO_KEEP = "stopped by hand before there was anything to keep"
+_STOPPED = "stopped by hand; what was finished before is kept"
 
 _FEW = 6
 """Commands of a group that a message names; of more, the help."""
@@ -159,7 +159,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 raise
             return _refuse(f"stopped by hand ({type(error).__name__})", FAILED)
         except KeyboardInterrupt:
-            return _refuse(_NOTHING_TO_KEEP, FAILED)
+            return _refuse(_STOPPED, FAILED)
 
 
 def _run(argv: Sequence[str] | None) -> int:
@@ -180,7 +180,7 @@ def _run(argv: Sequence[str] | None) -> int:
         # may raise them, and which call it was is of no use to the user
         return _refuse(_of_a_file(error), 2)
     if code == _CTRL_C:
-        return _refuse(_NOTHING_TO_KEEP, FAILED)
+        return _refuse(_STOPPED, FAILED)
     return code
 
 

@@ -18,11 +18,16 @@ from uas_coverage_env.flight import (
 from uas_coverage_env.flight.interruption import interruptions_noted
 
 
-def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> None:
-    """Write a flight directory with its map; one Ctrl-C meanwhile does not lose the flight."""
-    with interruptions_noted():
+def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
+    """Write a flight directory with its map; one Ctrl-C meanwhile does not lose the flight.
+
+    Returns:
+        Whether one has come.
+    """
+    with interruptions_noted() as interrupted:
         flight.save(directory, overwrite=overwrite)
         draw_flight(flight, directory / "map.png")
+        return interrupted()
 
 
 def report_flight(screen: Console, flight: Flight, directory: Path) -> None:

@@ -42,12 +42,14 @@ def score_command(
     Ctrl-C or a kill loses no mission that was flown: the same command goes on. Planners fly with
     the assistants of the level.
     """
-    levels = _named("--level", level, tuple(LEVELS))
-    _named("--split", split, _SPLITS)
+    levels = _named("--level", level)
+    for name in levels:
+        check_choice("--level", name, tuple(LEVELS))
+    check_choice("--split", split, _SPLITS)
     if players is not None:
         sys.stderr.write("--players is called --planners now\n")
         planners = players
-    names = [name for name in planners.split(",") if name]
+    names = _named("--planners", planners)
     if missions > len(SPLITS[split]):
         raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
     for name in names:
@@ -71,8 +73,8 @@ def _scored(store: ScoreStore, planner: str, level: str, missions: int, split: s
     return score(planner, level, missions=missions, split=split, known=known, on_mission=keep)
 
 
-def _named(option: str, text: str, allowed: tuple[str, ...]) -> list[str]:
+def _named(option: str, text: str) -> list[str]:
     names = [name for name in text.split(",") if name]
-    for name in names:
-        check_choice(option, name, allowed)
+    if not names:
+        raise InputError(f"{option} {text!r}: names none; give some, with commas between them")
     return names

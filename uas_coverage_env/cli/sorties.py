@@ -30,10 +30,13 @@ def keep_sorties(
     """
     (directory / SUMMARY).unlink(missing_ok=True)
     flights: list[Flight] = []
+    stopped = False
     for number, flight in enumerate(sorties, start=1):
-        keep_flight(flight, directory / f"sortie_{number}", overwrite=overwrite)
+        stopped = keep_flight(flight, directory / f"sortie_{number}", overwrite=overwrite)
         flights.append(flight)
-    result = sorties_summary(flights)
+        if stopped:
+            break
+    result = sorties_summary(flights, stopped=stopped)
     text = json.dumps(result, indent=2, allow_nan=False) + "\n"
     write_files(directory, {SUMMARY: text.encode()})
     _report(screen, result, directory)

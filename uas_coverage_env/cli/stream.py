@@ -7,6 +7,7 @@ import typer
 
 from uas_coverage_env.cli.operations import asked_place, extra
 from uas_coverage_env.cli.output import FAILED, console
+from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
@@ -50,10 +51,8 @@ def stream(
     with extra():
         from uas_coverage_env.operations.export import place_of_flight
         from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
-    if track is not None and track.suffix != ".csv":
-        raise InputError(f"--track {track}: should end in .csv")
-    if track is not None and track.exists() and not overwrite:
-        raise InputError(f"{track}: exists; give another --track or add --overwrite")
+    if track is not None:
+        check_file(track, (".csv",), overwrite=overwrite)
     connections = _connections(connect)
     flight = Flight.load(directory)
     where = place_of_flight(flight, asked_place(place))

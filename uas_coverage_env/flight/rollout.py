@@ -102,8 +102,8 @@ def rollout(
     if isinstance(planner, str):
         planner = load_planner(planner)
     check_planner(planner)
-    if max_steps is not None and max_steps < 1:
-        raise ValueError(f"max_steps = {max_steps}: a flight has at least one step")
+    if max_steps is not None and not (isinstance(max_steps, int | np.integer) and max_steps > 0):
+        raise ValueError(f"max_steps is {max_steps!r}; give a whole number from 1 on, or None")
     assistants: Assistants = getattr(planner, "assistants", Assistants())
     # no plan is verified against what pushes back, nor one of legs against what moves
     by_legs = scenario.execution is not None
@@ -142,10 +142,11 @@ def rollout(
             scenario=scenario,
             planner=name_of(planner),
             planner_options=options_of(planner),
-            seed=seed,
+            # as Python's own, which a file holds: NumPy's come from a range of seeds
+            seed=int(seed),
             dynamics=dynamics,
-            return_mode=return_mode,
-            safety_filter=safety_filter,
+            return_mode=bool(return_mode),
+            safety_filter=bool(safety_filter),
             disturbances=tuple(disturbance.name for disturbance in world.disturbances),
             ended=ended,
             wall_time_s=time.perf_counter() - started,

@@ -66,11 +66,12 @@ def _next(scenario: Scenario, flight: Flight, number: int) -> Scenario:
     return rest.model_copy(update={"sorties": left})
 
 
-def sorties_summary(flights: Sequence[Flight]) -> dict[str, Any]:
+def sorties_summary(flights: Sequence[Flight], *, stopped: bool = False) -> dict[str, Any]:
     """What came of a chain of sorties, and of each of them.
 
     Args:
         flights: The sorties in their order; at least one.
+        stopped: Whether they were stopped by hand after the last one.
 
     Returns:
         `sorties`: one entry each; `packs`: how many each UAS has used; `time_s` with the swaps,
@@ -90,7 +91,7 @@ def sorties_summary(flights: Sequence[Flight]) -> dict[str, Any]:
         for name in entry["flew"]:
             packs[name] += 1
     return {
-        "ended": why_over(flights[-1]) or "packs used up",
+        "ended": why_over(flights[-1]) or ("stopped" if stopped else "packs used up"),
         "coverage": covered / (covered + left) if covered + left else 1.0,
         "covered": covered,
         "left": left,

@@ -29,6 +29,13 @@ def read_geojson(path: Path) -> Iterator[Drawn]:
                 raise InputError(f"{path}: features[{number}] has no rings; export it again")
             for rings in parts:
                 yield polygon(str(path), rings, properties, f"area_{number + 1}")
+        elif properties.get("role"):
+            # a no-fly zone that is left out is flown into
+            role = str(properties["role"])[:40]
+            raise InputError(
+                f"{path}: features[{number}] has the role {role!r} but is a {str(kind)[:40]}; "
+                f"draw a polygon"
+            )
 
 
 def features(path: Path, data: dict[str, Any]) -> list[dict[str, Any]]:

@@ -133,6 +133,13 @@ class MissionSource:
         if callable(missions):
             generator: Any = missions
             return cls(generator)
+        if not isinstance(missions, Scenario | Mapping) and not _may_name_one(missions):
+            families = ", ".join((*FAMILIES, *installed_families()))
+            raise InputError(
+                f"unknown scenario {str(missions)[:80]!r}; take {', '.join(scenario_names())}, the "
+                f"family {families}, one mission of a family as in generated:7, the path of a "
+                f".toml file, or a function rng -> Scenario"
+            )
         scenario = loaded_scenario(missions)
         n_uas, n_waypoints, n_moving = Room.of(scenario)
         room = Room(n_uas, n_waypoints, max(_MOVING, n_moving))
@@ -187,6 +194,13 @@ class MissionSource:
         return scenario
 
 
+def _may_name_one(missions: object) -> bool:
+    """Whether it has the form of a file, is a shipped scenario, or a family with a seed."""
+    if isinstance(missions, str):
+        return is_path(missions) or missions in scenario_names() or ":" in missions
+    return isinstance(missions, Path)
+
+
 ScenarioLike = str | Path | Scenario | Mapping[str, Any] | MissionSource | ScenarioGenerator
 """What environments take as `scenario=`, see `MissionSource.of`."""
 
@@ -201,10 +215,4 @@ def loaded_scenario(scenario: str | Path | Scenario | Mapping[str, Any]) -> Scen
         return scenario
     if isinstance(scenario, Mapping):
         return parse(scenario, Scenario, "scenario")
-    if not is_path(scenario) and scenario not in scenario_names():
-        families = ", ".join((*FAMILIES, *installed_families()))
-        raise InputError(
-            f"unknown scenario {str(scenario)[:80]!r}; take {', '.join(scenario_names())}, the "
-            f"family {families}, the path of a .toml file, or a function rng -> Scenario"
-        )
     return load_scenario(scenario)

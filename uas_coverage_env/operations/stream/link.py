@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ class VehicleLink:
         self._link = _connected(name, address)
 
     def hear(self, now_s: float) -> None:
-        """Read what has arrived.
+        """Read what has arrived; nothing does over a connection that has broken.
 
         Args:
             now_s: Time by the caller's clock [s].
@@ -65,7 +66,7 @@ class VehicleLink:
         Raises:
             InputError: Its autopilot is none of `AUTOPILOTS`.
         """
-        while (message := self._link.recv_match(blocking=False)) is not None:
+        while (message := self._received()) is not None:
             kind = message.get_type()
             if message.get_srcComponent() != 1:
                 continue
@@ -86,6 +87,11 @@ class VehicleLink:
                 if abs(degrees[0]) <= 90.0 and abs(degrees[1]) <= 180.0:
                     self.place_m = self._frame.to_ned(*degrees, 1e-3 * message.relative_alt)
                     self.heard_s = now_s
+
+    def _received(self) -> Any:
+        """The next message; None: there is none yet, or none can come."""
+        with suppress(OSError):
+            return self._link.recv_match(blocking=False)
 
     @property
     def takes_targets(self) -> bool:
