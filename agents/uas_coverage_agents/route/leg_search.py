@@ -71,6 +71,7 @@ class Workspace(NamedTuple):
 
     Attributes:
         tries: Changes that are tried in each step.
+        slow_starts: Whether plans may begin slowly or with braking where none else is clear.
         x: (14,) a state.
         reference: (2,) of the inner loop.
         u: (5,) inputs.
@@ -88,6 +89,7 @@ class Workspace(NamedTuple):
     """
 
     tries: int
+    slow_starts: bool
     x: NDArray[np.float64]
     reference: NDArray[np.float64]
     u: NDArray[np.float64]
@@ -104,10 +106,13 @@ class Workspace(NamedTuple):
     base: NDArray[np.float64]
 
 
-def search_workspace(lookahead_steps: int, tries: int = TRIES) -> Workspace:
+def search_workspace(
+    lookahead_steps: int, tries: int = TRIES, *, slow_starts: bool = False
+) -> Workspace:
     """An empty one; `lookahead_steps` are those of the arena's rules."""
     return Workspace(
         tries=tries,
+        slow_starts=slow_starts,
         x=np.zeros(14),
         reference=np.zeros(2),
         u=np.zeros(5),
@@ -287,7 +292,7 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspa
         if cost_s < best_s:
             best_s, used = cost_s, steps
             best[:] = trial
-    if best_s < np.inf:
+    if best_s < np.inf or not workspace.slow_starts:
         return best_s, used, way
     for held in range(_BRAKED):
         trial[:held, :2] = 0.0
@@ -366,9 +371,8 @@ def plan_along(
         for k in range(AHEAD):
             workspace.rows[k] = write_place(arena, i, targets, n_targets, k, workspace.ahead[k])
         if _search(
-            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace,
-            belief,
-        ):  # fmt: skip
+            arena, around, i, x, reference, layers, plan, kept, has_base, rng, workspace, belief
+        ):
             return True
     plan[:] = workspace.base
     # of one step only, weighed as in still air

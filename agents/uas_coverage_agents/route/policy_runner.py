@@ -83,10 +83,14 @@ class RouteRunner:
         self._learnt: LearntWind | None = None
         if brief.conditions is not None:
             self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
-        self._workspace = search_workspace(int(self._arena.rules[0].lookahead_steps))
+        rehearses = self._rehearsed and not brief.moving_obstacles and brief.conditions is None
+        # elsewhere, guidance is better than a slow start
+        self._workspace = search_workspace(
+            int(self._arena.rules[0].lookahead_steps), slow_starts=bool(rehearses)
+        )
         self._rng = np.random.default_rng(seed)
         self._rehearsal: Rehearsal | None = None
-        if self._rehearsed and not brief.moving_obstacles and brief.conditions is None:
+        if rehearses:
             self._rehearsal = Rehearsal(
                 self._arena, self._around, self._flight, self._routes.view.state.x, self._rng
             )

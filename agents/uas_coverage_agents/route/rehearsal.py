@@ -256,7 +256,7 @@ class Rehearsal:
         n_flights = in_large_missions(_FLIGHTS, n_waypoints)
         self._room = _room(n_flights, n_waypoints, int(arena.rules[0].max_steps))
         self._workspace = search_workspace(
-            int(arena.rules[0].lookahead_steps), _CHANGES // n_flights
+            int(arena.rules[0].lookahead_steps), _CHANGES // n_flights, slow_starts=True
         )
         self._known: dict[tuple[int, ...], tuple[float, NDArray[np.float64]]] = {}
         self._flights: list[Rehearsed | None] = [None] * len(x)
