@@ -243,6 +243,45 @@ def test_of_many_uas_no_name_lies_on_another_on_the_map(swarm):
         assert not any(box.overlaps(other) for other in boxes[:i]), names[i].get_text()
 
 
+def test_of_many_uas_each_name_stands_beside_its_uas(swarm):
+    figure = map_figure(swarm)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    most_px = 20.0 / 72.0 * figure.dpi
+    for text in axes.texts:
+        if text.get_text().isdigit():
+            (i,) = (i for i, name in enumerate(swarm.names) if name == f"uas_{text.get_text()}")
+            place_px = axes.transData.transform(swarm.x[-1, i, [1, 0]])
+            box = text.get_window_extent()
+            nearest_px = np.clip(place_px, box.min, box.max)
+            assert np.hypot(*(nearest_px - place_px)) < most_px, text.get_text()
+
+
+def test_ticks_are_no_larger_than_the_waypoints_that_they_are_in(swarm):
+    x = swarm.x.copy()
+    for i, waypoint in enumerate(swarm.scenario.waypoints[:15]):
+        x[2, i, :3] = waypoint.position_m
+    (axes,) = map_figure(dataclasses.replace(swarm, x=x)).axes
+    axes.figure.draw_without_rendering()
+    radius_m = min(waypoint.radius_m for waypoint in swarm.scenario.waypoints)
+    px = np.diff(axes.transData.transform([(0.0, 0.0), (2 * radius_m, 0.0)])[:, 0]).item()
+    ticks_pt = [
+        line.get_markersize() for line in axes.get_lines() if str(line.get_marker()) == "$✓$"
+    ]
+    assert len(ticks_pt) >= 15
+    assert max(ticks_pt) < 72.0 / axes.figure.dpi * px
+
+
+def test_a_long_title_has_as_many_lines_as_the_width_asks_for(swarm):
+    widest = {}
+    for width_in in (3.4, 6.3):
+        with look(width_in):
+            lines = map_figure(swarm).axes[0].get_title().split("\n")
+        widest[len(lines)] = max(map(len, lines))
+    assert set(widest) == {1, 2}
+    assert widest[2] < 0.75 * widest[1]
+
+
 @pytest.mark.parametrize("edge", ["upper", "lower"])
 def test_of_many_uas_no_name_stands_outside_the_frame(swarm, edge):
     """Three rows of them along an edge of the fence, where names would fit outside only."""
