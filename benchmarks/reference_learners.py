@@ -1,4 +1,4 @@
-"""Reference learners on the levels: trains and scores them, writes the table of docs/level_scores.md.
+"""Reference learners on the levels: trains and scores them, writes docs/level_scores.md.
 
     python benchmarks/reference_learners.py --out reference             # the budgets of their files
     python benchmarks/reference_learners.py --out reference --share 0.1 # a tenth of the steps
@@ -53,7 +53,7 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=1.0, help="of the steps of their files")
     parser.add_argument("--missions", type=int, default=20, help="test missions of each training")
     parser.add_argument("--out", type=Path, default=Path("reference"))
-    parser.add_argument("--publish", action="store_true", help="write the table of docs/level_scores.md")
+    parser.add_argument("--publish", action="store_true", help="write docs/level_scores.md")
     given = parser.parse_args()
     if given.seeds < 1 or not 0.0 < given.share <= 100.0 or not 1 <= given.missions <= 50:
         parser.error("--seeds: 1 or more; --share: above 0, at most 100; --missions: 1 to 50")
