@@ -8,8 +8,7 @@ ten times real time in a window of 1400 x 900 pixels. A picture is one that the 
 The processor time is that of Chromium and all its processes; it says more than the pictures per
 second where the machine does other work, too. The script's part of it is what remains where a
 graphics card draws: the page's own code, with its layout, by Chromium's clock of the main thread.
-Needs Chromium and its driver (Debian: `chromium`,
-`chromium-driver`) and the extra `test`.
+Needs Chromium and its driver (Debian: `chromium`, `chromium-driver`) and the extra `test`.
 """
 
 import argparse
