@@ -1,11 +1,11 @@
-"""Publish the scores of `uas-coverage score`: anchors and the tables of docs/levels.md.
+"""Publish the scores of `uas-coverage score`: anchors and the tables of docs/level_scores.md.
 
     uas-coverage score --level easy,medium,hard,extreme --missions 50 --out scores
     python benchmarks/levels.py scores
 
 Writes the interquartile means of the values of the random policy and of the best planner on the
 test missions to `uas_coverage_env/tasks/anchors.json`, and one table per level between the marks
-`<!-- scores -->` of docs/levels.md.
+`<!-- scores -->` of docs/level_scores.md.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from uas_coverage_env.tasks.table import markdown
 
 ROOT = Path(__file__).parents[1]
 ANCHORS = ROOT / "uas_coverage_env" / "tasks" / "anchors.json"
-PAGE = ROOT / "docs" / "levels.md"
+PAGE = ROOT / "docs" / "level_scores.md"
 FIRST, LAST = "<!-- scores -->\n", "<!-- end of scores -->"
 
 

@@ -1,4 +1,4 @@
-"""Reference learners on the levels: trains and scores them, writes the table of docs/levels.md.
+"""Reference learners on the levels: trains and scores them, writes docs/level_scores.md.
 
     python benchmarks/reference_learners.py --out reference             # the budgets of their files
     python benchmarks/reference_learners.py --out reference --share 0.1 # a tenth of the steps
@@ -24,7 +24,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.tasks import LEVELS, Score, score, scored
 from uas_coverage_env.tasks.scoring import MissionScore
 
-PAGE = Path(__file__).parents[1] / "docs" / "levels.md"
+PAGE = Path(__file__).parents[1] / "docs" / "level_scores.md"
 FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
 HEAD = (
     "learner", "steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
@@ -53,7 +53,7 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=1.0, help="of the steps of their files")
     parser.add_argument("--missions", type=int, default=20, help="test missions of each training")
     parser.add_argument("--out", type=Path, default=Path("reference"))
-    parser.add_argument("--publish", action="store_true", help="write the table of docs/levels.md")
+    parser.add_argument("--publish", action="store_true", help="write docs/level_scores.md")
     given = parser.parse_args()
     if given.seeds < 1 or not 0.0 < given.share <= 100.0 or not 1 <= given.missions <= 50:
         parser.error("--seeds: 1 or more; --share: above 0, at most 100; --missions: 1 to 50")

@@ -6,8 +6,9 @@
 Flights of `nearest-waypoint` over generated towns with ten waypoints per UAS, 120 steps, played at
 ten times real time in a window of 1400 x 900 pixels. A picture is one that the browser has shown.
 The processor time is that of Chromium and all its processes; it says more than the pictures per
-second where the machine does other work, too. Needs Chromium and its driver (Debian: `chromium`,
-`chromium-driver`) and the extra `test`.
+second where the machine does other work, too. The script's part of it is what remains where a
+graphics card draws: the page's own code, with its layout, by Chromium's clock of the main thread.
+Needs Chromium and its driver (Debian: `chromium`, `chromium-driver`) and the extra `test`.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import shutil
 import tempfile
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import psutil
 from selenium import webdriver
@@ -95,8 +97,32 @@ def processor_s(process: psutil.Process) -> float:
     return sum(each.user + each.system for each in times)
 
 
-def played(page: Path, view: str, seconds: float) -> tuple[float, float, float]:
-    """Pictures per second, processor time per picture [s], and time until the first one [s]."""
+def script_s(driver: webdriver.Chrome) -> float:
+    """Time that the page has spent in scripts and layout [s]."""
+    metrics = driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    by_name = {metric["name"]: metric["value"] for metric in metrics}
+    parts = ("ScriptDuration", "LayoutDuration", "RecalcStyleDuration")
+    return sum(by_name[part] for part in parts)
+
+
+class Played(NamedTuple):
+    """What playing a page took.
+
+    Attributes:
+        rate: Pictures per second.
+        picture_s: Processor time per picture [s].
+        script_s: Of it, time in scripts and layout [s].
+        loaded_s: Time until the first picture [s].
+    """
+
+    rate: float
+    picture_s: float
+    script_s: float
+    loaded_s: float
+
+
+def played(page: Path, view: str, seconds: float) -> Played:
+    """Open a page and play it."""
     driver = browser()
     try:
         driver.set_script_timeout(10.0 * seconds + 60.0)
@@ -107,12 +133,14 @@ def played(page: Path, view: str, seconds: float) -> tuple[float, float, float]:
         loaded_s = time.monotonic() - begun_s
         driver.find_element(By.TAG_NAME, "body").send_keys(" ")
         process = psutil.Process(driver.service.process.pid)
-        before_s = processor_s(process)
+        driver.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+        before_s, scripts_before_s = processor_s(process), script_s(driver)
         pictures, lasted_s = driver.execute_async_script(_COUNT, seconds)
         used_s = processor_s(process) - before_s
+        scripts_s = script_s(driver) - scripts_before_s
     finally:
         driver.quit()
-    return pictures / lasted_s, used_s / pictures, loaded_s
+    return Played(pictures / lasted_s, used_s / pictures, scripts_s / pictures, loaded_s)
 
 
 def main() -> None:
@@ -126,16 +154,18 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         folder = arguments.keep or Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
-        print(f"{'UAS':>4} {'view':4} {'pictures/s':>10} {'processor, ms':>14} {'loaded, s':>9}")
+        columns = ("pictures/s", "processor, ms", "script, ms", "loaded, s")
+        print(f"{'UAS':>4} {'view':4} {' '.join(f'{column:>13}' for column in columns)}")
         for uas in map(int, arguments.uas.split(",")):
             flight = flown(uas)
             if arguments.keep:
                 flight.save(folder / f"flight{uas}", overwrite=True)
             page = write_replay([flight], folder / f"uas{uas}.html")
             for view in arguments.views.split(","):
-                rate, picture_s, loaded_s = played(page, view, arguments.seconds)
+                it = played(page, view, arguments.seconds)
+                values = (it.rate, 1e3 * it.picture_s, 1e3 * it.script_s, it.loaded_s)
                 print(
-                    f"{uas:4d} {view:4} {rate:10.1f} {1e3 * picture_s:14.0f} {loaded_s:9.1f}",
+                    f"{uas:4d} {view:4} {' '.join(f'{value:13.1f}' for value in values)}",
                     flush=True,
                 )
 

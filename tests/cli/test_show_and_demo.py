@@ -9,7 +9,8 @@ import pytest
 from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import demo as demo_command
 from uas_coverage_env.cli import main
-from uas_coverage_env.flight import Flight, summary
+from uas_coverage_env.cli.figures_of_flight import verdict
+from uas_coverage_env.flight import Flight, load_planner, rollout, summary
 from uas_coverage_env.scenario import generate_scenario
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -50,6 +51,14 @@ def test_show_puts_a_second_flight_beside_the_first(flown, capsys):
     assert row(out, "accomplished") == ["yes", "no"]
     assert row(out, "steps") == [str(Flight.load(path).steps) for path in flown]
     assert "mission not accomplished: limit of steps reached; 0% covered; not home: uas_1" in out
+
+
+def test_of_many_uas_that_are_not_home_the_first_are_named():
+    town = generate_scenario(seed=5, n_uas=30, n_waypoints=30, n_obstacles=0)
+    said = verdict(rollout(town, load_planner("hover"), max_steps=1))
+    assert said.endswith(
+        "not home: uas_1, uas_2, uas_3, uas_4, uas_5, uas_6, uas_7, uas_8 and 22 more"
+    )
 
 
 def test_show_gives_machines_what_the_summary_says(flown, capsys):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from chromium import started
 
-from uas_coverage_env.flight import Flight, Violation, load_planner, rollout
+from uas_coverage_env.flight import MODES, Flight, Violation, load_planner, rollout
 from uas_coverage_env.flight.record import PLAN_DTYPE
-from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.vehicle import DOD
 
 HORIZON = 18
@@ -40,6 +40,16 @@ def discharged(plain) -> Flight:
     x = plain.x.copy()
     x[:, 1, DOD] += np.linspace(0.0, 0.2, len(x))
     return dataclasses.replace(plain, x=x)
+
+
+@pytest.fixture(scope="session")
+def swarm():
+    """Thirty UAS, the second half of which has landed after two steps."""
+    town = generate_scenario(seed=5, n_uas=30, n_waypoints=60, n_obstacles=5)
+    flown = rollout(town, load_planner("hover"), max_steps=4)
+    mode = flown.mode.copy()
+    mode[2:, 15:] = MODES.index("landed")
+    return dataclasses.replace(flown, mode=mode)
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,11 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from drawn_lines import lines
 from matplotlib.patches import Rectangle
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, DecisionRecord, load_planner, rollout
+from uas_coverage_env.flight import MODES, DecisionRecord
 from uas_coverage_env.replay.figures import (
     KINDS,
     WIDTH_IN,
@@ -17,18 +18,12 @@ from uas_coverage_env.replay.figures import (
     decision_time_figure,
     learning_curve,
     look,
-    map_figure,
     modes_figure,
     save_figure,
     training_figure,
     with_baselines,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
-from uas_coverage_env.scenario import Sensor, generate_scenario
-
-
-def lines(axes) -> list[np.ndarray]:
-    return [line.get_xydata() for line in axes.get_lines()]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -47,76 +42,6 @@ def test_figures_leave_the_settings_of_matplotlib_alone(flight, tmp_path):
     before = dict(mpl.rcParams)
     save_figure(modes_figure(flight), tmp_path / "modes.svg")
     assert dict(mpl.rcParams) == before
-
-
-def test_the_map_shows_what_was_flown_and_predicted_until_a_step(flight):
-    (axes,) = map_figure(flight, step=25).axes
-    drawn = lines(axes)
-    for i in range(2):
-        path = flight.x[:26, i, [1, 0]]
-        assert any(line.shape == path.shape and (line == path).all() for line in drawn)
-        rows = flight.plan[(flight.plan["step"] == 25) & (flight.plan["uas"] == i)]
-        predicted = rows["position_m"][:, [1, 0]]
-        assert any(line.shape == predicted.shape and (line == predicted).all() for line in drawn)
-    assert f"{flight.covered[25]} of 49" in axes.get_title()
-    assert {"uas_1", "uas_2"} <= {text.get_text() for text in axes.texts}
-
-
-def test_the_map_shows_the_last_sample_by_default(flight):
-    (axes,) = map_figure(flight).axes
-    assert f"{flight.time_s[-1]:g} s" in axes.get_title()
-
-
-def test_the_map_shows_the_ground_that_a_camera_has_seen(flight):
-    assert "seen by" not in str([text.get_text() for text in map_figure(flight).legends[0].texts])
-    camera = Sensor(name="camera", field_of_view_deg=(60.0, 45.0))
-    fleet = tuple(
-        uas.model_copy(update={"sensors": (camera,)} if i == 0 else {})
-        for i, uas in enumerate(flight.scenario.uas)
-    )
-    seen = dataclasses.replace(flight, scenario=flight.scenario.model_copy(update={"uas": fleet}))
-    texts = [text.get_text() for text in map_figure(seen).legends[0].texts]
-    assert any(text.startswith("seen by camera, ") for text in texts)
-
-
-def test_the_map_has_north_heights_and_a_legend_of_all_that_is_on_it(flight):
-    figure = map_figure(flight, step=25)
-    texts = [text.get_text() for text in figure.axes[0].texts]
-    heights = {f"{np.ptp(hull.vertices_m[:, 2]):.0f} m" for hull in flight.scenario.hulls}
-    assert "N" in texts
-    assert heights <= set(texts)
-    entries = [text.get_text() for text in figure.legends[0].texts]
-    kinds = {item.kind.replace("_", " ") for item in flight.scenario.obstacles}
-    assert {"waypoint", "weighs more", "covered", "flown", "predicted", "water"} | kinds <= {
-        *entries
-    }
-    assert len(entries) == len(set(entries))
-
-
-def entries_at(flight, step):
-    return {text.get_text() for text in map_figure(flight, step=step).legends[0].texts}
-
-
-def test_the_legend_says_only_what_is_on_the_map_at_its_sample(flight):
-    charge = {"charged", "medium", "discharged"}
-    assert charge | {"geofence", "height", "predicted"} <= entries_at(flight, 25)
-    elsewhere = dataclasses.replace(flight, plan=flight.plan[flight.plan["step"] != 25])
-    assert "predicted" not in entries_at(elsewhere, 25)
-    mode = np.full_like(flight.mode, MODES.index("landed"))
-    mode[:, 1] = MODES.index("lost")
-    over = entries_at(dataclasses.replace(flight, mode=mode), 25)
-    assert not charge & over
-    assert {"landed", "lost"} <= over
-
-
-def test_the_path_of_a_moving_obstacle_is_drawn_once_it_has_moved(flight):
-    moved_m = flight.moving_position_m.copy()
-    moved_m[10:, 0, 0] += 50.0
-    moved = dataclasses.replace(flight, moving_position_m=moved_m)
-    assert "its path" not in entries_at(moved, 5)
-    assert "its path" in entries_at(moved, 25)
-    drawn = lines(map_figure(moved, step=25).axes[0])
-    assert any(np.array_equal(line, moved_m[:26, 0, [1, 0]]) for line in drawn)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -181,11 +106,6 @@ def test_the_first_decision_does_not_set_the_axis(plain):
     assert any("first: 30.0 s" in text.get_text() for text in series.texts)
 
 
-def test_a_step_that_was_not_flown_is_refused(flight):
-    with pytest.raises(InputError, match="samples 0 to 60"):
-        map_figure(flight, step=61)
-
-
 def test_the_battery_figure_holds_our_curves_and_the_published_ones(flight):
     soc, voltage, current = battery_figure(flight).axes
     table = published_battery()
@@ -200,16 +120,6 @@ def test_the_battery_figure_holds_our_curves_and_the_published_ones(flight):
         assert any(np.array_equal(line, scale * ours[:-1, 1]) for line in series)
         assert any(np.array_equal(line, scale * table[name][:airborne]) for line in series)
     assert soc.get_ylabel() == "State of charge, %"
-
-
-@pytest.fixture(scope="module")
-def swarm():
-    """Thirty UAS, the second half of which has landed after two steps."""
-    town = generate_scenario(seed=5, n_uas=30, n_waypoints=60, n_obstacles=5)
-    flown = rollout(town, load_planner("hover"), max_steps=4)
-    mode = flown.mode.copy()
-    mode[2:, 15:] = MODES.index("landed")
-    return dataclasses.replace(flown, mode=mode)
 
 
 def test_of_many_uas_the_battery_figure_shows_least_median_and_span(swarm):
@@ -229,37 +139,6 @@ def test_of_many_uas_the_modes_figure_counts_how_many_do_what(swarm):
     assert max(heights) == 15.0
     assert counts.get_ylabel() == "UAS"
     assert modes_figure(swarm).get_size_inches()[1] < 6.0
-
-
-def test_of_many_uas_no_name_lies_on_another_on_the_map(swarm):
-    x = swarm.x.copy()
-    x[:, :, :2] = 0.2 * x[:, :, :2]
-    figure = map_figure(dataclasses.replace(swarm, x=x))
-    figure.draw_without_rendering()
-    names = [text for text in figure.axes[0].texts if text.get_text().isdigit()]
-    assert 5 < len(names) < 30, "those without a place are left out"
-    boxes = [name.get_window_extent() for name in names]
-    for i, box in enumerate(boxes):
-        assert not any(box.overlaps(other) for other in boxes[:i]), names[i].get_text()
-
-
-@pytest.mark.parametrize("edge", ["upper", "lower"])
-def test_of_many_uas_no_name_stands_outside_the_frame(swarm, edge):
-    """Three rows of them along an edge of the fence, where names would fit outside only."""
-    north_m = swarm.scenario.fence.vertices_m[:, 0]
-    x = swarm.x.copy()
-    rows_m = np.linspace(0.0, 10.0, x.shape[1])
-    x[:, :, 0] = north_m.max() - rows_m if edge == "upper" else north_m.min() + rows_m
-    figure = map_figure(dataclasses.replace(swarm, x=x))
-    figure.draw_without_rendering()
-    frame = figure.axes[0].get_window_extent()
-    names = [text for text in figure.axes[0].texts if text.get_text().isdigit()]
-    assert names
-    for name in names:
-        box = name.get_window_extent()
-        halo = 2.0
-        assert box.y0 > frame.y0 - halo, name.get_text()
-        assert box.y1 < frame.y1 + halo, name.get_text()
 
 
 def test_the_published_curves_are_drawn_beside_the_village_alone(flight):
@@ -403,6 +282,15 @@ def test_baselines_beside_trainings_are_drawn_once_unless_they_flew_other_missio
     assert [len(curve["coverage"]) for curve in runs.values()] == [2, 2, 2, 1, 1]
     assert list(with_baselines({"": tmp_path / "a"})) == ["a", "tour"]
     assert list(with_baselines({"": curve_in(tmp_path / "d")})) == [""]
+
+
+def test_the_steps_of_a_short_training_are_counted_in_thousands(tmp_path):
+    curve = learning_curve(curve_in(tmp_path))
+    short = {**curve, "steps": [0.0, 4_160.0]}
+    for run, last, unit in ((curve, 1.0, "million"), (short, 4.16, "thousand")):
+        axes = training_figure({"": run}).axes[-1]
+        assert lines(axes)[0][-1, 0] == pytest.approx(last)
+        assert axes.get_xlabel() == f"Steps learned from, {unit}"
 
 
 def test_a_training_alone_needs_no_legend(tmp_path):

@@ -17,6 +17,8 @@ from uas_coverage_env.flight import (
 _ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped by hand"}
 NONE = "-"
 _ALIKE = 0.005
+_NAMED = 8
+"""UAS whose names are told; of more, the number."""
 _WORDS = {True: "more energy than", False: "less energy than"}
 
 
@@ -28,7 +30,7 @@ def verdict(flight: Flight) -> str:
     lacks = [
         _ENDED[flight.ended],
         "" if result["coverage"] == 1.0 else f"{result['coverage']:.0%} covered",
-        "" if result["all_home"] else f"not home: {', '.join(_not_home(flight))}",
+        "" if result["all_home"] else f"not home: {_not_home(flight)}",
         _several(len(flight.violations), "violation"),
     ]
     return f"mission not accomplished: {'; '.join(filter(None, lacks))}"
@@ -65,7 +67,7 @@ def figures(flight: Flight) -> dict[str, str]:
         "ended": _ENDED[flight.ended] or "complete",
         "covered": f"{result['coverage']:.0%}",
         "ground seen": ", ".join(f"{name} {share:.1%}" for name, share in seen.items()) or NONE,
-        "all home": "yes" if result["all_home"] else f"not {', '.join(_not_home(flight))}",
+        "all home": "yes" if result["all_home"] else f"not {_not_home(flight)}",
         "steps": str(flight.steps),
         "energy, Wh": f"{result['energy_Wh']:.2f}",
         "packs used": packs if flight.swaps else NONE,
@@ -115,8 +117,11 @@ def data(flight: Flight, directory: str) -> dict[str, Any]:
     }
 
 
-def _not_home(flight: Flight) -> list[str]:
-    return [name for i, name in enumerate(flight.names) if MODES[flight.mode[-1, i]] != "landed"]
+def _not_home(flight: Flight) -> str:
+    """The first few UAS that have not landed, and how many more there are."""
+    out = [name for i, name in enumerate(flight.names) if MODES[flight.mode[-1, i]] != "landed"]
+    more = f" and {len(out) - _NAMED} more" if len(out) > _NAMED else ""
+    return f"{', '.join(out[:_NAMED])}{more}"
 
 
 def _several(count: int, thing: str) -> str:

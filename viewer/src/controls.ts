@@ -275,7 +275,7 @@ function helpDialog(): HTMLDialogElement {
         "covered. The ring around a UAS is as long as its charge, its notch is what the way home " +
         "takes with margin: green while more than 5 % is left beyond that, red where it is too " +
         "little. A diamond is where least was left, a red one the point of no return. Dots are " +
-        "where the planner means to fly. The dashed area is where a UAS that is followed can " +
+        "where the planner means to fly. A dashed line surrounds where the UAS of its colour can " +
         "still fly and come home from. A click on a waypoint or a path says what it was.",
     ),
     element("p", {}, "Drag to turn, wheel or two fingers to come closer, right button to move."),

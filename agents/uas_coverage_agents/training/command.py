@@ -209,7 +209,7 @@ def _shown(screen: Console) -> Iterator[Callable[["TrainingProgress"], object]]:
         if not started:
             started.append((now, progress.share))
         since, share = started[0]
-        parts = [f"{progress.steps / 1e6:.2f} million steps"]
+        parts = [f"{progress.steps:,} steps"]
         if (point := progress.point) is not None:
             parts.append(
                 f"covers {point.coverage:.1%}, all home {point.all_home:.0%}, "

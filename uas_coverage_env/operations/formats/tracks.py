@@ -66,7 +66,7 @@ def geojson_text(name: str, flown: Flown) -> str:
 
 
 def csv_text(name: str, flown: Flown) -> str:
-    """The flown samples: time, place in degrees, height above the ground of home, which sortie.
+    """The flown samples: time, place in degrees, height above the ground of home, sortie, battery.
 
     Between two sorties of one flight a UAS stands where it has landed: these samples are there,
     too, as of the sortie that has ended.
@@ -77,16 +77,19 @@ def csv_text(name: str, flown: Flown) -> str:
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["t_s", "uas", "latitude_deg", "longitude_deg", "height_m", "sortie"])
+    places = ("latitude_deg", "longitude_deg", "height_m")
+    writer.writerow(["t_s", "uas", *places, "sortie", "soc", "voltage_V", "current_A"])
     for n, (part, one) in enumerate(flown):
         first, last = one.track.sortie.first, one.track.sortie.landed
         if n + 1 < len(flown) and flown[n + 1][0] is part:
             last = flown[n + 1][1].track.sortie.first
-        places_m = part.flight.x[first:last, one.track.uas, :3]
-        for k, (a, b, c) in enumerate(one.geodetic(places_m).tolist(), first):
-            at_s = part.flown_from_s + k * part.flight.scenario.dt_s
+        flight, i = part.flight, one.track.uas
+        for k, (a, b, c) in enumerate(one.geodetic(flight.x[first:last, i, :3]).tolist(), first):
+            at_s = part.flown_from_s + k * flight.scenario.dt_s
             place = f"{a:.8f}", f"{b:.8f}", f"{c:.3f}"
-            writer.writerow([f"{at_s:g}", name, *place, one.track.number])
+            volts_amperes = f"{flight.voltage_V[k, i]:.4f}", f"{flight.current_A[k, i]:.4f}"
+            battery = f"{flight.soc[k, i]:.6f}", *volts_amperes
+            writer.writerow([f"{at_s:g}", name, *place, one.track.number, *battery])
     return text.getvalue()
 
 

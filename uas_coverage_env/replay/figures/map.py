@@ -1,5 +1,6 @@
 """The map with past and predicted paths and charge rings (Gasche et al., Fig. 1 and 2)."""
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,11 +32,13 @@ from uas_coverage_env.vehicle import PSI
 _LEGEND_IN = 0.2
 _LEGEND_ROW_IN = 0.175
 _LABEL_PT = 6.5
-_NAME_PT = 8.0
+_NAME_PT, _NAME_PT_OF_MANY = 8.0, 6.5
 _LETTER = 0.62  # width of a letter for its height
-_NAME_ROWS = (0, -1, 1, -2, 2, -3, 3)
-_TITLE_PER_IN = 13  # letters that fit
+_NAME_ROWS, _NAME_ROWS_OF_MANY = (0, -1, 1, -2, 2, -3, 3), (0, -1, 1)
+_TICK_PT = 6.0
+_TITLE_PER_IN = 12  # letters that fit
 _PT_PER_IN = 72.0
+_SIZE_OF_MANY = 0.55  # of paths and marks, where there are many UAS
 
 
 def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
@@ -58,8 +61,10 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
     fence = scenario.fence.vertices_m
     low, high = fence.min(axis=0), fence.max(axis=0)
     with printed():
+        m_per_pt = float((high - low)[1]) / (width_in() * _PT_PER_IN)
+        heights = _heights(scenario, m_per_pt)
         seen = seen_ground(flight, now)
-        legend = legend_of(flight, scenario, moving_m, seen, now)
+        legend = legend_of(flight, scenario, moving_m, seen, now, heights=bool(heights))
         columns = columns_of(max(len(str(entry.get_label())) for entry in legend), 6)
         legend_in = _LEGEND_IN + _LEGEND_ROW_IN * -(-len(legend) // columns)
         height_in = width_in() * float((high[0] - low[0]) / (high[1] - low[1]))
@@ -76,21 +81,32 @@ def map_figure(flight: Flight, *, step: int | None = None) -> Figure:
         axes.spines[["left", "bottom"]].set_visible(False)
         _terrain(axes, scenario)
         _seen_ground(axes, seen)
-        _waypoints(axes, scenario, covered)
-        _heights(axes, scenario, float((high - low)[1]) / (width_in() * _PT_PER_IN))
+        _waypoints(axes, scenario, covered, m_per_pt)
+        for place, words, ink in heights:
+            axes.text(*place, words, color=ink, fontsize=_LABEL_PT, ha="center", va="center")
         _north(figure, axes)
         _moving_obstacles(axes, scenario, moving_m)
         for i in range(len(flight.names)):
             _uas(axes, flight, now, i)
         _violations(axes, flight, now)
-        title = f"{flight.scenario.name}, {flight.planner}, {flight.time_s[now]:g} s:"
-        count = f"{flight.covered[now]} of {len(scenario.waypoints)} waypoints"
-        wide = len(title) + len(count) < _TITLE_PER_IN * width_in()
-        title += f"{' ' if wide else chr(10)}{count}"
-        axes.set_title(title, fontsize=9, parse_math=False)
+        axes.set_title(_title(flight, scenario, now), fontsize=9, parse_math=False)
         figure.legend(handles=legend, loc="outside lower center", ncols=columns, columnspacing=1.2)
         _names(figure, axes, flight, now)
     return figure
+
+
+def _title(flight: Flight, scenario: Scenario, now: int) -> str:
+    """What is drawn, in as many lines as the width asks for."""
+    parts = (
+        f"{flight.scenario.name},",
+        f"{flight.planner},",
+        f"{flight.time_s[now]:g} s:",
+        f"{flight.covered[now]} of {len(scenario.waypoints)} waypoints",
+    )
+    no_break = "\N{NO-BREAK SPACE}"
+    whole = " ".join(part.replace(" ", no_break) for part in parts)
+    lines = textwrap.fill(whole, int(_TITLE_PER_IN * width_in()), break_on_hyphens=False)
+    return lines.replace(no_break, " ")
 
 
 def _flat(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -126,7 +142,7 @@ def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
             )
 
 
-def _waypoints(axes: Axes, scenario: Scenario, covered: NDArray[np.bool_]) -> None:
+def _waypoints(axes: Axes, scenario: Scenario, covered: NDArray[np.bool_], m_per_pt: float) -> None:
     lightest = min((waypoint.weight for waypoint in scenario.waypoints), default=1.0)
     for waypoint, done in zip(scenario.waypoints, covered, strict=True):
         x, y = waypoint.position_m[1], waypoint.position_m[0]
@@ -138,22 +154,26 @@ def _waypoints(axes: Axes, scenario: Scenario, covered: NDArray[np.bool_]) -> No
         if done:
             green = shade(colours.COVERED)
             axes.add_patch(Circle((x, y), waypoint.radius_m, color=green, alpha=0.5, linewidth=0))
-            axes.plot(x, y, marker="$✓$", color=edge, markersize=6, markeredgewidth=0)
+            tick_pt = min(_TICK_PT, 1.4 * waypoint.radius_m / m_per_pt)
+            axes.plot(x, y, marker="$✓$", color=edge, markersize=tick_pt, markeredgewidth=0)
 
 
-def _heights(axes: Axes, scenario: Scenario, m_per_pt: float) -> None:
-    """How high the obstacles are, where no waypoint lies over the words."""
+def _heights(
+    scenario: Scenario, m_per_pt: float
+) -> list[tuple[tuple[float, float], str, tuple[float, float, float]]]:
+    """How high the obstacles are, where no waypoint lies over the words: place, words, colour."""
     discs_m = np.array(
         [(*_flat(np.array(w.position_m[:2])), w.radius_m) for w in scenario.waypoints]
     ).reshape(-1, 3)
+    heights = []
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
         words = f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
         box_m = m_per_pt * _LABEL_PT * np.array([_LETTER * len(words), 1.1])
         place = free_place(_flat(outline_of(hull)), box_m, discs_m)
         if place is not None:
             tint = colours.of_obstacle(obstacle.kind)
-            ink = shade(colours.shaded(tint, 0.35))
-            axes.text(*place, words, color=ink, fontsize=_LABEL_PT, ha="center", va="center")
+            heights.append((place, words, shade(colours.shaded(tint, 0.35))))
+    return heights
 
 
 def _north(figure: Figure, axes: Axes) -> None:
@@ -190,19 +210,23 @@ def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
     lowest_pt, highest_pt = (pt_per_px * edge for edge in axes.bbox.intervaly)
     taken: list[Box] = []
     many = len(flight.names) > MANY
+    # far from their marks, the names of many would be taken for those of others
+    name_pt = _NAME_PT_OF_MANY if many else _NAME_PT
+    rows = _NAME_ROWS_OF_MANY if many else _NAME_ROWS
+    off_pt = 9.0 * _size(flight)
     for i, whole in enumerate(flight.names):
         name = short_name(whole) if many else whole
         east, north = _flat(flight.x[min(now, int(flight.last_sample[i])), i, :3]).tolist()
         # where there is no room to the right, the name stands to the left
         crowded = east > np.dot(axes.get_xlim(), (0.12, 0.88))
         x_pt, y_pt = pt_per_px * axes.transData.transform((east, north))
-        width = _LETTER * _NAME_PT * len(name)
-        beside = -9.0 if crowded else 9.0
+        width = _LETTER * name_pt * len(name)
+        beside = -off_pt if crowded else off_pt
         left = x_pt + beside - (width if crowded else 0.0)
-        for row in _NAME_ROWS:
-            up = 6.0 + 1.2 * _NAME_PT * row
-            box = (left, y_pt + up, width, _NAME_PT)
-            outside = y_pt + up < lowest_pt or y_pt + up + _NAME_PT > highest_pt
+        for row in rows:
+            up = off_pt - 3.0 + 1.2 * name_pt * row
+            box = (left, y_pt + up, width, name_pt)
+            outside = y_pt + up < lowest_pt or y_pt + up + name_pt > highest_pt
             if outside or any(overlap(box, it) for it in taken):
                 continue
             taken.append(box)
@@ -213,20 +237,25 @@ def _names(figure: Figure, axes: Axes, flight: Flight, now: int) -> None:
                 textcoords="offset points",
                 ha="right" if crowded else "left",
                 color=words_colour(i),
-                fontsize=_NAME_PT,
+                fontsize=name_pt,
                 fontweight="bold",
                 path_effects=[withStroke(linewidth=2, foreground="white")],
             )
             break
 
 
+def _size(flight: Flight) -> float:
+    """How large paths and marks of UAS are, beside those of a few."""
+    return _SIZE_OF_MANY if len(flight.names) > MANY else 1.0
+
+
 def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
-    colour = uas_colour(i)
+    colour, size = uas_colour(i), _size(flight)
     until = min(now, int(flight.last_sample[i]))
     path = _flat(flight.x[: until + 1, i, :3])
-    axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.2)
+    axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.2 * size)
     start = _flat(flight.x[0, i, :3])
-    axes.plot(*start, "o", mfc="white", mec=colour, markersize=4, markeredgewidth=1)
+    axes.plot(*start, "o", mfc="white", mec=colour, ms=4 * size, mew=size)
     rows = flight.plan[(flight.plan["step"] == now) & (flight.plan["uas"] == i)]
     predicted = _flat(rows["position_m"])
     axes.plot(predicted[:, 0], predicted[:, 1], ".", color=colour, markersize=2.6)
@@ -235,15 +264,15 @@ def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
     if mode == "lost":
         axes.plot(x, y, **LOST)
     elif mode == "landed":
-        axes.plot(x, y, color=colour, **LANDED)
+        axes.plot(x, y, color=colour, **{**LANDED, "ms": size * LANDED["ms"], "mew": size})
     else:
-        _charge_ring(axes, (x, y), float(flight.soc[now, i]))
+        _charge_ring(axes, (x, y), float(flight.soc[now, i]), size)
         heading = float(np.degrees(flight.x[now, i, PSI]))
-        axes.plot(x, y, marker=(4, 2, 45 - heading), color=shade(colours.INK), markersize=7)
+        axes.plot(x, y, marker=(4, 2, 45 - heading), color=shade(colours.INK), ms=7 * size)
 
 
-def _charge_ring(axes: Axes, place: tuple[float, float], soc: float) -> None:
-    """A ring as long and as green as the charge, of the same size on every map."""
+def _charge_ring(axes: Axes, place: tuple[float, float], soc: float, size: float) -> None:
+    """A ring as long and as green as the charge, of a size in points."""
     angles = np.linspace(0.0, 2 * np.pi * min(1.0, max(0.0, soc)), 60)
     whole = np.linspace(0.0, 2 * np.pi, 60)
     for points, colour, width in (
@@ -252,9 +281,8 @@ def _charge_ring(axes: Axes, place: tuple[float, float], soc: float) -> None:
         (angles, colours.of_charge(soc), 2.4),
     ):
         arc = np.column_stack([np.sin(points), np.cos(points)])
-        axes.plot(
-            *place, marker=arc, markersize=15, mfc="none", mec=shade(colour), markeredgewidth=width
-        )
+        ring = {"marker": arc, "ms": 15 * size, "mec": shade(colour), "mew": width * size}
+        axes.plot(*place, mfc="none", **ring)
 
 
 def _violations(axes: Axes, flight: Flight, now: int) -> None:

@@ -33,6 +33,8 @@ def legend_of(
     moving_m: NDArray[np.float64],
     seen: Sequence[SeenGround],
     now: int,
+    *,
+    heights: bool,
 ) -> list[Artist]:
     """The entries of the legend of a map.
 
@@ -42,6 +44,7 @@ def legend_of(
         moving_m: (now + 1, M, 3) [m] where its moving obstacles have been.
         seen: What its cameras have seen, as far as it is drawn.
         now: Number of the sample that is drawn.
+        heights: Whether the height of an obstacle is written on it.
     """
     weights = {waypoint.weight for waypoint in scenario.waypoints}
     ink = shade(colours.INK)
@@ -60,7 +63,7 @@ def legend_of(
         )
     start = {"mfc": "white", "mec": uas_colour(0), "markersize": 4}
     marks.append(Line2D([], [], marker="o", ls="", **start, label="start, home"))
-    return [*marks, *_uas(flight, now), *_seen(seen), *_places(scenario, moving_m)]
+    return [*marks, *_uas(flight, now), *_seen(seen), *_places(scenario, moving_m, heights)]
 
 
 def _uas(flight: Flight, now: int) -> list[Artist]:
@@ -90,7 +93,7 @@ def _seen(seen: Sequence[SeenGround]) -> list[Artist]:
     ]
 
 
-def _places(scenario: Scenario, moving_m: NDArray[np.float64]) -> list[Artist]:
+def _places(scenario: Scenario, moving_m: NDArray[np.float64], heights: bool) -> list[Artist]:
     """Fence, kinds of obstacles and of other things on the ground, and what moves."""
     ink, ground = shade(colours.INK), shade(colours.GROUND)
     patches: list[Artist] = [Patch(facecolor=ground, edgecolor=ink, lw=1.2, label="geofence")]
@@ -102,7 +105,7 @@ def _places(scenario: Scenario, moving_m: NDArray[np.float64]) -> list[Artist]:
         Patch(facecolor=shade(tint), edgecolor="none", label=words)
         for words, tint in decoration_kinds(scenario).items()
     ]
-    if scenario.obstacles:
+    if heights:
         patches.append(
             Line2D([], [], marker="$9\\,m$", ls="", color=ink, ms=13, mew=0, label="height")
         )

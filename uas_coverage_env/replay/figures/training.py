@@ -30,6 +30,7 @@ Curve = Mapping[str, Sequence[float] | NDArray[np.float64]]
 """Column of `learning_curve.csv` -> its values, a row for each time that the policy was tried."""
 
 _STEPS, _RETURN = "steps", "return"
+_FEW_STEPS = 50_000
 _PANELS = (
     ("coverage", 100.0, "Covered, %"),
     ("violations", 1.0, "Violations per mission"),
@@ -50,6 +51,8 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
     returns = all(_RETURN in curve for curve in runs.values()) and bool(runs)
     panels = (*_PANELS, *([(_RETURN, 1.0, "Return")] if returns else []))
     rows = 3 if returns else 2
+    longest = max((float(curve[_STEPS][-1]) for curve in runs.values()), default=0.0)
+    unit, unit_name = (1e3, "thousand") if 0.0 < longest < _FEW_STEPS else (1e6, "million")
     with printed():
         figure = Figure(figsize=(width_in(), 2.1 * rows), layout="constrained")
         grid = figure.subplots(rows, 2, sharex=True)
@@ -63,7 +66,7 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
                 if len(values) == 1:
                     axis.axhline(float(values[0]), **style)
                 else:
-                    steps = np.asarray(curve[_STEPS], float) / 1e6
+                    steps = np.asarray(curve[_STEPS], float) / unit
                     axis.plot(steps, values, marker=".", markersize=4, **style)
             axis.set_ylabel(label)
             axis.margins(x=0.02)
@@ -74,10 +77,10 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
         for axis in grid[1]:
             axis.set_ylim(bottom=0)
         for axis in (grid[-1, 0], grid[1, 1]):
-            axis.set_xlabel("Steps learned from, million")
+            axis.set_xlabel(f"Steps learned from, {unit_name}")
             axis.tick_params(labelbottom=True)
         if rows == 2:
-            grid[1, 0].set_xlabel("Steps learned from, million")
+            grid[1, 0].set_xlabel(f"Steps learned from, {unit_name}")
         figure.align_ylabels()
         if any(runs):
             handles, labels = grid[0, 0].get_legend_handles_labels()
