@@ -14,6 +14,7 @@ import argparse
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,7 @@ def main() -> None:
     PAGE.write_text(before + first + tables(store) + last + after, encoding="utf-8")
 
 
-def anchors_from(store: ScoreStore, level: str) -> dict[str, object]:
+def anchors_from(store: ScoreStore, level: str) -> dict[str, Any]:
     """The anchors of a level, over the missions that all of its planners have flown."""
     middle = {
         planner: float(iqm(np.array([flown.value for flown in store.missions(level, planner)])))

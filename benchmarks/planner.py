@@ -15,7 +15,7 @@ import time
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -328,10 +328,11 @@ def _town(seed: int, n_uas: int, n_waypoints: int) -> Scenario:
     town = generate_scenario(
         seed, n_uas=min(enough, 64), n_waypoints=n_waypoints, n_obstacles=min(n_waypoints // 5, 400)
     )
-    fields = {name: getattr(town, name) for name in type(town).model_fields}
+    fields: dict[str, Any] = {name: getattr(town, name) for name in type(town).model_fields}
     fields["schema"] = fields.pop("schema_version")
     name = f"town-s{seed}-u{n_uas}-w{n_waypoints}"
-    return Scenario(**{**fields, "name": name, "uas": town.uas[:n_uas]})
+    fields |= {"name": name, "uas": town.uas[:n_uas]}
+    return Scenario(**fields)
 
 
 def _decision_table(title: str) -> Table:

@@ -154,7 +154,7 @@ def _rock(rng: Rng, north_m: float, east_m: float) -> list[Any]:
 def _scattered(
     rng: Rng, name: str, kinds: list[Callable[[Rng, float, float], list[Any]]], count: int
 ) -> Scenario:
-    obstacles = []
+    obstacles: list[dict[str, Any]] = []
     for number in range(count):
         shape = kinds[int(rng.integers(len(kinds)))]
         north_m, east_m = rng.uniform((25.0, 50.0), (175.0, 180.0))

@@ -53,16 +53,20 @@ def page_of(notebook: Path) -> Path:
 def _holds_all_cells(notebook: Path) -> bool:
     page = page_of(notebook)
     rest = page.read_text(encoding="utf-8") if page.exists() else ""
-    for cell in nbformat.read(notebook, as_version=4).cells:
+    for cell in _read(notebook).cells:
         _, found, rest = rest.partition(source_of(cell))
         if not found:
             return False
     return True
 
 
+def _read(notebook: Path) -> Any:
+    return nbformat.read(notebook, as_version=4)
+
+
 def write(notebook: Path) -> None:
     """Run a notebook, and write its page and pictures."""
-    cells = nbformat.read(notebook, as_version=4)
+    cells = _read(notebook)
     with tempfile.TemporaryDirectory() as folder:
         resources = {"metadata": {"path": folder}}
         NotebookClient(

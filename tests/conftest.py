@@ -25,7 +25,7 @@ def pytest_configure():
     path = os.environ.get("PYTHONPATH", "")
     os.environ.setdefault(PATH_BEFORE, path)  # by the process that starts the others of `-n`
     if tested is not None and tested.origin and Path(tested.origin).parents[1] == ROOT:
-        folders = filter(None, [str(ROOT), *path.split(os.pathsep)])
+        folders = [str(ROOT), *(each for each in path.split(os.pathsep) if each)]
         os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(folders))
 
 

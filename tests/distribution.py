@@ -17,8 +17,9 @@ FIRST = ("missions/test_evasion.py", "test_house.py", "docs")
 """One process compiles what most others need, meanwhile the next one works without kernels: `docs`
 begins with building the site."""
 
-APART = ("docs/test_documented_commands.py", "docs/test_notebooks.py")
-"""Files whose tests have nothing in common and are long: each goes where there is time for it."""
+APART = ("docs/test_documented_commands.py", "docs/test_notebooks.py", "cli/test_warm_up.py")
+"""Files whose tests have nothing in common, and use all planners: each goes where there is time for
+it, after all others, which have compiled the planners' kernels by then."""
 
 BY_FILE = ("baselines", "leaderboard", "milp_mpc", "missions")
 """Folders whose files have nothing in common but kernels, which other folders need as well."""
@@ -26,18 +27,22 @@ BY_FILE = ("baselines", "leaderboard", "milp_mpc", "missions")
 
 def scope_of(nodeid: str) -> str:
     """What a test stays together with."""
-    path = nodeid.partition("::")[0].removeprefix("tests/")
+    path = _path(nodeid)
     if path in APART:
         return nodeid.removeprefix("tests/")
     folder, slash, _ = path.partition("/")
     return folder if slash and folder not in BY_FILE else path
 
 
+def _path(nodeid: str) -> str:
+    return nodeid.partition("::")[0].removeprefix("tests/")
+
+
 def rank_of(nodeid: str) -> tuple[int, float, str]:
     """Where a test stands in the order of the whole suite."""
     scope = scope_of(nodeid)
-    first = FIRST.index(scope) if scope in FIRST else len(FIRST)
-    return first, -SECONDS.get(scope, 0.0), scope
+    group = FIRST.index(scope) if scope in FIRST else len(FIRST) + (_path(nodeid) in APART)
+    return group, -SECONDS.get(scope, 0.0), scope
 
 
 def write_seconds(of_tests: dict[str, float], file: Path = SECONDS_FILE) -> None:

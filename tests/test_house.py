@@ -199,8 +199,11 @@ def test_ruff_finds_nothing_to_mend():
     checked(sys.executable, "-m", "ruff", "format", "--check", ".")
 
 
-def test_pyright_finds_no_type_that_does_not_fit():
-    output = checked(sys.executable, "-m", "pyright", "--pythonpath", sys.executable)
+def test_pyrefly_finds_no_type_that_does_not_fit():
+    # the packages that are imported are looked up where the tests run
+    here = ("--python-interpreter-path", sys.executable)
+    tool = Path(sys.executable).with_name("pyrefly")
+    output = checked(str(tool), "check", *here, "--output-format", "min-text")
     assert "0 errors" in output
 
 

@@ -73,14 +73,18 @@ def test_tests_of_a_folder_stay_together_but_for_long_ones_that_share_nothing():
     assert scope_of(file) != scope_of(next_file)
 
 
-def test_the_longest_come_first_and_what_stays_together_in_one_piece():
+def test_the_longest_come_first_but_for_what_is_apart():
     nodes = [f"tests/{s}" if ".py" in s else f"tests/{s}/test_x.py" for s in reversed(SECONDS)]
     assert [scope_of(node) for node in nodes] == list(reversed(SECONDS))
     nodes.append("tests/world/test_x.py::test_y")
     ranked = [scope_of(name) for name in sorted(nodes, key=rank_of)]
     assert ranked[: len(FIRST)] == list(FIRST)
-    seconds = [SECONDS[scope] for scope in ranked if scope in SECONDS and scope not in FIRST]
-    assert seconds == sorted(seconds, reverse=True)
+    apart = [scope.startswith(APART) for scope in ranked]
+    assert apart == sorted(apart), "what uses all kernels comes when they are compiled"
+    for last in (False, True):
+        timed = [scope for scope in ranked[len(FIRST) :] if scope in SECONDS]
+        seconds = [SECONDS[scope] for scope in timed if scope.startswith(APART) is last]
+        assert seconds == sorted(seconds, reverse=True)
 
 
 def test_what_is_timed_exists():

@@ -1,6 +1,7 @@
 """Lawnmower: the waypoints row by row, back and forth, cut into one run per UAS."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,11 +83,11 @@ def _brief_of(brief: MissionBrief, team: Sequence[int]) -> MissionBrief:
     """The mission of some of its UAS."""
     if len(team) == len(brief.uas):
         return brief
-    fleet = {
+    fleet: dict[str, Any] = {
         "uas": tuple(brief.uas[u] for u in team),
         "vehicles": tuple(brief.vehicles[u] for u in team),
     }
-    known = {name: getattr(brief, name) for name in type(brief).model_fields}
+    known: dict[str, Any] = {name: getattr(brief, name) for name in type(brief).model_fields}
     return MissionBrief.model_construct(**known | fleet)
 
 

@@ -64,7 +64,7 @@ def _wait(child: int) -> int:
     return os.waitpid(child, 0)[1]
 
 
-def _forked(command: list[str], said: Path) -> int:
+def _forked(command: list[str], said: Path) -> int:  # pyrefly: ignore[bad-return]
     """Begin `uas-coverage` with these arguments; returns the process's number once it runs."""
     runs, begins = os.pipe()
     child = os.fork()

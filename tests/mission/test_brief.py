@@ -59,7 +59,7 @@ PUBLIC = {
     Decoration: {"name", "kind", "polygon_m"},
     Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
-HIDDEN = {
+HIDDEN: dict[type, set[str]] = {
     Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "relaunch"},
     MovingObstacle: {"schedule"},
 }

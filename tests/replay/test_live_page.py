@@ -107,7 +107,8 @@ class Client:
     """Flies like `hover`, and looks at the page as a browser does."""
 
     def __init__(self):
-        self.planner, self.page, self.seen = load_planner("hover"), None, []
+        self.planner, self.seen = load_planner("hover"), []
+        self.page: LivePage | None = None
 
     def reset(self, brief, seed):
         self.planner.reset(brief, seed)

@@ -273,8 +273,9 @@ class _Window:
         rows, bounds = [], []
         sides = np.vstack([self._sides, *directions])
         for k, x in enumerate(states):
-            landed = last_mps is not None and k == n
-            largest = [last_mps, math.inf, math.inf] if landed else motion.largest
+            largest = motion.largest
+            if last_mps is not None and k == n:
+                largest = [last_mps, math.inf, math.inf]
             for which, most in enumerate(largest):
                 if math.isfinite(most):
                     rows.append(sides @ x[:, which])

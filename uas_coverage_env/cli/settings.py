@@ -44,7 +44,8 @@ def from_settings(context: typer.Context, path: Path | None) -> Path | None:
 
 def _spelled(param: Any) -> str:
     """Its name as it is typed, without dashes."""
-    return max(param.opts, key=len).lstrip("-").lower()
+    spellings: list[str] = param.opts
+    return max(spellings, key=len).lstrip("-").lower()
 
 
 def _as_written(hint: Any) -> Any:

@@ -1,6 +1,7 @@
 """Blocks with a kernel, which users write as well: what every tuple of them has to satisfy."""
 
-from collections.abc import Sequence
+from collections import namedtuple
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from numbers import Real
 from typing import Any, TypeVar
@@ -32,6 +33,17 @@ def checked_blocks(
     if len(names) < least or len(set(names)) < len(names):
         raise ValueError(f"{argument}: {nouns} are named {names}; give each a name of its own")
     return tuple(blocks)
+
+
+def numbered(names: Iterable[str], numbers: Iterable[int]) -> Any:
+    """Numbers by their names: a named tuple, whose fields are constants to a kernel.
+
+    Args:
+        names: Of the fields.
+        numbers: The value of each.
+    """
+    made: Any = namedtuple
+    return made("numbers", [*names])(*numbers)
 
 
 def check_parameters(what: str, parameters: Sequence[Any]) -> None:

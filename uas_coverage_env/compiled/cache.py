@@ -70,9 +70,11 @@ class _KernelCache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any], form: type[CacheImpl], digest: str) -> None:
         self.digest = digest
-        self._impl_class = form
+        # another form, and other files, than those that numba's type checks know
+        self._impl_class = form  # pyrefly: ignore[bad-assignment]
         super().__init__(function)
-        self._cache_file = _Files(self.cache_path, self._impl.filename_base, self.digest)
+        files = _Files(self.cache_path, self._impl.filename_base, digest)
+        self._cache_file = files  # pyrefly: ignore[bad-assignment]
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return sig, codegen.magic_tuple(), self._impl_class.__name__, _function_key(self._py_func)

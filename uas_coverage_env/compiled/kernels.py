@@ -202,7 +202,7 @@ def _prefetched(typing_context, array):
 
 if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
     lowest_bit = _trailing_zeros()
-    rarely = _expected_false()  # pyright: ignore[reportAssignmentType]
-    prefetch = intrinsic(_prefetched)  # pyright: ignore[reportAssignmentType]
+    ahead: Any = intrinsic(_prefetched)
+    rarely, prefetch = _expected_false(), ahead
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

@@ -203,11 +203,11 @@ def _unpacked(context: Any, builder: Any, pool: Any, value: Any) -> tuple[list[A
         make_array(array_type)(context, builder, array)
         for array_type, array in zip(pool[0], cgutils.unpack_tuple(builder, arrays), strict=True)
     ]
-    tables = (
+    tables = [
         make_array(table_type)(context, builder, table)
         for table_type, table in ((pool[1], first), (pool[2], sizes))
-    )
-    return flat, *tables
+    ]
+    return flat, tables[0], tables[1]
 
 
 def _element(context: Any, builder: Any, table: Any, row: Any, column: int) -> Any:
@@ -246,8 +246,7 @@ def copy_arrays(source: Any, target: Any) -> None:
         written[...] = given
 
 
-if _COMPILED:
-    copy_arrays = intrinsic(_copied)  # pyright: ignore[reportAssignmentType]
+copy_arrays = _in_kernels(_copied, copy_arrays)
 
 
 class Handover:

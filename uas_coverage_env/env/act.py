@@ -1,7 +1,6 @@
 """Actions become commands: the usual kinds as one kernel, others at their address."""
 
 import math
-from collections import namedtuple
 from collections.abc import Sequence
 from functools import cache
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.array_views import slice_view
+from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
@@ -36,7 +36,7 @@ from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME, VELOCITY
 from uas_coverage_env.world.state import STATE
 
-_KIND = namedtuple("kinds", ACTION_NAMES)(*range(len(ACTIONS)))
+_KIND = numbered(ACTION_NAMES, range(len(ACTIONS)))
 _OWN = len(ACTIONS)
 
 

@@ -40,7 +40,7 @@ from uas_coverage_env.scenario import FAMILIES, Scenario, installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 
-THREADS_PER_BLOCK = 64
+THREADS_PER_BLOCK: int = 64
 
 
 def _check_is_one(scenario: Any) -> None:

@@ -332,7 +332,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         settings, index, before = self._episode.settings, self._index, self._told
         mask_of = self._episode.infos.action_mask if settings.mask_in_observation else None
         as_shown = {
-            agent: shown(settings, row, mask_of and mask_of(index[agent]))
+            agent: shown(settings, row, None if mask_of is None else mask_of(index[agent]))
             for agent, row in seen.items()
         }
         self._told = LastKnown(as_shown, before[0]), LastKnown(infos, before[1])

@@ -1,6 +1,5 @@
 """The rewards of all UAS, compiled: the default terms as one kernel, others at their address."""
 
-from collections import namedtuple
 from collections.abc import Sequence
 from functools import cache
 
@@ -9,6 +8,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import slice_view
+from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.env.memory import (
@@ -27,7 +27,7 @@ from uas_coverage_env.env.rewards import terms as default
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.state import STATE
 
-_AT = namedtuple("columns", REWARD_TERMS)(*range(len(REWARD)))
+_AT = numbered(REWARD_TERMS, range(len(REWARD)))
 
 
 @cache

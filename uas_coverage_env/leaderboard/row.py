@@ -179,7 +179,9 @@ class Row:
         return self.status == FLOWN and not self.violations
 
 
-COLUMNS = {field.name: get_args(field.type) or (field.type,) for field in fields(Row)}
+COLUMNS: dict[str, tuple[Any, ...]] = {
+    field.name: get_args(field.type) or (field.type,) for field in fields(Row)
+}
 """What a row holds: name -> the types of its values, None's last."""
 
 ADDED = ("episode_return",)

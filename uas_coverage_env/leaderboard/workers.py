@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -144,8 +144,9 @@ def _join_ray(jobs: int) -> None:
         supports_return_generator = True
 
     if not ray.is_initialized():
-        here = "RAY_ADDRESS" not in os.environ
-        local = {"num_cpus": None if jobs < 0 else jobs, "include_dashboard": False} if here else {}
+        local: dict[str, Any] = {}
+        if "RAY_ADDRESS" not in os.environ:
+            local = {"num_cpus": None if jobs < 0 else jobs, "include_dashboard": False}
         ray.init(**local, log_to_driver=False, logging_level=logging.ERROR)
     from joblib import register_parallel_backend
 

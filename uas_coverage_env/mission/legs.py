@@ -229,7 +229,8 @@ def _straight_s(
     way_m = (away[:, :2] @ _OCTAGON.T).max(axis=1)
     up_m = np.maximum(-away[:, 2] - credit_m, 0.0)
     down_m = np.maximum(away[:, 2] - credit_m, 0.0)
-    level_s = level_seconds(ROUTED, speeds._replace(level_mps=level_mps), way_m)
+    at_speed = speeds._replace(level_mps=level_mps)  # pyrefly: ignore[bad-argument-type]
+    level_s = level_seconds(ROUTED, at_speed, way_m)
     return np.maximum(level_s, vertical_seconds(speeds, up_m, down_m))
 
 

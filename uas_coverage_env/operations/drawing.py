@@ -19,11 +19,14 @@ MOST_BYTES = 20_000_000
 MOST_CORNERS = 100_000
 _HEAVIEST = 1e6
 
+_SPELLINGS: dict[Role | Literal["home"], tuple[str, ...]] = {
+    "search": ("search", "survey", "area"),
+    "no_fly": ("no_fly", "nofly", "keep_out", "exclusion"),
+    "fence": ("fence", "geofence"),
+    "home": ("home", "take_off", "takeoff", "launch"),
+}
 _ROLES: dict[str, Role | Literal["home"]] = {
-    **dict.fromkeys(("search", "survey", "area"), "search"),
-    **dict.fromkeys(("no_fly", "nofly", "keep_out", "exclusion"), "no_fly"),
-    **dict.fromkeys(("fence", "geofence"), "fence"),
-    **dict.fromkeys(("home", "take_off", "takeoff", "launch"), "home"),
+    written: role for role, spellings in _SPELLINGS.items() for written in spellings
 }
 """How roles are written in files, `-` and spaces read as `_`."""
 

@@ -36,7 +36,7 @@ def local_polygon(frame: LocalFrame, drawn: DrawnPolygon) -> Polygon:
     rings = [_local(frame, drawn.source, ring) for ring in (drawn.outer, *drawn.holes)]
     polygon = Polygon(rings[0], rings[1:])
     if not polygon.is_valid:
-        reason = shapely.is_valid_reason(polygon)
+        reason = str(shapely.is_valid_reason(polygon))
         found = _PLACE.search(reason)
         at = ""
         if found:

@@ -183,14 +183,14 @@ def _apart(areas: list[Area]) -> tuple[Area, ...]:
     result: list[Area] = []
     taken_by: dict[str | None, BaseGeometry] = {}
     for area in sorted(areas, key=lambda entry: -entry.weight):
-        taken, left = taken_by.get(area.camera, Polygon()), area.shape
-        if not taken.is_empty:
+        taken, left = taken_by.get(area.camera), area.shape
+        if taken is not None:
             left = left.difference(taken)
             # what is thinner than can be drawn is where two edges nearly agree
             left = left.buffer(-_EDGE_M, join_style="mitre").buffer(_EDGE_M, join_style="mitre")
         if not left.is_empty:
             result.append(area._replace(shape=left))
-        taken_by[area.camera] = taken.union(area.shape)
+        taken_by[area.camera] = area.shape if taken is None else taken.union(area.shape)
     return tuple(result)
 
 

@@ -117,7 +117,7 @@ def _predicted(
         for pick, settled, bound, first in quantities:
             if step >= first:
                 row = pick @ power
-                entry = [*row, settled - row @ at_rest, bound]
+                entry = [*row, float(settled - row @ at_rest), bound]
                 (rows if step < steps else last).append(entry)
         power = closed @ power
     return np.array(rows), np.array(last)

@@ -41,7 +41,8 @@ class CentralCriticPolicy(ActorCriticPolicy):
 
     def __init__(self, *args: Any, actor_size: int, **kwargs: Any) -> None:
         self._actor_size = actor_size
-        super().__init__(*args, **{**kwargs, "share_features_extractor": False})
+        options: dict[str, Any] = {**kwargs, "share_features_extractor": False}
+        super().__init__(*args, **options)
 
     def _build_mlp_extractor(self) -> None:
         space = self.observation_space

@@ -76,7 +76,8 @@ class AttentionPolicy(ActorCriticPolicy):
 
     def __init__(self, *args: Any, network: Attention, **kwargs: Any) -> None:
         self.network = network
-        super().__init__(*args, **{"ortho_init": False, **kwargs})
+        options: dict[str, Any] = {"ortho_init": False, **kwargs}
+        super().__init__(*args, **options)
 
     def _build_mlp_extractor(self) -> None:
         network = self.network
@@ -103,8 +104,9 @@ class AttentionPolicy(ActorCriticPolicy):
 
     def tensors(self) -> dict[str, NDArray[np.float32]]:
         """The weights by the names of `Attention.shapes`."""
+        extractor: Any = self.mlp_extractor
         parts = {
-            **self.mlp_extractor.actor.state_dict(),
+            **extractor.actor.state_dict(),
             **{f"out.{name}": tensor for name, tensor in self.action_net.state_dict().items()},
         }
         return {k: v.detach().cpu().numpy().astype(np.float32) for k, v in parts.items()}

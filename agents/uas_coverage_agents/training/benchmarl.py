@@ -34,7 +34,7 @@ class CoverageTask(PettingZooClass):
     ) -> Callable[[], EnvBase]:
         """What makes an environment of TorchRL."""
         usual = {"action": "velocity" if continuous_actions else "waypoint", "flat_infos": True}
-        config = {**usual, **self.config}
+        config: dict[str, Any] = {**usual, **self.config}
         masked = kind_of(config["action"]).choices > 0
 
         def make() -> EnvBase:

@@ -96,7 +96,8 @@ class PointerPolicy(MaskableActorCriticPolicy):
 
     def __init__(self, *args: Any, pointer: Pointer, **kwargs: Any) -> None:
         self.pointer = pointer
-        super().__init__(*args, **{"ortho_init": False, **kwargs})
+        options: dict[str, Any] = {"ortho_init": False, **kwargs}
+        super().__init__(*args, **options)
 
     def _build_mlp_extractor(self) -> None:
         pointer = self.pointer
@@ -126,7 +127,8 @@ class PointerPolicy(MaskableActorCriticPolicy):
             "home_1.": "home.1.",
         }
         tensors = {}
-        for name, tensor in self.mlp_extractor.actor.state_dict().items():
+        extractor: Any = self.mlp_extractor
+        for name, tensor in extractor.actor.state_dict().items():
             for ours, theirs in names.items():
                 if name.startswith(ours):
                     name = theirs + name.removeprefix(ours)

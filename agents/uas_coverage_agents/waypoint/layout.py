@@ -5,12 +5,12 @@ from its nearest neighbour, `unit_s` the time to fly it. So one policy serves to
 Nothing depends on where north is, or on the order of the fleet.
 """
 
-from collections import namedtuple
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.env.observation import Feature, Group
 from uas_coverage_env.vehicle.range import LEARNED_LEG
 
@@ -110,13 +110,10 @@ N_TEAM = TEAM.size
 N_CANDIDATE = CANDIDATE.size // K
 OBSERVATION_SIZE = TEAM.size + CANDIDATE.size
 
-TeamColumns = namedtuple("TeamColumns", [feature.name for feature in TEAM.features])
-CandidateColumns = namedtuple("CandidateColumns", [feature.name for feature in CANDIDATE.features])
-
-TEAM_AT = TeamColumns(*range(N_TEAM))
+TEAM_AT = numbered((feature.name for feature in TEAM.features), range(N_TEAM))
 """The column of each number by its name, for kernels too."""
 
-CANDIDATE_AT = CandidateColumns(*range(N_CANDIDATE))
+CANDIDATE_AT = numbered((feature.name for feature in CANDIDATE.features), range(N_CANDIDATE))
 """The same, from the first column of a candidate on."""
 
 WAY = CANDIDATE_AT.way

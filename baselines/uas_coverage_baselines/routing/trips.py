@@ -268,6 +268,10 @@ def _flights(
         budget_s=fresh.budget_share * of_each(task.budget_s, later.budget_s),
         barred=barred,
         packs=np.column_stack(
-            [uas, ground_s, np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0)]
+            [
+                uas.astype(np.float64),
+                ground_s,
+                np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0),
+            ]
         ),
     )

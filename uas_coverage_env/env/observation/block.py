@@ -1,12 +1,11 @@
 """What an observation is made of: blocks, each a table of numbers and a kernel that writes them."""
 
 import math
-from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from uas_coverage_env.compiled.blocks import check_parameters
+from uas_coverage_env.compiled.blocks import check_parameters, numbered
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Group:
         for feature in self.features:
             firsts.append(column)
             column += feature.size
-        return namedtuple("columns", [feature.name for feature in self.features])(*firsts)
+        return numbered((feature.name for feature in self.features), firsts)
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ def firsts_of(groups: Sequence[Group]) -> Any:
     for group in groups:
         firsts.append(column)
         column += group.size
-    return namedtuple("firsts", [group.name for group in groups])(*firsts)
+    return numbered((group.name for group in groups), firsts)
 
 
 DIRECTION = "unit vector to it, north and east; 0 where it is straight above or below"

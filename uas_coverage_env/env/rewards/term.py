@@ -67,7 +67,7 @@ def weights_of(
             raise ValueError(f"there is no reward term {name!r}; there are {', '.join(weights)}")
         number = isinstance(weight, Real) and not isinstance(weight, bool)
         # NaN is not below any bound
-        if not number or not abs(weight) <= LARGEST_WEIGHT:
+        if not number or not abs(weight) <= LARGEST_WEIGHT:  # pyrefly: ignore[unsupported-operation]
             shown = repr(weight)[:80]
             raise ValueError(
                 f"reward_weights: {name} is {shown}; give a finite number, at most "

@@ -24,7 +24,7 @@ LOST: Mapping[str, Any] = {
     "ms": 9,
 }
 LANDED: Mapping[str, Any] = {"marker": "o", "ls": "", "mec": "white", "ms": 6}
-_RING = {"marker": "o", "linestyle": "", "mfc": "none", "markersize": 8}
+_RING: dict[str, Any] = {"marker": "o", "linestyle": "", "mfc": "none", "markersize": 8}
 
 
 def legend_of(
@@ -50,9 +50,18 @@ def legend_of(
     ink = shade(colours.INK)
     marks: list[Artist] = [Line2D([], [], **_RING, mec=ink, label="waypoint")]
     if len(weights) > 1:
-        twice = {"marker": "$◎$", "ls": "", "color": ink, "ms": 9, "markeredgewidth": 0}
+        twice: dict[str, Any] = {
+            "marker": "$◎$",
+            "ls": "",
+            "color": ink,
+            "ms": 9,
+            "markeredgewidth": 0,
+        }
         marks.append(Line2D([], [], **twice, label="weighs more"))
-    covered = {"mfc": (*shade(colours.COVERED), 0.5), "mec": shade(colours.COVERED_EDGE)}
+    covered: dict[str, Any] = {
+        "mfc": (*shade(colours.COVERED), 0.5),
+        "mec": shade(colours.COVERED_EDGE),
+    }
     marks += [
         Line2D([], [], **{**_RING, **covered}, label="covered"),
         Line2D([], [], color=uas_colour(0), label="flown"),
@@ -61,7 +70,7 @@ def legend_of(
         marks.append(
             Line2D([], [], color=uas_colour(0), marker=".", ls="", ms=3, label="predicted")
         )
-    start = {"mfc": "white", "mec": uas_colour(0), "markersize": 4}
+    start: dict[str, Any] = {"mfc": "white", "mec": uas_colour(0), "markersize": 4}
     marks.append(Line2D([], [], marker="o", ls="", **start, label="start, home"))
     return [*marks, *_uas(flight, now), *_seen(seen), *_places(scenario, moving_m, heights)]
 

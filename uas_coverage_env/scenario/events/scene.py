@@ -218,4 +218,5 @@ def _before(obstacle: MovingObstacle, time_s: float) -> tuple[ScheduledVelocity,
 
 def _with(entry: T, **changes: Any) -> T:
     # checked before; and a vehicle file may be elsewhere by now
-    return type(entry).model_construct(**{**dict(entry), **changes})
+    kind: Any = type(entry)
+    return kind.model_construct(**{**dict(entry), **changes})

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,7 +213,8 @@ class BlockRows:
         for columns in (v.x, v.u, v.covers, v.uncovered):
             own[columns[columns >= 0]] = False
         shape = (len(built.row_lower), len(own))
-        matrix = sparse.csr_matrix((built.coefficient, built.column, built.row_start), shape=shape)
+        entries = (built.coefficient, built.column, built.row_start)
+        matrix: Any = sparse.csr_matrix(entries, shape=shape)
         self._built, self._own = built, own
         self._given, self._free = matrix[:, ~own], matrix[:, own]
         self._alone = np.diff(self._free.indptr) == 0  # rows without columns of their own

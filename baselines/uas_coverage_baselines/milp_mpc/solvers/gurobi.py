@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
+from typing import Any
 
 import gurobipy
 import numpy as np
@@ -119,7 +120,8 @@ def _model(
     )
     model.ObjCon = milp.constant
     shape = (len(milp.row_lower), len(milp.cost))
-    rows = sparse.csr_matrix((milp.coefficient, milp.column, milp.row_start), shape=shape)
+    entries = (milp.coefficient, milp.column, milp.row_start)
+    rows: Any = sparse.csr_matrix(entries, shape=shape)
     equal = milp.row_lower == milp.row_upper
     for chosen, sense, side in (
         (equal, GRB.EQUAL, milp.row_upper),
