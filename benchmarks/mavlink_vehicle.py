@@ -16,7 +16,7 @@ os.environ.setdefault("MAVLINK20", "1")
 from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.mission_raw import MissionRaw
 
-# by its name: its 30 000 generated lines take pyright ten seconds
+# by its name: its 30 000 generated lines take type checkers seconds
 mav = import_module("pymavlink.dialects.v20.ardupilotmega")
 
 MISSION, FENCE, RALLY = 0, 1, 2

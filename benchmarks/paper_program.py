@@ -161,7 +161,7 @@ def main(
     """Fly a mission with `milp-mpc-paper` and tell every decision."""
     scenario = mission_of(mission)
     given = {name: value for name, _, value in (part.partition("=") for part in option or [])}
-    options = load_planner("milp-mpc-paper", given).options  # type: ignore[attr-defined]
+    options = load_planner("milp-mpc-paper", given).options  # pyrefly: ignore[missing-attribute]
     folder = out / "solutions"
     folder.mkdir(parents=True, exist_ok=True)
     told = json.dumps({"mission": mission, "options": options.model_dump(mode="json")}, indent=1)

@@ -109,7 +109,7 @@ def _arcs_s(task: RoutingTask, uas: int) -> NDArray[np.float64]:
 def or_tools(task: RoutingTask, weight: float, seconds: float, seed: int) -> Found:
     """Guided local search from the cheapest arcs."""
     del seed  # it draws nothing
-    from ortools.constraint_solver import (  # pyright: ignore[reportMissingImports]
+    from ortools.constraint_solver import (
         pywrapcp,
         routing_enums_pb2,
     )
@@ -151,7 +151,7 @@ def or_tools(task: RoutingTask, weight: float, seconds: float, seed: int) -> Fou
 
 def pyvrp(task: RoutingTask, weight: float, seconds: float, seed: int) -> Found | None:
     """Iterated local search of PyVRP; None where several UAS fly."""
-    from pyvrp import Model  # pyright: ignore[reportMissingImports]
+    from pyvrp import Model
 
     if task.n_uas > 1:
         return None

@@ -145,7 +145,7 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
 
 
 def _mpe2_dict(num_envs: int, threads: int) -> Steps:
-    from mpe2 import simple_spread_v3  # pyright: ignore[reportMissingImports]
+    from mpe2 import simple_spread_v3
 
     return _parallel(
         simple_spread_v3.parallel_env(N=N_AGENTS, max_cycles=100, continuous_actions=True)
@@ -154,7 +154,7 @@ def _mpe2_dict(num_envs: int, threads: int) -> Steps:
 
 def _vmas(num_envs: int, threads: int) -> Steps:
     import torch
-    import vmas  # pyright: ignore[reportMissingImports]
+    import vmas
 
     torch.set_num_threads(threads)
     env = vmas.make_env(
@@ -180,8 +180,8 @@ def _vmas(num_envs: int, threads: int) -> Steps:
 
 
 def _jaxmarl(num_envs: int, threads: int) -> Steps:
-    import jax  # pyright: ignore[reportMissingImports]
-    import jaxmarl  # pyright: ignore[reportMissingImports]
+    import jax
+    import jaxmarl
 
     env = jaxmarl.make("MPE_simple_spread_v3", num_agents=N_AGENTS, num_landmarks=N_AGENTS)
 

@@ -97,7 +97,7 @@ def judged(task: RoutingTask, routes: Sequence[NDArray[np.int64]]) -> Routes:
 
 def routed(task: RoutingTask, seconds: float) -> Routes:
     """OR-tools: one vehicle per UAS, from where it is, to its start."""
-    from ortools.constraint_solver import pywrapcp, routing_enums_pb2  # pyright: ignore[reportMissingImports]
+    from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 
     U, W = task.n_uas, task.n_waypoints
     starts, ends = [W + u for u in range(U)], [W + U + u for u in range(U)]
@@ -160,7 +160,7 @@ def main(
 ) -> None:
     """Compare orders, predicted and flown."""
     try:
-        import ortools  # pyright: ignore[reportMissingImports]
+        import ortools
 
         solvers = {"annealing": annealed, f"OR-tools {ortools.__version__}": routed}
     except ImportError:

@@ -97,7 +97,7 @@ class Timed:
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile, which is not timed."""
         if hasattr(self._planner, "warm_up"):
-            self._planner.warm_up(brief)  # pyright: ignore[reportAttributeAccessIssue]
+            self._planner.warm_up(brief)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """See `Planner`."""

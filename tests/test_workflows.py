@@ -53,12 +53,6 @@ def test_the_site_is_built_as_contributing_says():
         assert command.removesuffix(" --check") in CONTRIBUTING
 
 
-def test_the_second_type_check_is_the_one_of_contributing():
-    *_, install, check = steps("types")
-    assert f"`{check}`" in CONTRIBUTING
-    assert install.replace("[test,types]", "[types]") in CONTRIBUTING
-
-
 def test_every_library_of_the_clients_tests_is_installed_by_a_job():
     jobs = [entry["tests"].split() for entry in matrix("clients", "library")["include"]]
     named = [f"test_{name}.py" for names in jobs for name in names]

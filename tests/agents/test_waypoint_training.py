@@ -143,7 +143,7 @@ def test_an_untrained_model_takes_the_nearest_waypoint():
     observation = np.asarray(lanes.reset())
     for _ in range(20):
         masks = np.stack(lanes.env_method("action_masks"))
-        choices = model.predict(observation, action_masks=masks, deterministic=True)[0]  # pyright: ignore
+        choices = model.predict(observation, action_masks=masks, deterministic=True)[0]  # pyrefly: ignore[unexpected-keyword]
         assert (choices == masks.argmax(axis=1)).all()
         assert (choices != HOME_CHOICE).all()
         observation = lanes.step(choices)[0]
@@ -163,7 +163,7 @@ def test_a_short_training_saves_energy_and_time_on_towns_it_has_not_seen():
         observation, costs = np.asarray(lanes.reset()), np.full(32, np.nan)
         while np.isnan(costs).any():
             masks = np.stack(lanes.env_method("action_masks"))
-            choices = model.predict(observation, action_masks=masks, deterministic=True)[0]  # pyright: ignore
+            choices = model.predict(observation, action_masks=masks, deterministic=True)[0]  # pyrefly: ignore[unexpected-keyword]
             observation, _, done, infos = lanes.step(choices)
             for lane in np.flatnonzero(done & np.isnan(costs)):
                 costs[lane] = infos[lane]["account"] @ prices_of(SETTINGS) / SETTINGS.price_per_Wh

@@ -7,7 +7,7 @@ AsyncPettingZooVecEnv = library("agilerl.vector.pz_async_vec_env").AsyncPettingZ
 IPPO = library("agilerl.algorithms").IPPO
 training = library("agilerl.training.train_multi_agent_on_policy")
 
-from supersuit import black_death_v3  # pyright: ignore[reportMissingImports]
+from supersuit import black_death_v3
 
 from uas_coverage_env import uas_coverage_v0
 

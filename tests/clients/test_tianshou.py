@@ -5,14 +5,14 @@ from libraries import SHORT, library
 library("tianshou")
 
 import numpy as np
-from tianshou.algorithm.multiagent.marl import (  # pyright: ignore[reportMissingImports]
+from tianshou.algorithm.multiagent.marl import (
     MultiAgentOffPolicyAlgorithm,
 )
-from tianshou.algorithm.random import (  # pyright: ignore[reportMissingImports]
+from tianshou.algorithm.random import (
     MARLRandomDiscreteMaskedOffPolicyAlgorithm,
 )
-from tianshou.data import Collector, VectorReplayBuffer  # pyright: ignore[reportMissingImports]
-from tianshou.env import DummyVectorEnv, PettingZooEnv  # pyright: ignore[reportMissingImports]
+from tianshou.data import Collector, VectorReplayBuffer
+from tianshou.env import DummyVectorEnv, PettingZooEnv
 
 from uas_coverage_env import uas_coverage_v0
 

@@ -235,8 +235,8 @@ def test_numbers_that_are_not_finite_end_the_flight_with_a_line():
 def test_what_is_no_disturbance_is_refused():
     again = waypoint((150.0, 150.0, -20.0)) | {"again_after_s": (30.0,)}
     cases = [
-        (lambda: World(meadow(), disturbances=push(0.0, 0.0, 0.0)), "give a tuple"),  # type: ignore
-        (lambda: World(meadow(), disturbances=("wind",)), "no Disturbance"),  # type: ignore
+        (lambda: World(meadow(), disturbances=push(0.0, 0.0, 0.0)), "give a tuple"),
+        (lambda: World(meadow(), disturbances=("wind",)), "no Disturbance"),
         (lambda: World(meadow(), disturbances=(gusts(), gusts())), "a name of its own"),
         (lambda: push(math.inf, 0.0, 0.0), r"push: parameters\[0\] is inf"),
         (lambda: Disturbance("", None), "give it a name"),

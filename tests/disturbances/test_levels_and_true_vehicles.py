@@ -170,7 +170,7 @@ def test_a_level_that_there_is_not_is_one_line():
         lambda: generate_scenario(1, disturbances="stormy"),
         lambda: GeneratedScenarios(disturbances="stormy"),
         lambda: with_disturbances(generate_scenario(1), "stormy", 1),
-        lambda: generate_scenario(1, disturbances=3),  # type: ignore
+        lambda: generate_scenario(1, disturbances=3),
     ):
         with pytest.raises(ValueError, match="it should be light, moderate, strong or None"):
             make()

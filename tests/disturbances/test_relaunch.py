@@ -128,7 +128,7 @@ def test_no_file_says_so_that_did_not_before(tmp_path):
 def test_in_an_environment_a_uas_that_has_landed_has_left():
     env = parallel_env(again(LOST_2), action="waypoint")
     env.reset(seed=0)
-    home_action = int(env.action_space("uas_1").n) - 1  # pyright: ignore[reportAttributeAccessIssue]
+    home_action = int(env.action_space("uas_1").n) - 1
     env.step({"uas_1": home_action, "uas_2": 0})
     for _ in range(8):
         assert env.agents in (["uas_2"], [])

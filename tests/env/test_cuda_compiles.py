@@ -59,7 +59,7 @@ def test_numba_finds_the_types_of_all_that_the_step_calls(missions):
 
 def test_the_step_compiles_for_a_gpu(compiler, missions):
     given = [typeof(argument) for argument in (missions._pool_there, *missions._arguments)]
-    from numba.cuda import compile_ptx  # pyright: ignore[reportPrivateImportUsage]
+    from numba.cuda import compile_ptx
 
     code, _ = compile_ptx(missions._launched.py_func, tuple(given), cc=COMPUTE_CAPABILITY)
     assert ".visible .entry" in code

@@ -288,7 +288,7 @@ def test_a_spec_goes_through_json_with_its_scenario(scenario):
     assert inner.scenario == (load_scenario(scenario) if scenario == "open_field" else scenario)
     assert inner.action_space == env.action_space
     assert copy.spec is not None
-    assert copy.spec.to_json() == gymnasium.make(copy.spec).spec.to_json()  # pyright: ignore
+    assert copy.spec.to_json() == gymnasium.make(copy.spec).spec.to_json()
 
 
 def test_a_spec_of_many_missions_goes_through_json():

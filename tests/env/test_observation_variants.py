@@ -232,7 +232,7 @@ def test_a_policy_is_shown_as_a_planner_what_the_environment_shows():
 def test_observations_have_names_that_a_spec_can_hold():
     env = gymnasium.make("UASCoverage-v0", scenario="open_field", observation="local")
     size = sum(block.size for block in OBSERVATIONS["local"])
-    assert env.observation_space.shape == (size * len(env.unwrapped.scenario.uas),)  # pyright: ignore[reportAttributeAccessIssue]
+    assert env.observation_space.shape == (size * len(env.unwrapped.scenario.uas),)
     assert env.spec is not None
     assert json.loads(env.spec.to_json())["kwargs"]["observation"] == "local"
     batch = CoverageBatch(1, "open_field", observation="default")

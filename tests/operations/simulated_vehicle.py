@@ -8,7 +8,7 @@ os.environ.setdefault("MAVLINK20", "1")
 
 import numpy as np
 
-# by its name, as in `autopilot_logs.py`: its 30 000 generated lines take pyright ten seconds
+# by its name, as in `autopilot_logs.py`: its 30 000 generated lines take type checkers seconds
 mav = import_module("pymavlink.dialects.v20.ardupilotmega")
 
 STABILIZE, GUIDED, LAND = 0, 4, 9

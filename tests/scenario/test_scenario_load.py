@@ -47,7 +47,7 @@ def test_an_unknown_name_lists_what_there_is():
     with pytest.raises(InputError, match="unknown scenario ''"):
         load_scenario("")
     with pytest.raises(InputError, match="unknown scenario '3'"):
-        load_scenario(3)  # pyright: ignore[reportArgumentType]
+        load_scenario(3)
 
 
 def test_a_generated_scenario_has_a_name_and_a_seed():

@@ -102,7 +102,7 @@ def test_a_copy_of_a_world_flies_on_by_itself(duplicate):
 def test_the_state_of_a_world_is_written_and_not_replaced():
     world = World(meadow())
     with pytest.raises(AttributeError):
-        world.state = world.state.copy()  # type: ignore[misc]
+        world.state = world.state.copy()
 
 
 def test_packed_commands_may_lie_anywhere_in_memory():
@@ -165,7 +165,7 @@ def test_time_counts_in_steps_of_the_scenario():
 
 def test_unknown_dynamics_are_refused_with_the_known_ones():
     with pytest.raises(ValueError, match=r"'newton'.*lpv.*nonlinear"):
-        World(meadow(), dynamics="newton")  # type: ignore[arg-type]
+        World(meadow(), dynamics="newton")
 
 
 def test_after_a_wrench_the_inner_loop_goes_on_from_the_velocity_reached():

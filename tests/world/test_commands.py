@@ -170,4 +170,4 @@ def test_commands_beyond_the_limits_of_the_vehicle_are_flown_as_far_as_it_goes()
 def test_a_planner_may_not_change_what_the_world_flies():
     command = Velocity(1.0, 0.0, 5.0)
     with pytest.raises(AttributeError):
-        command.north_mps = 2.0  # type: ignore[misc]
+        command.north_mps = 2.0

@@ -29,7 +29,7 @@ def checked_blocks(
     for block in blocks:
         if not isinstance(block, kind):
             raise ValueError(f"{argument}: {block!r} is no {kind.__name__}")
-    names = [block.name for block in blocks]  # pyright: ignore[reportAttributeAccessIssue]
+    names = [block.name for block in blocks]
     if len(names) < least or len(set(names)) < len(names):
         raise ValueError(f"{argument}: {nouns} are named {names}; give each a name of its own")
     return tuple(blocks)

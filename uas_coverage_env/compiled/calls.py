@@ -14,7 +14,7 @@ from numba import config, types
 from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
-COMPILED = not config.DISABLE_JIT  # pyright: ignore[reportAttributeAccessIssue]
+COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
 
 
 class Signature:
@@ -117,7 +117,7 @@ def _made(
         return result(types.int64, *expected), generate
 
     # numba reads from the signature how many arguments there are
-    typed.__signature__ = inspect.Signature(  # pyright: ignore[reportFunctionMemberAccess]
+    typed.__signature__ = inspect.Signature(  # pyrefly: ignore[missing-attribute]
         [
             inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
             for name in ("typing_context", "address", *names)

@@ -30,7 +30,7 @@ def _decorator(**options: Any) -> Any:
     def decorate(function: Any = None, /, **more: Any) -> Any:
         if function is None:
             return _decorator(**options, **more)
-        if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+        if config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
             return function
         compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
         keep_on_disk(compiled)
@@ -71,7 +71,7 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
 
     Called directly it spares numba's look at the type of each argument, a third of a short step.
     """
-    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    if config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
         return function
     return function.compile(tuple(map(typeof, arguments)))
 
@@ -200,7 +200,7 @@ def _prefetched(typing_context, array):
     return types.none(array), generate
 
 
-if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+if not config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
     lowest_bit = _trailing_zeros()
     ahead: Any = intrinsic(_prefetched)
     rarely, prefetch = _expected_false(), ahead

@@ -66,6 +66,6 @@ def normal(random: NDArray[np.uint64]) -> float:
     return radius * math.cos(2.0 * math.pi * uniform(random))
 
 
-if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+if config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
     # that the numbers overflow is meant; NumPy warns of it
     mixed, counted, bits = (np.errstate(over="ignore")(each) for each in (mixed, counted, bits))

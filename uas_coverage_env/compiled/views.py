@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.array_views import view_of
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
 
-_COMPILED = not config.DISABLE_JIT  # pyright: ignore[reportAttributeAccessIssue]
+_COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
 
 
 def _pointer(builder: Any, pointer: Any, n_bytes: Any) -> Any:

@@ -232,7 +232,7 @@ def _step_of(write: Any, fly: Any) -> Any:
 
     @cuda.jit
     def step(pool, acting, paying, observing, missions, nonlinear):
-        lane = cuda.grid(1)  # pyright: ignore[reportCallIssue]
+        lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
         if lane < missions.ended.shape[0]:
             write(pool, acting, missions, lane)
             if _flies(pool, missions, lane):

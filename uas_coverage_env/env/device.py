@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Memory, Pool
 
 # the simulator's own arrays are strange to what is called by its kernels; it takes plain ones
-_SIMULATED = config.ENABLE_CUDASIM  # pyright: ignore[reportAttributeAccessIssue]
+_SIMULATED = config.ENABLE_CUDASIM  # pyrefly: ignore[missing-attribute]
 
 
 def on_device(arrays: Any) -> Any:

@@ -116,7 +116,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         v0: First version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
+    metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
         "name": "uas_coverage_v0",
         "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,

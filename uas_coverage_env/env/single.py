@@ -72,7 +72,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         v0: First version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
+    metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
         "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,
     }
@@ -100,7 +100,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         return self._spec
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def spec(self, spec: EnvSpec | None) -> None:
         fixed = self._missions.source.fixed or self._episode.settings.max_cycles is not None
         self._spec = plain_spec(spec, self._episode.max_cycles if fixed else None)
 

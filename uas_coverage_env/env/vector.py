@@ -164,7 +164,7 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         return self._spec
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def spec(self, spec: EnvSpec | None) -> None:
         limits = {scenario.max_steps for scenario in self._batch.pool.scenarios}
         fixed = self._batch.settings.max_cycles is not None or not self._batch.draws
         self._spec = plain_spec(spec, limits.pop() if fixed and len(limits) == 1 else None)

@@ -201,7 +201,7 @@ class FlightRecord:
             for field in dataclasses.fields(self)
         )
 
-    __hash__ = None  # pyright: ignore[reportAssignmentType]  # arrays cannot be hashed
+    __hash__ = None  # arrays cannot be hashed
 
     @property
     def names(self) -> tuple[str, ...]:

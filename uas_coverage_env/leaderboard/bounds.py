@@ -42,7 +42,7 @@ def bounds_of(
     parallel = Parallel(
         side_by_side,
         return_as="generator_unordered",
-        batch_size=1,  # pyright: ignore[reportArgumentType]  # its default is a word
+        batch_size=1,  # its default is a word
     )
     results = cast("Iterator[dict[tuple[str, int], float]]", parallel(work))
     for done, of_one in enumerate(results, 1):
@@ -53,5 +53,5 @@ def bounds_of(
 
 
 def _bounds(name: str, scenario: Scenario, steps: Sequence[int]) -> dict[tuple[str, int], float]:
-    bound = bound_of(scenario)  # pyright: ignore[reportArgumentType]  # it is frozen, so hashable
+    bound = bound_of(scenario)  # it is frozen, so hashable
     return {} if bound is None else {(name, n): bound.energy_Wh(n) for n in steps}

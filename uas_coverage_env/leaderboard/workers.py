@@ -71,7 +71,7 @@ def fly_all(
             # one flight per task: what is finished is kept at once
             parallel = Parallel(
                 return_as="generator_unordered",
-                batch_size=1,  # pyright: ignore[reportArgumentType]  # its default is a word
+                batch_size=1,  # its default is a word
                 max_nbytes=None,  # nothing large travels
             )
             for row in parallel(delayed(fly)(entry, source_sha256, kept_in) for entry in entries):
@@ -130,8 +130,8 @@ def _end_with(owner: int) -> None:
 def _join_ray(jobs: int) -> None:
     """Make Ray known to joblib, and start a local cluster where there is none to join."""
     try:
-        import ray  # pyright: ignore[reportMissingImports]
-        from ray.util.joblib.ray_backend import RayBackend  # pyright: ignore[reportMissingImports]
+        import ray
+        from ray.util.joblib.ray_backend import RayBackend
     except ImportError as error:
         raise InputError(
             f"--backend ray: Ray cannot be loaded ({error}); "

@@ -172,7 +172,7 @@ def _window(
             f"{path}: {millions:.0f} million heights over the fence, more than "
             f"{_MOST_READ / 1e6:.0f} million; resample the grid to a few metres"
         )
-    return (top, left), Window(left, top, right - left, bottom - top)  # pyright: ignore[reportCallIssue]
+    return (top, left), Window(left, top, right - left, bottom - top)
 
 
 def _read(path: Path, grid: rasterio.DatasetReader, window: Window) -> tuple[FloatArray, BoolArray]:

@@ -139,7 +139,7 @@ def _hover_W(sheet: DataSheet, battery: Battery) -> float:
             f"{sheet.cells} cells faster than their resistance of {1e3 * resistance_ohm:.3g} mohm "
             "lets it; correct hover_minutes, capacity_Ah or cells, or give resistance_mohm"
         )
-    return float(brentq(too_little_W, 0.0, most_W))  # pyright: ignore[reportArgumentType]
+    return float(brentq(too_little_W, 0.0, most_W))  # pyrefly: ignore[bad-argument-type]
 
 
 def _airframe(sheet: DataSheet) -> dict[str, Value]:

@@ -6,10 +6,10 @@ BenchMARL is no dependency of this package: `pip install benchmarl` beside it.
 from collections.abc import Callable
 from typing import Any
 
-from benchmarl.environments.pettingzoo.common import (  # pyright: ignore[reportMissingImports]
+from benchmarl.environments.pettingzoo.common import (
     PettingZooClass,
 )
-from torchrl.envs import EnvBase, PettingZooWrapper  # pyright: ignore[reportMissingImports]
+from torchrl.envs import EnvBase, PettingZooWrapper
 
 from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.env.actions.kinds import kind_of

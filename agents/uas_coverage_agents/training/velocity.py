@@ -96,7 +96,7 @@ class VelocityVecEnv(VecEnvWrapper):
 class DecidingRollouts(RolloutBuffer):
     """The samples of a rollout without those in which nothing was decided."""
 
-    def get(self, batch_size: int | None = None) -> Iterator[RolloutBufferSamples]:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def get(self, batch_size: int | None = None) -> Iterator[RolloutBufferSamples]:  # pyrefly: ignore[bad-override]
         """Batches of samples in random order; a small rest is left out."""
         if not self.generator_ready:
             names = ("observations", "actions", "values", "log_probs", "advantages", "returns")

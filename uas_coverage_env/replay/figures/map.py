@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -264,7 +265,8 @@ def _uas(axes: Axes, flight: Flight, now: int, i: int) -> None:
     if mode == "lost":
         axes.plot(x, y, **LOST)
     elif mode == "landed":
-        axes.plot(x, y, color=colour, **{**LANDED, "ms": size * LANDED["ms"], "mew": size})
+        landed: dict[str, Any] = {**LANDED, "ms": size * LANDED["ms"], "mew": size}
+        axes.plot(x, y, color=colour, **landed)
     else:
         _charge_ring(axes, (x, y), float(flight.soc[now, i]), size)
         heading = float(np.degrees(flight.x[now, i, PSI]))

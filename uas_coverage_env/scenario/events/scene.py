@@ -111,7 +111,7 @@ class NoFlyZoneAdded(ObstacleAdded):
         vertices_m: Points whose convex hull is the zone, (V, 3) [m].
     """
 
-    kind: Literal["no_fly_zone"]  # pyright: ignore[reportIncompatibleVariableOverride]
+    kind: Literal["no_fly_zone"]  # pyrefly: ignore[bad-override]
 
     def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
         """The zone comes last among the obstacles."""
