@@ -34,7 +34,7 @@ from uas_coverage_env.env.reward_kernel import compute_rewards, paying_of
 from uas_coverage_env.env.rewards import REWARD
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.pool import arena_of, state_of
-from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle import N_STATES, lpv_step
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (
@@ -219,7 +219,8 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     )
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,
-        SCRATCH.zeros(batch.pool.sizes, lanes=n_lanes), rules, np.zeros(14), batch.observation,
+        SCRATCH.zeros(batch.pool.sizes, lanes=n_lanes), rules, np.zeros(N_STATES),
+        batch.observation,
     )  # fmt: skip
     # once, so that there are outcomes for the parts to go on from
     _over_lanes(PARTS[WHOLE])(*arguments)

@@ -226,7 +226,7 @@ def test_attributes_are_those_of_a_lane():
     assert env.env_is_wrapped(VecNormalize) == [False] * 6
     with pytest.raises(AttributeError):
         env.get_attr("nothing")
-    with pytest.raises(AttributeError, match="all lanes"):
+    with pytest.raises(AttributeError, match="all environments"):
         env.set_attr("num_envs", 3)
     with pytest.raises(AttributeError, match="action_masks"):
         env.env_method("fly_home")
@@ -246,5 +246,5 @@ def test_an_action_that_is_no_number_is_refused():
     env.reset()
     actions = np.zeros((4, 3))
     actions[2, 1] = np.nan
-    with pytest.raises(ValueError, match="UAS 0 in lane 1"):
+    with pytest.raises(ValueError, match="UAS 0 in environment 1"):
         env.step(actions)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from uas_coverage_env.cli import main
+from uas_coverage_env.compiled.random import SEEDS
 
 VILLAGE = files("uas_coverage_env.scenario").joinpath("village.toml").read_text(encoding="utf-8")
 FIRST_WAYPOINT = "position_m = [48.0, 68.0, -26.0]"
@@ -92,6 +93,9 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
         (["run", "village", "--steps", "0"], "--steps"),
         (["run", "village", "--steps", "many"], "--steps"),
         (["run", "village", "--seed", "-1"], "--seed"),
+        (["run", "village", "--seed", str(SEEDS)], "--seed"),
+        (["front", "village", "--seed", str(SEEDS), "--out", "front"], "--seed"),
+        (["train", "ppo", "--seed", str(2**32)], "--seed"),
         (["run", "village", "--speed", "9"], "--speed"),
         (["run"], "SCENARIO"),
         (["fly", "village"], "fly"),

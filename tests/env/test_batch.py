@@ -207,7 +207,7 @@ def test_an_action_that_is_refused_changes_nothing():
     actions = random_actions(batch, 1)
     n_uas = len(batch.scenario_of(1).uas)
     actions[1, n_uas - 1, 2] = np.inf
-    with pytest.raises(ValueError, match=f"UAS {n_uas - 1} in lane 1"):
+    with pytest.raises(ValueError, match=f"UAS {n_uas - 1} in environment 1"):
         batch.step(actions)
     after = batch.state_dict()
     del before["asked"], after["asked"]

@@ -290,7 +290,7 @@ def test_states_that_no_batch_can_have_are_refused_and_change_nothing():
             batch.load_state_dict({**state, name: wrong})
         assert batch.pool.scenarios == before
     batch.reset(scenarios=practice_ground(n_uas=1))
-    with pytest.raises(ValueError, match="lane 0 was given"):
+    with pytest.raises(ValueError, match="environment 0 was given"):
         batch.state_dict()
 
 

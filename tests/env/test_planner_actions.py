@@ -188,7 +188,7 @@ def test_lanes_that_have_ended_take_no_commands():
     batch.step(batch.actions_of([{"uas_1": GoTo(0), "uas_2": GoTo(1)}] * 2))
     with pytest.raises(ValueError, match="uas_2 has no command"):
         batch.actions_of([{"uas_1": GoTo(0)}, {"uas_1": GoTo(0)}])
-    with pytest.raises(ValueError, match="commands for 1 of 2 lanes"):
+    with pytest.raises(ValueError, match="commands for 1 of 2 environments"):
         batch.actions_of([{}])
 
 

@@ -105,10 +105,10 @@ def test_a_mission_that_has_ended_waits_for_its_reset_where_autoreset_is_disable
     env.reset()
     _, _, _, truncated, _ = env.step(env.action_space.sample())
     assert truncated.all()
-    with pytest.raises(ResetNeeded, match="lane 0"):
+    with pytest.raises(ResetNeeded, match="environment 0"):
         env.step(env.action_space.sample())
     env.reset(options={"reset_mask": np.array([True, False, False])})
-    with pytest.raises(ResetNeeded, match="lane 1"):
+    with pytest.raises(ResetNeeded, match="environment 1"):
         env.step(env.action_space.sample())
 
 
@@ -283,7 +283,7 @@ def test_a_copy_in_another_process_flies_on():
     [
         ({"reset_mask": np.zeros(3, dtype=bool)}, "one true value"),
         ({"reset_mask": [True, False, True]}, "give an array"),
-        ({"reset_mask": np.ones(2, dtype=bool)}, "each of 3 lanes"),
+        ({"reset_mask": np.ones(2, dtype=bool)}, "each of 3 environments"),
         ({"scenario": np.array([0, 1, 2])}, "indices from 0 to 0"),
         ({"scenario": [0.5] * 3}, "an index for each"),
     ],

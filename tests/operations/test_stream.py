@@ -5,7 +5,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from simulated_vehicle import LAND, DrivenClock, SimulatedPX4, SimulatedVehicle
+from simulated_vehicle import LAND, DrivenClock, SimulatedPX4, SimulatedVehicle, mav
 from small_worlds import meadow, waypoint
 
 pytest.importorskip("pyproj")
@@ -180,6 +180,61 @@ def test_an_autopilot_with_other_modes_is_refused(flight):
     loop.vehicles[0].autopilot = 13
     with pytest.raises(InputError, match=r"uas_1.*autopilot 13.*only.*ArduPilot and PX4"):
         loop.fly()
+
+
+def test_another_system_on_the_same_connection_is_not_heard(flight):
+    loop = Loopback(flight)
+    vehicle = loop.vehicles[0]
+    report = vehicle._report
+
+    def with_stranger():
+        report()
+        if vehicle.time_s > 1.0:  # elsewhere, on the ground, and of an unknown autopilot
+            stranger = mav.MAVLink(None, srcSystem=7, srcComponent=1)
+            for message in (
+                stranger.heartbeat_encode(2, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4),
+                stranger.global_position_int_encode(0, *(10**8, 10**8), *(0,) * 6),
+            ):
+                vehicle._socket.sendto(message.pack(stranger), vehicle._peer)
+
+    vehicle._report = with_stranger
+    ended, _ = loop.fly()
+    assert ended.reason == ""
+    assert ended.late_s < 5.0
+
+
+@pytest.mark.parametrize("reaction", ["hold", "rtl"])
+def test_a_heartbeat_of_another_autopilot_in_flight_ends_as_asked_for_both(flight, reaction):
+    loop = Loopback(flight, patience_s=10.0, reaction=reaction)
+    changing = loop.vehicles[0]
+    step = changing.step
+
+    def changed(dt_s):
+        if changing.time_s > 18.0:
+            changing.autopilot = mav.MAV_AUTOPILOT_INVALID
+        step(dt_s)
+
+    changing.step = changed
+    ended, _ = loop.fly()
+    assert ended.reason == "uas_1 does not take targets (mode None)"
+    mode = {"hold": BRAKE, "rtl": RTL}[reaction]
+    assert [vehicle.modes[-1] for vehicle in loop.vehicles] == [mode, mode]
+
+
+@pytest.mark.parametrize("error", [BrokenPipeError, RuntimeError, SystemExit])
+def test_before_any_error_ends_the_stream_all_get_the_mode_asked(flight, error):
+    loop = Loopback(flight)
+    clock, last_step = loop.clock, loop.vehicles[1].step
+
+    def fails(dt_s):
+        last_step(dt_s)
+        if clock.now_s() > 18.0:  # from now on, each time
+            raise error
+
+    loop.vehicles[1].step = fails
+    with pytest.raises(error):
+        loop.fly()
+    assert [vehicle.modes[-1] for vehicle in loop.vehicles] == [BRAKE, BRAKE]
 
 
 PORT = "udpout:127.0.0.1:9"

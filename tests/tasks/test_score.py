@@ -1,6 +1,7 @@
 """Scores: one formula, anchors that are published, a folder that a kill does not harm."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -134,6 +135,8 @@ def test_scores_of_a_version_that_said_player_are_read(tmp_path):
     ("change", "reason"),
     [
         ({"value": "much"}, "value is 'much'"),
+        ({"value": math.nan}, "value is nan"),
+        ({"seed": -1}, "mission -1 of easy is another one"),
         ({"level": "none"}, "level is 'none'"),
         ({"scenario_sha256": "0"}, "is another one now"),
         ({"surplus": 1}, "no scored mission"),

@@ -9,10 +9,18 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.autopilot.low_way import low_way
 from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
-from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, route
+from uas_coverage_env.world.routes import (
+    CLEAR,
+    NO_WAY,
+    ROUND_CORNER,
+    crossing,
+    level_apart,
+    route,
+)
 from uas_coverage_env.world.state import FLYING
 
 LEAD_S = 1.6
@@ -24,6 +32,10 @@ CRUISE_ALTITUDE_M = 8.0
 _GLIDE_SLOPE = 0.12
 HEADROOM_M = 0.5
 """Roofs are passed this much above the distance of routes [m]."""
+
+_TIGHT_M = 3.0
+"""A corner so near to what routes avoid of two obstacles lies in a gap that is seen through from
+there alone: UAS come to rest at it before they turn."""
 
 _SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
 _TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
@@ -107,13 +119,26 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
 
 
 @kernel
+def _is_tight(arena, x, y):
+    """Whether a corner of routes lies in a gap that is little wider than what they keep."""
+    n_near = 0
+    for o in range(arena.obstacles.shape[0]):
+        obstacle = arena.obstacles[o]
+        if obstacle.tall and not level_apart(obstacle, x, y, x, y):
+            first, last = obstacle.first_side, obstacle.last_side
+            away_m = signed_distance(arena.normals, arena.offsets_m, first, last, x, y, 0.0)
+            n_near += away_m < _TIGHT_M
+    return n_near > 1
+
+
+@kernel
 def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
     """Speed towards the end of a leg [m/s]: slower for turns, a stop, and a climb or descent."""
     uas = arena.uas[i]
-    if leg == ROUND_CORNER:
-        return min(uas.speed_mps, 0.65 * uas.speed_mps + 0.25 * distance_m)
     if stop:
         return min(uas.speed_mps, 0.28 * distance_m)
+    if leg == ROUND_CORNER:
+        return min(uas.speed_mps, 0.65 * uas.speed_mps + 0.25 * distance_m)
     # flying by: fast, but neither past a small sphere nor before the altitude is reached
     radius_m = arena.waypoints[target].radius_m
     passing_mps = min(0.75 * uas.speed_mps, 0.8 * radius_m)
@@ -180,8 +205,10 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         low, beside_x, beside_y = low_way(arena, i, x, belief, end_x, end_y, altitude_m, needed_m)
         if beside_x != end_x or beside_y != end_y:
             end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
+    if leg == ROUND_CORNER:
+        stop = _is_tight(arena, end_x, end_y)
     lead_s = LEAD_S
-    if not stop or leg == ROUND_CORNER:
+    if not stop:
         # to look beyond what is flown by would turn the UAS round before it gets there
         left_m = math.hypot(end_x - x[X], end_y - x[Y])
         lead_s = min(LEAD_S, 0.5 * left_m / (math.hypot(x[VX], x[VY]) + 1e-9))

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from rich.progress import track
 
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.cli.options import options_of
+from uas_coverage_env.cli.options import LAST_SEED, options_of
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
@@ -38,7 +38,7 @@ def demonstrate_command(
         list[str] | None,
         typer.Option(metavar="KEY=VALUE", help="Set a planner option; may be repeated."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the planner.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Of the planner.", min=0, max=LAST_SEED)] = 0,
     jobs: Annotated[
         int | None,
         typer.Option(

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 from uas_coverage_env.cli.compare import bounds_shown, fly_sweep
+from uas_coverage_env.cli.options import LAST_SEED
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
@@ -57,7 +58,7 @@ def front(
             show_default=False,
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the planner.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Of the planner.", min=0, max=LAST_SEED)] = 0,
     jobs: Annotated[
         int | None,
         typer.Option(min=1, help="Flights in parallel; default: one per core.", show_default=False),

@@ -1,8 +1,11 @@
-"""Options of planners as they are typed."""
+"""Options as they are typed: of planners, and seeds."""
 
 from collections.abc import Sequence
 
 from uas_coverage_env.files.strict_toml import InputError
+
+LAST_SEED = 2**64 - 1
+"""The largest seed of a flight."""
 
 
 def options_of(pairs: Sequence[str]) -> dict[str, str]:

@@ -13,7 +13,7 @@ from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.compilation import compiling_for_flight
 from uas_coverage_env.cli.figures_of_flight import data
 from uas_coverage_env.cli.flights import keep_flight, report_flight
-from uas_coverage_env.cli.options import options_of
+from uas_coverage_env.cli.options import LAST_SEED, options_of
 from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.settings import from_settings
@@ -52,7 +52,7 @@ def run(
         list[str] | None,
         typer.Option(metavar="KEY=VALUE", help="Option of the planner; may be repeated."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the planner.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=LAST_SEED, help="Seed of the planner.")] = 0,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Stop after this many steps (exit code 0).")
     ] = None,

@@ -168,16 +168,19 @@ class CoverageBatch:
         elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
             seeds = list(seed)
         else:
-            raise ValueError(f"seed is {seed!r}; give a whole number, or one for each lane")
+            raise ValueError(f"seed is {seed!r}; give a whole number, or one for each environment")
         if len(seeds) != self.num_envs:
-            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} lanes; give one for each")
+            raise ValueError(
+                f"{len(seeds)} seeds for {self.num_envs} environments; give one for each"
+            )
         for lane, value in enumerate(seeds):
             if value is None:
                 continue
             whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
             if not whole or not 0 <= value < SEEDS:
                 raise ValueError(
-                    f"seed of lane {lane} is {value!r}; give a whole number from 0 to 2**64 - 1"
+                    f"seed of environment {lane} is {value!r}; give a whole number from 0 to "
+                    f"2**64 - 1"
                 )
             self.lanes.seed[lane] = value
             self.lanes.mission[lane] = -1
@@ -209,10 +212,10 @@ class CoverageBatch:
         elif mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise ValueError(
                 f"mask has shape {mask.shape} and dtype {mask.dtype}; "
-                f"give one truth value for each of {self.num_envs} lanes"
+                f"give one truth value for each of {self.num_envs} environments"
             )
         if not self._begun and not mask.all():
-            raise ResetNeeded("reset of some lanes before any: reset all lanes first")
+            raise ResetNeeded("reset of some environments before any: reset all environments first")
         chosen = self.pool.chosen(scenarios, self.num_envs)
         if seed is not None:
             self.seed(seed)
@@ -240,7 +243,7 @@ class CoverageBatch:
             ended = lanes.terminated | lanes.truncated
             if ended.any():
                 raise ResetNeeded(
-                    f"the mission of lane {int(ended.argmax())} has ended: reset the lanes that "
+                    f"the mission of environment {int(ended.argmax())} has ended: reset those that "
                     f"have ended before the next step, or choose another autoreset mode"
                 )
         accept_of_lanes(self.actions, actions, self.learners.asked)
@@ -253,8 +256,8 @@ class CoverageBatch:
         if refused != ACCEPTED:
             lane, i = divmod(refused, self.n_uas)
             raise ValueError(
-                f"action of UAS {i} in lane {lane} is {self.learners.asked[lane, i].tolist()}; "
-                f"give finite numbers"
+                f"action of UAS {i} in environment {lane} is "
+                f"{self.learners.asked[lane, i].tolist()}; give finite numbers"
             )
         if self.pool.changes:
             flew = orders == FLY
@@ -331,7 +334,7 @@ class CoverageBatch:
             ValueError: No action of this kind flies a command, or one that flies has none.
         """
         if len(commands) != self.num_envs:
-            raise ValueError(f"commands for {len(commands)} of {self.num_envs} lanes")
+            raise ValueError(f"commands for {len(commands)} of {self.num_envs} environments")
         rows = []
         for lane, given in enumerate(commands):
             s = int(self.lanes.scene[lane])

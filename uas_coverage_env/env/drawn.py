@@ -166,8 +166,8 @@ class DrawnPool:
         for lane, rng in enumerate(self._rngs):
             if rng is not None and not self.drawn_from[lane].any():
                 raise ValueError(
-                    f"the mission of lane {lane} was given to reset(): only missions that were "
-                    f"drawn can be kept in a checkpoint"
+                    f"the mission of environment {lane} was given to reset(): only missions that "
+                    f"were drawn can be kept in a checkpoint"
                 )
 
     def redrawn(

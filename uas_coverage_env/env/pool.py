@@ -210,7 +210,9 @@ class ScenarioPool:
             return None
         chosen = np.asarray(given)
         if chosen.shape != (num_envs,) or chosen.dtype.kind not in "iu":
-            raise ValueError(f"scenarios are {given!r}; give an index for each of {num_envs} lanes")
+            raise ValueError(
+                f"scenarios are {given!r}; give an index for each of {num_envs} environments"
+            )
         if chosen.min() < 0 or chosen.max() >= len(self):
             raise ValueError(
                 f"scenarios go from {chosen.min()} to {chosen.max()}; "

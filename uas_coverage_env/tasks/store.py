@@ -1,6 +1,7 @@
 """Scored missions on disk: a line of JSON each, added when it was flown; a kill loses none."""
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, fields
@@ -80,12 +81,12 @@ def _read(line: str, place: str) -> tuple[str, str, MissionScore]:
     if not isinstance(row, dict) or set(row) != set(wanted):
         raise InputError(f"{place}: is no scored mission; give another --out")
     for name, kind in wanted.items():
-        if type(row[name]) is not kind:
+        if type(row[name]) is not kind or (kind is float and not math.isfinite(row[name])):
             raise InputError(f"{place}: {name} is {row[name]!r}; give another --out")
     level, planner, sha256 = (row.pop(name) for name in _HEAD)
     if level not in LEVELS:
         raise InputError(f"{place}: level is {level[:40]!r}; there are {', '.join(LEVELS)}")
-    if _sha256(level, row["seed"]) != sha256:
+    if row["seed"] < 0 or _sha256(level, row["seed"]) != sha256:
         raise InputError(
             f"{place}: mission {row['seed']} of {level} is another one now; give another --out"
         )

@@ -13,6 +13,7 @@ from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
+from uas_coverage_env.world.corners import route_corners
 from uas_coverage_env.world.disturbance import (
     DISTURBANCE_DTYPE,
     Disturbance,
@@ -28,13 +29,11 @@ from uas_coverage_env.world.events import (
 from uas_coverage_env.world.obstacles import (
     OBSTACLE_DTYPE,
     ROUTE_MARGIN_M,
-    free_nodes,
     measure,
     obstacle_records,
     overfly_limit,
 )
 from uas_coverage_env.world.packs import PACKS_DTYPE, pack_records
-from uas_coverage_env.world.routes import node_distances
 from uas_coverage_env.world.tubes import route_tube_m, tubes_m
 from uas_coverage_env.world.waypoints import (
     N_WAYPOINT_COLUMNS,
@@ -193,7 +192,7 @@ def build_arena(
     rules["disturbed"] = blocks["acts"].any()
     tube_m = tubes_m(scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]))
     route_m = ROUTE_MARGIN_M + route_tube_m(tube_m)
-    obstacles, planes, corners = obstacle_records(scenario, radius_m, overfly_m, route_m)
+    obstacles, planes = obstacle_records(scenario, radius_m, overfly_m, route_m)
     measure(obstacles, scenario, float(rules["measured_m"][0]))
     fence = scenario.fence
     rules["fence_first"] = sum(len(rows[1]) for rows in planes)
@@ -204,7 +203,7 @@ def build_arena(
     rules["overhangs"] = obstacles["overhangs"].any()
     rules["eventful"] = is_eventful(scenario)
     rules["asks"] = waypoints["asks"].any()
-    nodes_m = free_nodes(scenario, corners, obstacles, normals, offsets_m, -targets_m[:, 2])
+    corners = route_corners(scenario, obstacles, normals, offsets_m, targets_m)
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(
         vehicles=_vehicles(scenario),
@@ -223,10 +222,8 @@ def build_arena(
         waypoint_columns=waypoint_columns(waypoints, float(rules["unit_m"][0])),
         again_steps=again_steps(scenario),
         rules=rules,
-        nodes_m=nodes_m,
-        node_distance_m=node_distances(
-            obstacles, normals, offsets_m, nodes_m, np.ascontiguousarray(targets_m[:, :2])
-        ),
+        nodes_m=corners.nodes_m,
+        node_distance_m=corners.distance_m,
         disturbances=blocks,
         disturbance_parameters=parameters,
         events=event_records(scenario),

@@ -90,13 +90,11 @@ def obstacle_records(
 ) -> tuple[
     NDArray[np.void],
     list[tuple[NDArray[np.float64], NDArray[np.float64]]],
-    list[NDArray[np.float64]],
 ]:
-    """The obstacles, the planes of their hulls and footprints, and the corners to turn at."""
+    """The obstacles, and the planes of their hulls and footprints."""
     records = np.zeros(len(scenario.obstacles), dtype=OBSTACLE_DTYPE)
     ground_m = float(-scenario.fence.vertices_m[:, 2].max())
     planes = []
-    corners = []
     first = 0
     for record, obstacle, hull, kept in zip(
         records, scenario.obstacles, scenario.hulls, scenario.kept_hulls, strict=True
@@ -136,10 +134,19 @@ def obstacle_records(
         record["top_m"] = record["roof_m"] - route_m
         record["overhangs"] = overhangs(hull, ground_m)
         record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
+    return records, planes
+
+
+def corners_around(
+    scenario: Scenario, obstacles: NDArray[np.void], margin_m: float
+) -> NDArray[np.float64]:
+    """(C, 2) [m] corners of the tall obstacles' footprints, widened by wall_m and a margin."""
+    corners = [np.zeros((0, 2))]
+    for record, kept in zip(obstacles, scenario.kept_hulls, strict=True):
         if record["tall"]:
-            outline = _footprint(_widened(kept, wall_m + NODE_MARGIN_M))
+            outline = _footprint(_widened(kept, record["wall_m"] + margin_m))
             corners.append(outline.points[outline.vertices])
-    return records, planes, corners
+    return np.concatenate(corners)
 
 
 def measure(obstacles: NDArray[np.void], scenario: Scenario, measured_m: float) -> None:
@@ -150,22 +157,3 @@ def measure(obstacles: NDArray[np.void], scenario: Scenario, measured_m: float) 
             widened_m = _widened(hull, measured_m)
             record["measured_lower_m"] = widened_m.min(axis=0) - EPS_M
             record["measured_upper_m"] = widened_m.max(axis=0) + EPS_M
-
-
-def free_nodes(
-    scenario: Scenario,
-    corners: list[NDArray[np.float64]],
-    obstacles: NDArray[np.void],
-    normals: NDArray[np.float64],
-    offsets_m: NDArray[np.float64],
-    target_altitudes_m: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """The corners that lie inside the fence and outside of all other tall obstacles."""
-    nodes_m = np.concatenate([np.zeros((0, 2)), *corners])
-    down_m = np.full((len(nodes_m), 1), -np.median(target_altitudes_m))
-    inset_m = scenario.geofence.margin_m + NODE_MARGIN_M
-    free = scenario.fence.signed_distance(np.hstack([nodes_m, down_m])) <= -inset_m
-    for obstacle in obstacles[obstacles["tall"]]:
-        sides = slice(obstacle["first_side"], obstacle["last_side"])
-        free &= (nodes_m @ normals[sides, :2].T + offsets_m[sides]).max(axis=1) > 0.0
-    return np.ascontiguousarray(nodes_m[free])

@@ -1,15 +1,10 @@
 """Ways past the fixed obstacles: what a straight leg crosses, and the corners to turn at.
 
 Low obstacles are flown over, tall ones passed along the corners of their widened footprints, as in
-a visibility graph. Distances along the graph to every waypoint and start are computed once.
+a visibility graph (`corners.py`).
 """
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.geometry import segment_meets, signed_distance
@@ -35,6 +30,19 @@ def box_apart(obstacle, x0, y0, z0, x1, y1, z1):
         | (min(y0, y1) > upper[1])
         | (max(z0, z1) < lower[2])
         | (min(z0, z1) > upper[2])
+    )
+
+
+@inlined_kernel
+def level_apart(obstacle, x0, y0, x1, y1):
+    """The same, looked at from above."""
+    lower = obstacle.lower_m
+    upper = obstacle.upper_m
+    return (
+        (max(x0, x1) < lower[0])
+        | (min(x0, x1) > upper[0])
+        | (max(y0, y1) < lower[1])
+        | (min(y0, y1) > upper[1])
     )
 
 
@@ -70,14 +78,7 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
         tells that the leg starts or ends above (or below) the obstacle itself, and `ends` that
         it ends in the widened footprint.
     """
-    lower = obstacle.lower_m
-    upper = obstacle.upper_m
-    if (
-        (max(x0, x1) < lower[0])
-        | (min(x0, x1) > upper[0])
-        | (max(y0, y1) < lower[1])
-        | (min(y0, y1) > upper[1])
-    ):
+    if level_apart(obstacle, x0, y0, x1, y1):
         return 2.0, False, False
     first = obstacle.first_side
     last = obstacle.last_side
@@ -248,50 +249,3 @@ def shortest_way(arena, target, x0, y0, z0, x1, y1, z1):
     dx = x1 - x0
     dy = y1 - y0
     return x1, y1, math.sqrt(dx * dx + dy * dy)
-
-
-@kernel
-def _sight_distances(obstacles, normals, offsets_m, from_m, to_m, distance_m):
-    for a in range(from_m.shape[0]):
-        for b in range(to_m.shape[0]):
-            seen = in_sight(
-                obstacles, normals, offsets_m, from_m[a, 0], from_m[a, 1], to_m[b, 0], to_m[b, 1]
-            )
-            if seen:
-                distance_m[a, b] = math.hypot(from_m[a, 0] - to_m[b, 0], from_m[a, 1] - to_m[b, 1])
-
-
-def node_distances(
-    obstacles: NDArray[np.void],
-    normals: NDArray[np.float64],
-    offsets_m: NDArray[np.float64],
-    nodes_m: NDArray[np.float64],
-    targets_m: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Shortest ways from every corner to every target over the visibility graph.
-
-    Args:
-        obstacles: (O,) of OBSTACLE_DTYPE.
-        normals: (F, 3) all planes.
-        offsets_m: (F,) [m].
-        nodes_m: (K, 2) [m] the corners.
-        targets_m: (P, 2) [m] the targets.
-
-    Returns:
-        (P, K) [m]; inf where there is no way.
-    """
-    n_nodes = len(nodes_m)
-    last_leg_m = np.full((len(targets_m), n_nodes), np.inf)
-    if n_nodes == 0:
-        return last_leg_m
-    _sight_distances(obstacles, normals, offsets_m, targets_m, nodes_m, last_leg_m)
-    legs_m = np.full((n_nodes, n_nodes), np.inf)
-    _sight_distances(obstacles, normals, offsets_m, nodes_m, nodes_m, legs_m)
-    from_node, to_node = np.nonzero(np.isfinite(legs_m))
-    graph = csr_array((legs_m[from_node, to_node], (from_node, to_node)), shape=legs_m.shape)
-    between_m = dijkstra(graph, directed=False)
-    ways_m = np.full_like(last_leg_m, np.inf)
-    for target, seen in enumerate(np.isfinite(last_leg_m)):
-        if seen.any():
-            ways_m[target] = (between_m[:, seen] + last_leg_m[target, seen]).min(axis=1)
-    return ways_m

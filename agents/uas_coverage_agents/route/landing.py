@@ -7,7 +7,7 @@ import numpy as np
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
@@ -79,8 +79,9 @@ def towards_home(vehicle, uas, rules, x, reference, values, command):
     _homewards(uas, rules, x, _cautious_mps(uas, x), values)
     if way_m > _BRAKING_FROM_S * uas.speed_mps:
         return
-    on, on_reference, there, governed = np.zeros(14), np.zeros(2), np.zeros(14), np.zeros(2)
-    u, trial, first = np.zeros(5), np.zeros(3), np.zeros(3)
+    on, on_reference = np.zeros(N_STATES), np.zeros(2)
+    there, governed = np.zeros(N_STATES), np.zeros(2)
+    u, trial, first = np.zeros(N_INPUTS), np.zeros(3), np.zeros(3)
     most = 2 * _BRAKING_STEPS
     for speed in _SPEEDS:
         on[:] = x

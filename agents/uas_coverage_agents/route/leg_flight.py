@@ -17,7 +17,19 @@ from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, LEAD_S, passes_over
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_hold_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import (
+    N_INPUTS,
+    N_STATES,
+    PHI,
+    THETA,
+    VX,
+    VY,
+    VZ,
+    X,
+    Y,
+    Z,
+    fly_kinematics,
+)
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, ROUND_CORNER, crossing, route
@@ -160,7 +172,7 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
     turn = math.atan2(aims_m[1, 1] - x[Y], aims_m[1, 0] - x[X]) - to_first
     turn = math.atan2(math.sin(turn), math.cos(turn))
     sign = 1.0 if turn > 0.0 else -1.0
-    there, governed, u = np.zeros(14), np.zeros(2), np.zeros(5)
+    there, governed, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
     row = np.empty(N_FLIGHT)
     n, most = 0, HORIZON
     for q in range(-_TURNS_BACK, _TURNS_ON):
@@ -179,7 +191,7 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
                 costs[n] += _TOO_LATE_S
             n += 1
     left = costs.copy()
-    held, held_reference = np.zeros(14), np.zeros(2)
+    held, held_reference = np.zeros(N_STATES), np.zeros(2)
     for _ in range(_CHANGED):
         first = left.argmin()
         left[first] = np.inf

@@ -38,7 +38,7 @@ from uas_coverage_env.autopilot.lookahead import (
     moving_slack,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, X, Y, Z
 from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
@@ -113,9 +113,9 @@ def search_workspace(
     return Workspace(
         tries=tries,
         slow_starts=slow_starts,
-        x=np.zeros(14),
+        x=np.zeros(N_STATES),
         reference=np.zeros(2),
-        u=np.zeros(5),
+        u=np.zeros(N_INPUTS),
         command=np.zeros(1, COMMAND_DTYPE),
         row=np.zeros(N_FLIGHT),
         path_m=np.zeros((HORIZON + _BRAKING + 1, 3)),

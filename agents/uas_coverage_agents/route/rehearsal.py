@@ -20,7 +20,7 @@ from uas_coverage_agents.route.places import detour_s, write_place
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import fly_kinematically
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import VZ, X, Y, Z
+from uas_coverage_env.vehicle import N_STATES, VZ, X, Y, Z
 from uas_coverage_env.world import Arena
 from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
@@ -69,7 +69,7 @@ class Flights(NamedTuple):
 def _room(n: int, n_waypoints: int, most_steps: int) -> Flights:
     """For so many flights."""
     return Flights(
-        x=np.zeros((n, 14)),
+        x=np.zeros((n, N_STATES)),
         reference=np.zeros((n, 2)),
         plan=np.zeros((n, HORIZON, 3)),
         kept=np.zeros(n, np.bool_),

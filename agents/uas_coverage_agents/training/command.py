@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 ORDER = "order.json"
 
 _FAILED = 1
+_LAST_SEED = 2**32 - 1  # of Stable-Baselines3
 _SECONDS_BETWEEN_LINES = 10.0
 _OURS = (
     *(ORDER, "checkpoints", "tensorboard", "learning_curve.csv", "learning_curve.png", "policy"),
@@ -48,7 +49,9 @@ def train(
     out: Annotated[
         Path | None, typer.Option(help="Directory; default: trainings/ALGORITHM-SEED.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of network, sampling and scenarios.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, max=_LAST_SEED, help="Seed of network, sampling and scenarios.")
+    ] = 0,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Environment steps to train on; repeatable.")
     ] = None,

@@ -224,7 +224,7 @@ class CoverageVecEnv(VecEnv):
             AttributeError: The name is one of the environment's own, which all lanes share.
         """
         if attr_name == "scenario" or hasattr(self, attr_name):
-            raise AttributeError(f"{attr_name} belongs to all lanes; make another environment")
+            raise AttributeError(f"{attr_name} belongs to all environments; make others")
         values = self._attributes.setdefault(attr_name, [None] * self.num_envs)
         for lane in self._get_indices(indices):
             values[lane] = value
@@ -242,7 +242,9 @@ class CoverageVecEnv(VecEnv):
             AttributeError: There is no such method.
         """
         if method_name != "action_masks":
-            raise AttributeError(f"lanes have no method {method_name!r}; they have action_masks")
+            raise AttributeError(
+                f"environments have no method {method_name!r}; they have action_masks"
+            )
         masks = self.action_masks(*method_args, **method_kwargs)
         return [masks[lane] for lane in self._get_indices(indices)]
 

@@ -201,7 +201,9 @@ class WaypointVecEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Lanes have no attributes of their own."""
-        raise AttributeError(f"{attr_name} cannot be set: lanes have no attributes of their own")
+        raise AttributeError(
+            f"{attr_name} cannot be set: environments have no attributes of their own"
+        )
 
     def env_method(
         self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any

@@ -18,7 +18,7 @@ from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target
 from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematically
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, VZ, X, Y, Z, fly_kinematics
 from uas_coverage_env.world.commands import CLIMB, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
@@ -96,7 +96,7 @@ def empty_plan(n_steps: int) -> PursuitPlan:
         np.ones(n_steps),
         np.zeros((n_steps, 3)),
         np.zeros((n_steps, 3)),
-        np.zeros((n_steps + 1, 14)),
+        np.zeros((n_steps + 1, N_STATES)),
         np.zeros((n_steps + 1, 2)),
         np.zeros(n_steps + 1, np.int64),
         np.zeros(n_steps + 1, np.int64),
@@ -107,7 +107,7 @@ def empty_plan(n_steps: int) -> PursuitPlan:
 @allocating_kernel
 def brake_seconds(arena, i, command):
     """How far braking leads ahead from the highest speed, over that speed [s]."""
-    x, reference, u = np.zeros(14), np.zeros(2), np.zeros(5)
+    x, reference, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
     speed_mps, steps = arena.uas[i].speed_mps, arena.rules[0].lookahead_steps
     write_command(command, CLIMB, speed_mps, 0.0, 0.0)
     for _ in range(2 * steps):
@@ -145,7 +145,7 @@ def _write_step(arena, i, task, plan, k, command, belief):
     x, reference = plan.x[k + 1], plan.reference[k + 1]
     x[:] = plan.x[k]
     reference[:] = plan.reference[k]
-    fly_kinematically(arena.vehicles[i], x, reference, command, np.zeros(5), belief)
+    fly_kinematically(arena.vehicles[i], x, reference, command, np.zeros(N_INPUTS), belief)
     plan.path_m[k + 1, 0] = x[X]
     plan.path_m[k + 1, 1] = x[Y]
     plan.path_m[k + 1, 2] = x[Z]

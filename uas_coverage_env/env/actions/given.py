@@ -174,7 +174,7 @@ def accept_of_lanes(actions: Actions, given: Any, asked: NDArray[np.float64]) ->
     if len(given.shape) < 2 or len(given) != n_lanes or given.size != asked.size:
         raise ValueError(
             f"actions have shape {given.shape}; give {size} for each of {n_uas} UAS in each of "
-            f"{n_lanes} lanes"
+            f"{n_lanes} environments"
         )
     choices = actions.kind.choices
     if given.dtype.kind not in ("iu" if choices else "fiu"):

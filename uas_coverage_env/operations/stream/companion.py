@@ -109,7 +109,10 @@ class Companion:
         return self._rows
 
     def fly(self) -> Ended:
-        """Take off, stream, land; give up where that cannot be, and on Ctrl-C."""
+        """Take off, stream, land; give up where that cannot be, and on Ctrl-C.
+
+        Whatever else ends it, vehicles get their mode first.
+        """
         flies = False
         try:
             self._make_ready()
@@ -121,6 +124,10 @@ class Companion:
             reason = str(why)
         except KeyboardInterrupt:
             reason = "stopped by hand"
+        except BaseException:
+            if flies:
+                self._react()
+            raise
         else:
             return Ended("", self.late_s)
         if flies:
@@ -296,14 +303,22 @@ class Companion:
     def _react(self) -> None:
         """Give every vehicle that flies by targets its mode, until it says that it has it."""
         self._held = []
+
+        def is_let_go(link: VehicleLink) -> bool:
+            in_stream = link.takes_targets or link.mode is None
+            return link.name in self._landing or not link.armed or not in_stream
+
+        def tell_mode(link: VehicleLink) -> None:
+            link.set_mode(getattr(link.autopilot, self._options.reaction))
+
+        # before they are heard again, which may be what has failed
+        for link in self._links.values():
+            if not is_let_go(link):
+                tell_mode(link)
         try:
             self._until(
-                lambda link: (
-                    link.name in self._landing
-                    or not link.armed
-                    or not (link.takes_targets or link.mode is None)
-                ),
-                lambda link: link.set_mode(getattr(link.autopilot, self._options.reaction)),
+                is_let_go,
+                tell_mode,
                 self._options.silent_s + 2.0 * _AGAIN_S,
                 "does not answer",
             )

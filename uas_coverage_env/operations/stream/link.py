@@ -35,7 +35,7 @@ class VehicleLink:
         place_m: (3,) where it says it is; None before it has [m].
         heard_s: When it was heard last, by the clock of the caller; None: never [s].
         autopilot: What it is, once it has said.
-        mode: Its mode; None before it has said.
+        mode: Its mode; None before it has said, and after a heartbeat that is not of its autopilot.
         armed: Whether it is armed.
 
     Args:
@@ -54,32 +54,32 @@ class VehicleLink:
         self.autopilot = ARDUPILOT
         self.mode: int | None = None
         self.armed = False
-        self._system = 1
+        self._system: int | None = None
         self._link = _connected(name, address)
 
     def hear(self, now_s: float) -> None:
         """Read what has arrived; nothing does over a connection that has broken.
 
+        The first heartbeat says which system is at the other end; others over the same connection
+        are not heard.
+
         Args:
             now_s: Time by the caller's clock [s].
 
         Raises:
-            InputError: Its autopilot is none of `AUTOPILOTS`.
+            InputError: By its first heartbeat, its autopilot is none of `AUTOPILOTS`.
         """
         while (message := self._received()) is not None:
             kind = message.get_type()
             if message.get_srcComponent() != 1:
                 continue
+            if self._system is None and kind == "HEARTBEAT":
+                self._meet(message)
+            if message.get_srcSystem() != self._system:
+                continue
             if kind == "HEARTBEAT":
-                if message.autopilot not in AUTOPILOTS:
-                    known = " and ".join(one.name for one in AUTOPILOTS.values())
-                    raise InputError(
-                        f"--connect {self.name}={self.address}: is autopilot "
-                        f"{message.autopilot}; stream knows only the modes of {known}"
-                    )
-                self.autopilot = AUTOPILOTS[message.autopilot]
-                self._system = message.get_srcSystem()
-                self.mode = int(message.custom_mode)
+                is_known = message.autopilot == self.autopilot.number
+                self.mode = int(message.custom_mode) if is_known else None
                 self.armed = bool(message.base_mode & _ARMED)
                 self.heard_s = now_s
             elif kind == "GLOBAL_POSITION_INT":
@@ -87,6 +87,16 @@ class VehicleLink:
                 if abs(degrees[0]) <= 90.0 and abs(degrees[1]) <= 180.0:
                     self.place_m = self._frame.to_ned(*degrees, 1e-3 * message.relative_alt)
                     self.heard_s = now_s
+
+    def _meet(self, heartbeat: Any) -> None:
+        if heartbeat.autopilot not in AUTOPILOTS:
+            known = " and ".join(one.name for one in AUTOPILOTS.values())
+            raise InputError(
+                f"--connect {self.name}={self.address}: is autopilot {heartbeat.autopilot}; "
+                f"stream knows only the modes of {known}"
+            )
+        self.autopilot = AUTOPILOTS[heartbeat.autopilot]
+        self._system = heartbeat.get_srcSystem()
 
     def _received(self) -> Any:
         """The next message; None: there is none yet, or none can come."""
@@ -126,7 +136,7 @@ class VehicleLink:
         whole = round(1e7 * latitude), round(1e7 * longitude)
         velocity = (float(value) for value in velocity_mps)
         self._link.mav.set_position_target_global_int_send(
-            0, self._system, 1, _RELATIVE_FRAME, _TYPE_MASK, *whole, height,
+            0, self._addressee, 1, _RELATIVE_FRAME, _TYPE_MASK, *whole, height,
             *velocity, 0.0, 0.0, 0.0, 0.0, 0.0,
         )  # fmt: skip
 
@@ -134,9 +144,13 @@ class VehicleLink:
         """End the connection."""
         self._link.close()
 
+    @property
+    def _addressee(self) -> int:
+        return 1 if self._system is None else self._system
+
     def _command(self, command: int, *params: float) -> None:
         padded = (*params, *(0.0,) * (7 - len(params)))
-        self._link.mav.command_long_send(self._system, 1, command, 0, *padded)
+        self._link.mav.command_long_send(self._addressee, 1, command, 0, *padded)
 
     def off_m(self, place_m: FloatArray) -> float:
         """How far it is from a place; infinite where it has not said [m]."""

@@ -26,6 +26,7 @@ from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import signed_distance, sphere_faces
 from uas_coverage_env.vehicle import (
+    N_INPUTS,
     VX,
     VY,
     VZ,
@@ -302,7 +303,7 @@ def _fly_all(
     visits = np.full((S, W), NEVER, np.int64)
     depths = np.zeros(S)
     x = np.empty(x0.shape[0])
-    u = np.zeros(5)
+    u = np.zeros(N_INPUTS)
     reference = np.empty(2)
     has_target = not np.isnan(target[0])
     for s in range(S):
