@@ -28,9 +28,9 @@ _ON_WHILE_STOPPING = 0.6
 _PLACES_AROUND = 8
 _RINGS = 2
 
-_WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
-"""Where disturbances are declared, the margin is more: this share of the time, and these seconds
-in a wind as fast as the UAS, in which it turns and stops the more slowly."""
+_WIND_MARGIN_S, _WIND_MARGIN_SHARE = 18.0, 0.35
+"""The margin grows with the wind, as turbulence and gusts do: in one as fast as the UAS, it is more
+by this share of the time, and by these seconds, in which it turns and stops the more slowly."""
 
 _LEAVING_MPS = 0.6
 _LEAVING_S = 15.0
@@ -121,9 +121,8 @@ def _flight_from(arena, i, x0, y0, z0, away_mps, belief=None):
         seconds += _out_of_overhangs_s(arena, i, x1, y1, z1)
     margin_s = margin_to_land(seconds + more_s, obstructed)
     if belief is not None and arena.rules[0].disturbed:
-        wind_mps = math.hypot(belief[WIND], belief[WIND + 1])
-        margin_s += _WIND_MARGIN_SHARE * (seconds + more_s)
-        margin_s += _WIND_MARGIN_S * wind_mps / arena.uas[i].speed_mps
+        wind = math.hypot(belief[WIND], belief[WIND + 1]) / arena.uas[i].speed_mps
+        margin_s += (_WIND_MARGIN_SHARE * (seconds + more_s) + _WIND_MARGIN_S * wind) * wind
     return seconds + more_s, margin_s
 
 

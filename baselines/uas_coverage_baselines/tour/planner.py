@@ -279,7 +279,7 @@ class Tour:
         flies = swarm.status == FLYING
         if self._repeats is not None:
             self._recall.keep(swarm.departed & (not self._repeats.has_grown))
-        self._returns = self._recall.update(swarm, self._world)
+        self._returns = self._recall.update(swarm, self._world, self._learnt)
         works = self._handover.workers(swarm)
         return View(
             x=swarm.x,
@@ -291,6 +291,7 @@ class Tour:
             swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
             asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
             wind_mps=None if self._learnt is None else self._learnt.mean_mps,
+            consumption=None if self._learnt is None else self._learnt.consumption,
         )
 
 
