@@ -16,9 +16,9 @@ Compared are time and depth of discharge from the moment it turns home with what
 - return mode: what return mode of the world allows for;
 - milp-mpc: what the planner's battery reserve allows for, without its allowance for braking.
 
-With `--level`, towns have the wind and the wrong vehicles of a level, and in place of `Range` and
-milp-mpc stands what return mode and `Recall` estimate in the wind and with the consumption that the
-UAS has learnt by then.
+With `--level`, towns have the wind and the wrong vehicles of light or moderate, in which every UAS
+comes home from anywhere, and in place of `Range` and milp-mpc stands what return mode and `Recall`
+estimate in the wind and with the consumption that the UAS has learnt by then.
 
 Errors are flown less estimated. Exits 0 where fewer than 1 in 200 returns took longer, or more
 charge, than the estimate with its margin, 1 otherwise, 2 where the input is bad.
@@ -45,7 +45,7 @@ from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scena
 from uas_coverage_env.autopilot import flight_home, seconds_home, seconds_to_keep
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
-from uas_coverage_env.scenario import LEVELS, with_disturbances
+from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.vehicle import DOD, dod_per_s
 from uas_coverage_env.world import CONSUMPTION, LANDED
@@ -58,6 +58,7 @@ _ALTITUDES_M = (3.0, 45.0)
 _DEEPEST = 0.6
 _ASIDE_STEPS = 15
 _ALLOWED = 1 / 200
+_LEVELS = (None, "light", "moderate")
 
 
 @dataclass(frozen=True)
@@ -183,13 +184,13 @@ def main(
     towns: Annotated[int, typer.Option(min=1, help="How many towns, five returns each.")] = 200,
     first_seed: Annotated[int, typer.Option(min=0, help="Of the towns.")] = 2000,
     dynamics: Annotated[str, typer.Option(help="lpv or nonlinear.")] = "lpv",
-    level: Annotated[str | None, typer.Option(help=f"{', '.join(LEVELS)}; None: still.")] = None,
+    level: Annotated[str | None, typer.Option(help="light or moderate; None: still.")] = None,
 ) -> None:
     """Fly returns and print by how much estimates of time and charge err."""
     if dynamics not in get_args(Dynamics):
         raise InputError(f"unknown dynamics {dynamics!r}; allowed: {', '.join(get_args(Dynamics))}")
-    if level is not None and level not in LEVELS:
-        raise InputError(f"unknown level {level!r}; allowed: {', '.join(LEVELS)}")
+    if level not in _LEVELS:
+        raise InputError(f"level is {level!r}; it should be light, moderate or None")
     columns, estimate = (COLUMNS, estimates) if level is None else (IN_WIND, estimates_in_wind)
     times, charges, ways_m = [], [], []
     for seed in range(first_seed, first_seed + towns):

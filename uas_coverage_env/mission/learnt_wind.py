@@ -52,7 +52,10 @@ def in_disturbances(arena: Arena) -> Arena:
 
 
 class LearntWind:
-    """Finds out the wind of each UAS, and the mean wind of the fleet.
+    """Finds out the wind of each UAS, what it consumes, and the mean wind of the fleet.
+
+    The consumption begins in the middle of what is stated, and counts from level flight at full
+    speed at `dod_max`, as `has_to_turn_home` does.
 
     Args:
         brief: The mission.
@@ -71,11 +74,9 @@ class LearntWind:
         self._before: SwarmState | None = None
         self._seen = np.zeros(len(brief.uas), np.int64)
         self.mean_mps, self._samples = np.zeros(2), 0
-        level = [
-            dod_per_s(vehicle, uas.dod_max)
-            for vehicle, uas in zip(brief.vehicles, brief.uas, strict=True)
-        ]
-        self._level_dod = brief.dt_s * np.array(level)
+        of_each = zip(brief.vehicles, brief.uas, strict=True)
+        per_s = [dod_per_s(vehicle, uas.dod_max) for vehicle, uas in of_each]
+        self._level_dod = brief.dt_s * np.array(per_s)
         self._consumption_gain = 1.0 - math.exp(-brief.dt_s / SEES_CONSUMPTION_S)
         if brief.conditions is not None:
             self.belief[:, CONSUMPTION] = 1.0 / brief.conditions.expected_charge_share - 1.0
@@ -88,7 +89,7 @@ class LearntWind:
 
     @property
     def consumption(self) -> FloatArray:
-        """(U,) by how much more charge is drawn than in level flight as believed [-]."""
+        """(U,) by what share more charge is drawn than in level flight as believed [-]."""
         return self.belief[:, CONSUMPTION]
 
     def see(self, swarm: SwarmState) -> None:

@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 _RESERVE_S = 30.0  # what the return rule asks for beyond the way home at full speed
 _SPARE_S = 10.0  # left beside it in a new order, so that not every delay upsets the order
 _SCARCE_RESERVE_S, _SCARCE_SPARE_S = 20.0, 3.0  # the same once charge does not suffice for all
-_SEEN_RESERVE_S = 12.0  # likewise in wind, where the return rule knows wind and consumption
+_SEEN_RESERVE_S = 12.0  # likewise where rule and order know the consumption of each UAS
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
 _AGAIN_S = 5.0  # what a search could not mend is searched again after so long
 _PACE = 1.2  # flights take so much longer than their legs, until it is known better
@@ -56,7 +56,7 @@ class View:
         swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
         asked_in_s: (W,) from now until a waypoint is asked for; None: all are.
         wind_mps: (2,) north and east at MEAN_HEIGHT_M, learnt so far; None: still air.
-        consumption: (U,) of charge, beyond that of level flight as believed [-]; None: likewise.
+        consumption: (U,) of charge, above that of level flight as believed [-]; None: not seen.
     """
 
     x: FloatArray
@@ -78,7 +78,7 @@ class Schedule:
         self.legs, self._packs = Legs(brief), Packs.of(brief)
         self._wind_mps, self._knows_wind = np.zeros(2), False
         self._arena, self._can_cover = arena, brief.can_cover
-        self._conditions = brief.conditions
+        self._sees_consumption = brief.conditions is not None
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         self._effort = effort
         self._weight = np.array([w.weight for w in brief.waypoints], float)
@@ -109,8 +109,7 @@ class Schedule:
 
     def _keep_less(self) -> None:
         """Use more of the charge: what is left at the end would have covered something."""
-        in_wind = self._conditions is not None
-        self._reserve_s = _SEEN_RESERVE_S if in_wind else _SCARCE_RESERVE_S
+        self._reserve_s = _SEEN_RESERVE_S if self._sees_consumption else _SCARCE_RESERVE_S
         self._spare_s, self._is_scarce = _SCARCE_SPARE_S, True
 
     def go_on(self, view: View, order: Routes) -> None:
@@ -220,7 +219,11 @@ class Schedule:
         return np.clip(self._flown_s / legs_s, 1.0, _SLOWEST_PACE)
 
     def _budget_s(self, view: View) -> FloatArray:
-        """(U,) seconds of legs that battery and clock allow each UAS."""
+        """(U,) seconds of legs that battery and clock allow each UAS.
+
+        Of the worst vehicle that is stated, as long as all can be visited with that; then as each
+        consumes. A UAS that consumes more than it did so far is called home earlier by the rule.
+        """
         uas = self._arena.uas
         share: FloatArray | float = self._charge_share
         if self._is_scarce and view.consumption is not None:
