@@ -12,7 +12,7 @@ from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.vehicle.range import margin_to_land
 from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
-from uas_coverage_env.world.state import WIND
+from uas_coverage_env.world.state import CONSUMPTION, WIND
 
 FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)
 
@@ -110,3 +110,23 @@ def test_the_margin_for_wind_is_none_without_wind_and_grows_with_it():
     calm_s, light_s, moderate_s, strong_s = map(margin_for_wind_s, (0.0, 2.0, 5.0, 8.0))
     assert abs(calm_s) < 1e-9
     assert 1.0 < light_s < moderate_s - 3.0 < moderate_s < strong_s
+
+
+@pytest.mark.parametrize("level", ["light", "moderate"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_way_home_in_wind_takes_no_more_than_estimated_with_the_margin(level, seed):
+    field = meadow([(100.0, 30.0, -1.0)], waypoints=FAR, max_steps=900)
+    world = World(with_disturbances(field, level, seed), seed=seed)
+    world.state.departed[0] = True
+    world.state.x[0, :3] = 20.0 + 50.0 * seed, 180.0, -10.0 * (1 + seed)
+    for _ in range(8):
+        world.step({"uas_1": GoTo(0)})
+    state, turned_s = world.state, world.time_s
+    x, per_s = state.x[0].copy(), world.arena.uas["dod_per_s"][0]
+    seconds, margin_s = flight_home(world.arena, 0, x, state.belief[0])
+    consumption = 1.0 + max(state.belief[0, CONSUMPTION], 0.0)
+    while not world.done:
+        world.step({"uas_1": GoTo(None)})
+    assert state.status[0] == LANDED
+    assert world.time_s - turned_s <= seconds + margin_s
+    assert state.x[0, DOD] - x[DOD] <= per_s * consumption * (seconds + margin_s)
