@@ -92,17 +92,17 @@ def _has_nothing_to_do(arena, state, i):
 
 
 @kernel
-def has_to_turn_home(arena, state, i):
-    """Whether UAS i has to fly home now, if who commands it knows what it commands next.
+def needs_all_for_home(arena, state, i, is_called):
+    """Whether the calibrated way home with its margin takes all that battery and clock leave.
 
-    Of `has_to_return` this is that nothing is left to do, or that the calibrated way home with its
-    margin, some steps later, takes all that battery and clock leave.
+    Of `has_to_return` this is what wind adds, for who knows what is commanded next. A UAS that is
+    called needs all until much more is left, as in `call_home`: against a gust, or low charge.
     """
-    if _has_nothing_to_do(arena, state, i):
-        return True
     seconds, margin_s = flight_home(arena, i, state.x[i], state.belief[i])
-    later_s = _STEPS_LATER * arena.rules[0].dt_s
-    return seconds + margin_s + later_s >= _seconds_left(arena, state, i)
+    keep_s = seconds + margin_s + _STEPS_LATER * arena.rules[0].dt_s
+    if is_called:
+        keep_s = _AMPLE * keep_s + _AMPLE_S
+    return keep_s >= _seconds_left(arena, state, i)
 
 
 @kernel

@@ -55,7 +55,7 @@ class LearntWind:
     """Finds out the wind of each UAS, what it consumes, and the mean wind of the fleet.
 
     The consumption begins in the middle of what is stated, and counts from level flight at full
-    speed at `dod_max`, as `has_to_turn_home` does.
+    speed at `dod_max`, as return mode does.
 
     Args:
         brief: The mission.
