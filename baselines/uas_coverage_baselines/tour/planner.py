@@ -279,7 +279,9 @@ class Tour:
         flies = swarm.status == FLYING
         if self._repeats is not None:
             self._recall.keep(swarm.departed & (not self._repeats.has_grown))
-        self._returns = self._recall.update(swarm, self._world, self._learnt)
+        # the order keeps the charge of the worst vehicle, and for wind, until charge is scarce
+        learnt = self._learnt if self._schedule.is_scarce else None
+        self._returns = self._recall.update(swarm, self._world, learnt)
         works = self._handover.workers(swarm)
         return View(
             x=swarm.x,

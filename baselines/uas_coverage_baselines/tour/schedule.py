@@ -72,7 +72,13 @@ class View:
 
 
 class Schedule:
-    """The order of the swarm, kept up to date."""
+    """The order of the swarm, kept up to date.
+
+    Attributes:
+        order: Which UAS visits what.
+        legs: Their leg times.
+        is_scarce: Whether charge was not enough for all waypoints; then less of it is kept.
+    """
 
     def __init__(self, brief: MissionBrief, arena: Arena, effort: SearchEffort) -> None:
         self.legs, self._packs = Legs(brief), Packs.of(brief)
@@ -84,7 +90,7 @@ class Schedule:
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
-        self._reserve_s, self._spare_s, self._is_scarce = _RESERVE_S, _SPARE_S, False
+        self._reserve_s, self._spare_s, self.is_scarce = _RESERVE_S, _SPARE_S, False
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
@@ -110,7 +116,7 @@ class Schedule:
     def _keep_less(self) -> None:
         """Use more of the charge: what is left at the end would have covered something."""
         self._reserve_s = _SEEN_RESERVE_S if self._sees_consumption else _SCARCE_RESERVE_S
-        self._spare_s, self._is_scarce = _SCARCE_SPARE_S, True
+        self._spare_s, self.is_scarce = _SCARCE_SPARE_S, True
 
     def go_on(self, view: View, order: Routes) -> None:
         """Search from an order that was flown until the scene became another."""
@@ -226,7 +232,7 @@ class Schedule:
         """
         uas = self._arena.uas
         share: FloatArray | float = self._charge_share
-        if self._is_scarce and view.consumption is not None:
+        if self.is_scarce and view.consumption is not None:
             share = 1.0 / (1.0 + np.maximum(view.consumption, 0.0))
         left_s = share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
         left_s = np.minimum(left_s, self._until_s - view.time_s)
