@@ -10,9 +10,8 @@ from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.scenario.air import Gust, Wind
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.vehicle.range import margin_to_land
 from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
-from uas_coverage_env.world.state import CONSUMPTION, WIND
+from uas_coverage_env.world.state import CONSUMPTION
 
 FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)
 
@@ -95,21 +94,6 @@ def test_home_is_found_from_above_a_roof_right_below_the_ceiling(wind_mps):
         outcome = world.step({"uas_1": GoTo(None)})
         assert outcome["breaches"][0] == 0
     assert world.state.status[0] == LANDED
-
-
-def margin_for_wind_s(wind_mps):
-    """What the margin of a way home of 90 m in a crosswind is more than in still air."""
-    world = away_from_home((100.0, 120.0, -20.0), Wind(mean_mps=1.0, from_deg=90.0))
-    belief = np.zeros_like(world.state.belief[0])
-    belief[WIND] = wind_mps
-    seconds, margin_s = flight_home(world.arena, 0, world.state.x[0], belief)
-    return margin_s - margin_to_land(seconds, False)
-
-
-def test_the_margin_for_wind_is_none_without_wind_and_grows_with_it():
-    calm_s, light_s, moderate_s, strong_s = map(margin_for_wind_s, (0.0, 2.0, 5.0, 8.0))
-    assert abs(calm_s) < 1e-9
-    assert 1.0 < light_s < moderate_s - 3.0 < moderate_s < strong_s
 
 
 @pytest.mark.parametrize("level", ["light", "moderate"])

@@ -60,33 +60,44 @@ def test_all_are_called_when_nothing_is_left_to_cover(seen):
     assert seen(0.1, uncovered=np.array([False])) == [True, True]
 
 
-def called_from_dod(north_mps=0.0, consumption=0.0):
-    """Depth of discharge from which on a UAS 140 m north of home is called in what it learnt."""
+@pytest.fixture
+def far():
+    """Called for a charge and what was learnt, whether a UAS 140 m north of home is called."""
     brief = MissionBrief.of(meadow(STARTS_M))
     view, first, learnt = WorldView(brief), first_sight(brief), LearntWind(brief)
-    learnt.belief[:, WIND] = north_mps
-    learnt.belief[:, CONSUMPTION] = consumption
-    for dod in np.arange(0.6, 0.75, 5e-4):
+
+    def ask(recall, dod, north_mps=0.0, consumption=0.0):
         x = first.x.copy()
         x[0, 0] += 140.0
         x[0, DOD] = dod
         swarm = dataclasses.replace(first, x=x)
         view.update(swarm)
-        if Recall(2).update(swarm, view, learnt)[0]:
-            return dod
-    return 1.0
+        learnt.belief[:, WIND] = north_mps
+        learnt.belief[:, CONSUMPTION] = consumption
+        return bool(recall.update(swarm, view, learnt)[0])
+
+    return ask
 
 
-def test_in_a_learnt_headwind_a_uas_is_called_the_earlier_the_stronger_it_is():
-    calm, light, strong = map(called_from_dod, (0.0, 3.0, 8.0))
-    assert strong + 0.01 < light < calm
+@pytest.mark.parametrize("learnt", [{"north_mps": 8.0}, {"consumption": 0.4}])
+def test_in_a_headwind_and_where_more_charge_is_drawn_a_uas_is_called_earlier(far, learnt):
+    dods = np.arange(0.6, 0.75, 5e-4)
+    calm, called = (
+        next(dod for dod in dods if far(Recall(2), dod, **what)) for what in ({}, learnt)
+    )
+    assert called + 0.005 < calm
 
 
-def test_a_uas_that_is_seen_to_draw_more_charge_is_called_earlier():
-    assert called_from_dod(consumption=0.3) + 0.005 < called_from_dod() == called_from_dod(0, -0.2)
+def test_less_charge_drawn_than_believed_is_not_relied_on(far):
+    for dod in np.arange(0.6, 0.75, 5e-3):
+        assert far(Recall(2), dod) == far(Recall(2), dod, consumption=-0.2)
 
 
-def test_a_learnt_wind_does_not_keep_a_uas_out_that_has_nothing_to_cover(seen):
-    learnt = LearntWind(MissionBrief.of(meadow(STARTS_M)))
-    assert seen(0.1, learnt) == [False, False]
-    assert seen(0.1, learnt, uncovered=np.array([False])) == [True, True]
+def test_a_call_in_a_gust_ends_with_it_where_charge_is_ample(far):
+    recall = Recall(2)
+    assert [far(recall, 0.3, wind_mps) for wind_mps in (0.0, 12.0, 0.0)] == [False, True, False]
+
+
+def test_a_call_for_lack_of_charge_does_not_end_when_a_little_less_is_needed(far):
+    recall = Recall(2)
+    assert [far(recall, dod, 8.0) for dod in (0.6, 0.72, 0.66)] == [False, True, True]
