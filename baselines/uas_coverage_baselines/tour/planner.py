@@ -205,7 +205,10 @@ class Tour:
         mode = "covering" if len(task.route) else "return"
         # in wind the first step is a hover, for a first look at it
         looks = self._learnt is not None and swarm.step == 0
-        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided and not looks
+        # the charge that is kept for the way home in wind is that of guidance
+        is_called = belief is not None and self._schedule.is_scarce and not len(task.route)
+        guided = is_guided or looks or is_called
+        self._is_flown[i] = seconds < SAFE_BELOW_S and not guided
         if not self._is_flown[i]:
             return GoTo(int(task.route[0]) if len(task.route) else None, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
