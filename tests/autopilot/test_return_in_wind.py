@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import flight_home, has_to_return
+from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.scenario.air import Gust, Wind
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
-from uas_coverage_env.world.state import CONSUMPTION
 
 FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)
 
@@ -94,23 +93,3 @@ def test_home_is_found_from_above_a_roof_right_below_the_ceiling(wind_mps):
         outcome = world.step({"uas_1": GoTo(None)})
         assert outcome["breaches"][0] == 0
     assert world.state.status[0] == LANDED
-
-
-@pytest.mark.parametrize("level", ["light", "moderate"])
-@pytest.mark.parametrize("seed", range(4))
-def test_a_way_home_in_wind_takes_no_more_than_estimated_with_the_margin(level, seed):
-    field = meadow([(100.0, 30.0, -1.0)], waypoints=FAR, max_steps=900)
-    world = World(with_disturbances(field, level, seed), seed=seed)
-    world.state.departed[0] = True
-    world.state.x[0, :3] = 20.0 + 50.0 * seed, 180.0, -10.0 * (1 + seed)
-    for _ in range(8):
-        world.step({"uas_1": GoTo(0)})
-    state, turned_s = world.state, world.time_s
-    x, per_s = state.x[0].copy(), world.arena.uas["dod_per_s"][0]
-    seconds, margin_s = flight_home(world.arena, 0, x, state.belief[0])
-    consumption = 1.0 + max(state.belief[0, CONSUMPTION], 0.0)
-    while not world.done:
-        world.step({"uas_1": GoTo(None)})
-    assert state.status[0] == LANDED
-    assert world.time_s - turned_s <= seconds + margin_s
-    assert state.x[0, DOD] - x[DOD] <= per_s * consumption * (seconds + margin_s)

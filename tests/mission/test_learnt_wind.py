@@ -5,9 +5,9 @@ from small_worlds import meadow, waypoint
 
 from uas_coverage_env import MissionBrief, World
 from uas_coverage_env.mission import MEAN_HEIGHT_M, LearntWind
-from uas_coverage_env.scenario import Uncertainty, Wind
-from uas_coverage_env.vehicle import DOD, Z
-from uas_coverage_env.world import CONSUMPTION, Velocity
+from uas_coverage_env.scenario import Wind
+from uas_coverage_env.vehicle import Z
+from uas_coverage_env.world import Velocity
 
 FIELD = meadow(((100.0, 100.0, -30.0),), waypoints=(waypoint((150.0, 100.0, -30.0)),))
 
@@ -40,20 +40,3 @@ def test_the_mean_wind_of_a_fleet_is_that_at_one_height():
     for known in (high, low):
         np.testing.assert_allclose(known.mean_mps, (0.0, 5.0), atol=0.4)
     assert high.wind_mps[0, 1] - low.wind_mps[0, 1] > 1.0
-
-
-def test_what_is_drawn_beyond_level_flight_is_found_out_from_the_middle_of_the_bounds_on():
-    aged = FIELD.model_copy(update={"uncertainty": Uncertainty(capacity_lost=0.5)})
-    brief = MissionBrief.of(aged)
-    world, known = World(aged, seed=4), LearntWind(brief)
-    believed = float(known.belief[0, CONSUMPTION])
-    assert believed == 1.0 / brief.conditions.expected_charge_share - 1.0 > 0.3
-    drawn = []
-    known.see(world.swarm_state())
-    for _ in range(150):
-        before = world.state.x[0, DOD]
-        world.step({"uas_1": Velocity(0.0, 0.0, 30.0)})
-        known.see(world.swarm_state())
-        drawn.append(world.state.x[0, DOD] - before)
-    truly = np.mean(drawn[-30:]) / world.arena.uas["dod_per_s"][0] - 1.0
-    assert abs(known.belief[0, CONSUMPTION] - truly) < 0.01 < abs(believed - truly)

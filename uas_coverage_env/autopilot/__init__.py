@@ -6,7 +6,6 @@ from uas_coverage_env.autopilot.guidance import guide, path_length_home_m, targe
 from uas_coverage_env.autopilot.guided import velocity_of
 from uas_coverage_env.autopilot.return_mode import (
     has_to_return,
-    needs_all_for_home,
     seconds_home,
     seconds_to_keep,
 )
@@ -18,7 +17,6 @@ __all__ = [
     "flight_home",
     "guide",
     "has_to_return",
-    "needs_all_for_home",
     "path_length_home_m",
     "seconds_home",
     "seconds_to_keep",

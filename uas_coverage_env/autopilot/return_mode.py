@@ -72,43 +72,16 @@ def _waiting_s(arena, i):
 
 
 @kernel
-def _seconds_left(arena, state, i):
-    """What clock and battery leave UAS i, as it consumes [s]."""
-    uas, rules = arena.uas[i], arena.rules[0]
-    # never less than the model says: what is saved now may be needed on the way
-    per_s = uas.dod_per_s * (1.0 + max(state.belief[i, CONSUMPTION], 0.0))
-    left_s = (uas.dod_max - state.x[i, DOD]) / per_s - _waiting_s(arena, i)
-    return min((rules.max_steps - state.step[0]) * rules.dt_s, left_s)
-
-
-@kernel
-def _has_nothing_to_do(arena, state, i):
-    """Whether everything is covered, or others alone can cover what is not."""
-    asks = arena.rules[0].asks
-    for w in range(state.uncovered.shape[0]):
-        if state.uncovered[w] and (not asks or can_cover(arena, i, w)):
-            return False
-    return True
-
-
-@kernel
-def needs_all_for_home(arena, state, i, is_called):
-    """Whether the calibrated way home with its margin takes all that battery and clock leave.
-
-    Of `has_to_return` this is what wind adds, for who knows what is commanded next. A UAS that is
-    called needs all until much more is left, as in `call_home`: against a gust, or low charge.
-    """
-    seconds, margin_s = flight_home(arena, i, state.x[i], state.belief[i])
-    keep_s = seconds + margin_s + _STEPS_LATER * arena.rules[0].dt_s
-    if is_called:
-        keep_s = _AMPLE * keep_s + _AMPLE_S
-    return keep_s >= _seconds_left(arena, state, i)
-
-
-@kernel
 def _calls_home(arena, state, i, share, more_s):
     """See `has_to_return`: for a way home that takes `share` times as long, and more_s [s]."""
-    if _has_nothing_to_do(arena, state, i):
+    left = 0
+    for w in range(state.uncovered.shape[0]):
+        left += state.uncovered[w]
+    if arena.rules[0].asks:
+        left = 0
+        for w in range(state.uncovered.shape[0]):
+            left += state.uncovered[w] and can_cover(arena, i, w)
+    if left == 0:
         return True
     x = state.x[i]
     rules = arena.rules[0]
@@ -124,7 +97,9 @@ def _calls_home(arena, state, i, share, more_s):
         wind_mps = math.hypot(belief[WIND], belief[WIND + 1])
         if wind_mps > _TOO_STRONG * arena.vehicles[i].reference_max_mps:
             return True
-    left_s = _seconds_left(arena, state, i)
+    # never less than the model says: what is saved now may be needed on the way
+    per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
+    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s - _waiting_s(arena, i))
     return share * seconds_to_keep(arena, i, x, left_s, belief) + more_s >= left_s
 
 

@@ -13,20 +13,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot.belief import (
-    CONSUMPTION_BOUNDS,
-    MOST_WIND,
-    SEES_CONSUMPTION_S,
-    wind_growth,
-)
+from uas_coverage_env.autopilot.belief import MOST_WIND, wind_growth
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import DOD, PHI, THETA, VX, VY, WX, WY, X, Y, Z
+from uas_coverage_env.vehicle import PHI, THETA, VX, VY, WX, WY, X, Y, Z
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import RATE, SPEED
-from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.vehicle.tube import belief_gain
 from uas_coverage_env.world import FLYING, Arena, SwarmState
-from uas_coverage_env.world.state import CONSUMPTION, N_BELIEF, WIND
+from uas_coverage_env.world.state import N_BELIEF, WIND
 
 FloatArray = NDArray[np.float64]
 
@@ -52,16 +46,13 @@ def in_disturbances(arena: Arena) -> Arena:
 
 
 class LearntWind:
-    """Finds out the wind of each UAS, what it consumes, and the mean wind of the fleet.
-
-    The consumption begins in the middle of what is stated, and counts from level flight at full
-    speed at `dod_max`, as return mode does.
+    """Finds out the wind of each UAS, and the mean wind of the fleet.
 
     Args:
         brief: The mission.
 
     Attributes:
-        belief: (U, N_BELIEF) as the world's kernels take it, the wind and the consumption alone.
+        belief: (U, N_BELIEF) as the world's kernels take it, the wind alone.
         mean_mps: (2,) at MEAN_HEIGHT_M, of all UAS and the last half minute, north and east [m/s].
     """
 
@@ -74,23 +65,12 @@ class LearntWind:
         self._before: SwarmState | None = None
         self._seen = np.zeros(len(brief.uas), np.int64)
         self.mean_mps, self._samples = np.zeros(2), 0
-        of_each = zip(brief.vehicles, brief.uas, strict=True)
-        per_s = [dod_per_s(vehicle, uas.dod_max) for vehicle, uas in of_each]
-        self._level_dod = brief.dt_s * np.array(per_s)
-        self._consumption_gain = 1.0 - math.exp(-brief.dt_s / SEES_CONSUMPTION_S)
-        if brief.conditions is not None:
-            self.belief[:, CONSUMPTION] = 1.0 / brief.conditions.expected_charge_share - 1.0
         self._mean_gain = 1.0 - math.exp(-brief.dt_s / _MEAN_S)
 
     @property
     def wind_mps(self) -> FloatArray:
         """(U, 2) north and east [m/s]."""
         return self.belief[:, WIND : WIND + 2]
-
-    @property
-    def consumption(self) -> FloatArray:
-        """(U,) by what share more charge is drawn than in level flight as believed [-]."""
-        return self.belief[:, CONSUMPTION]
 
     def see(self, swarm: SwarmState) -> None:
         """Learn from one more sample."""
@@ -99,7 +79,6 @@ class LearntWind:
             flying = np.flatnonzero((before.status == FLYING) & (swarm.status == FLYING)).tolist()
             for i in flying:
                 self._learn(i, axes(before.x[i]), axes(swarm.x[i]))
-                self._learn_consumption(i, swarm.x[i, DOD] - before.x[i, DOD])
             if flying:
                 self._samples += 1
                 gain = max(self._mean_gain, 1.0 / self._samples)
@@ -116,8 +95,3 @@ class LearntWind:
         wind_mps = self.wind_mps[i]
         wind_mps += gain * (off_mps / (1.0 - A[SPEED, SPEED]) - wind_mps)
         wind_mps *= min(1.0, self._most_mps[i] / max(float(np.hypot(*wind_mps)), 1e-9))
-
-    def _learn_consumption(self, i: int, drawn: float) -> None:
-        off = drawn / self._level_dod[i] - 1.0 - self.belief[i, CONSUMPTION]
-        seen = self.belief[i, CONSUMPTION] + self._consumption_gain * off
-        self.belief[i, CONSUMPTION] = np.clip(seen, *CONSUMPTION_BOUNDS)

@@ -47,11 +47,6 @@ class Conditions(StrictModel):
         heavier = (1.0 + bounds.mass) ** 1.5  # of the induced power of a hover
         return (1.0 - bounds.capacity_lost) / ((1.0 + bounds.power) * heavier)
 
-    @property
-    def expected_charge_share(self) -> float:
-        """Likewise in the middle of the bounds."""
-        return 1.0 if self.uncertainty is None else 1.0 - 0.5 * self.uncertainty.capacity_lost
-
 
 def conditions_of(wind: Wind | None, uncertainty: Uncertainty | None) -> Conditions | None:
     """What is stated of a mission with these tables; None where these change nothing."""

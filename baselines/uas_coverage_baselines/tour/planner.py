@@ -205,10 +205,7 @@ class Tour:
         mode = "covering" if len(task.route) else "return"
         # in wind the first step is a hover, for a first look at it
         looks = self._learnt is not None and swarm.step == 0
-        # the charge that is kept for the way home in wind is that of guidance
-        is_called = self._schedule.counts_on_seen and not len(task.route)
-        guided = is_guided or looks or is_called
-        self._is_flown[i] = seconds < SAFE_BELOW_S and not guided
+        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided and not looks
         if not self._is_flown[i]:
             return GoTo(int(task.route[0]) if len(task.route) else None, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
@@ -282,9 +279,7 @@ class Tour:
         flies = swarm.status == FLYING
         if self._repeats is not None:
             self._recall.keep(swarm.departed & (not self._repeats.has_grown))
-        # the order keeps the charge of the worst vehicle, and for wind, until charge is scarce
-        learnt = self._learnt if self._schedule.counts_on_seen else None
-        self._returns = self._recall.update(swarm, self._world, learnt)
+        self._returns = self._recall.update(swarm, self._world)
         works = self._handover.workers(swarm)
         return View(
             x=swarm.x,
@@ -296,7 +291,6 @@ class Tour:
             swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
             asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
             wind_mps=None if self._learnt is None else self._learnt.mean_mps,
-            consumption=None if self._learnt is None else self._learnt.consumption,
         )
 
 

@@ -27,8 +27,6 @@ FloatArray = NDArray[np.float64]
 _RESERVE_S = 30.0  # what the return rule asks for beyond the way home at full speed
 _SPARE_S = 10.0  # left beside it in a new order, so that not every delay upsets the order
 _SCARCE_RESERVE_S, _SCARCE_SPARE_S = 20.0, 3.0  # the same once charge does not suffice for all
-_SEEN_RESERVE_S = 12.0  # likewise where rule and order know the consumption of each UAS
-_KNOWN_WIND_MPS = 7.0  # in a stronger one, gusts call UAS home whose charge would have sufficed
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
 _AGAIN_S = 5.0  # what a search could not mend is searched again after so long
 _PACE = 1.2  # flights take so much longer than their legs, until it is known better
@@ -57,7 +55,6 @@ class View:
         swarm: what is seen, UAS that take no commands left out; None: no packs are swapped.
         asked_in_s: (W,) from now until a waypoint is asked for; None: all are.
         wind_mps: (2,) north and east at MEAN_HEIGHT_M, learnt so far; None: still air.
-        consumption: (U,) of charge, above that of level flight as believed [-]; None: not seen.
     """
 
     x: FloatArray
@@ -69,31 +66,21 @@ class View:
     swarm: SwarmState | None = None
     asked_in_s: FloatArray | None = None
     wind_mps: FloatArray | None = None
-    consumption: FloatArray | None = None
 
 
 class Schedule:
-    """The order of the swarm, kept up to date.
-
-    Attributes:
-        order: Which UAS visits what.
-        legs: Their leg times.
-        counts_on_seen: Whether charge was not enough for all waypoints, and is planned as each UAS
-            consumes it in a stated wind: then less is kept.
-    """
+    """The order of the swarm, kept up to date."""
 
     def __init__(self, brief: MissionBrief, arena: Arena, effort: SearchEffort) -> None:
         self.legs, self._packs = Legs(brief), Packs.of(brief)
         self._wind_mps, self._knows_wind = np.zeros(2), False
         self._arena, self._can_cover = arena, brief.can_cover
-        stated = brief.conditions
-        self._sees_consumption = stated is not None and stated.mean_mps <= _KNOWN_WIND_MPS
         self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         self._effort = effort
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
-        self._reserve_s, self._spare_s, self.counts_on_seen = _RESERVE_S, _SPARE_S, False
+        self._reserve_s, self._spare_s = _RESERVE_S, _SPARE_S
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
@@ -118,8 +105,7 @@ class Schedule:
 
     def _keep_less(self) -> None:
         """Use more of the charge: what is left at the end would have covered something."""
-        self._reserve_s = _SEEN_RESERVE_S if self._sees_consumption else _SCARCE_RESERVE_S
-        self._spare_s, self.counts_on_seen = _SCARCE_SPARE_S, self._sees_consumption
+        self._reserve_s, self._spare_s = _SCARCE_RESERVE_S, _SCARCE_SPARE_S
 
     def go_on(self, view: View, order: Routes) -> None:
         """Search from an order that was flown until the scene became another."""
@@ -228,16 +214,9 @@ class Schedule:
         return np.clip(self._flown_s / legs_s, 1.0, _SLOWEST_PACE)
 
     def _budget_s(self, view: View) -> FloatArray:
-        """(U,) seconds of legs that battery and clock allow each UAS.
-
-        Of the worst vehicle that is stated, as long as all can be visited with that; then as each
-        consumes. A UAS that consumes more than it did so far is called home earlier by the rule.
-        """
+        """(U,) seconds of legs that battery and clock allow each UAS."""
         uas = self._arena.uas
-        share: FloatArray | float = self._charge_share
-        if self.counts_on_seen and view.consumption is not None:
-            share = 1.0 / (1.0 + np.maximum(view.consumption, 0.0))
-        left_s = share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
+        left_s = self._charge_share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
         left_s = np.minimum(left_s, self._until_s - view.time_s)
         return (left_s - self._reserve_s - self._spare_s) / self.pace
 
