@@ -2,6 +2,7 @@
 
     python benchmarks/returns.py
     python benchmarks/returns.py --towns 40 --dynamics nonlinear
+    python benchmarks/returns.py --level moderate
 
 A town of a seed is a generated scenario, its steps 0.5 or 1 s long, with one UAS (even seeds
 s500_v2, odd ones hexacopter). For each of its returns the UAS is put at rest at a drawn place and
@@ -15,15 +16,19 @@ Compared are time and depth of discharge from the moment it turns home with what
 - return mode: what return mode of the world allows for;
 - milp-mpc: what the planner's battery reserve allows for, without its allowance for braking.
 
+With `--level`, towns have the wind and the wrong vehicles of light or moderate, in which every UAS
+comes home from anywhere, and in place of `Range` and milp-mpc stands what return mode and `Recall`
+estimate in the wind and with the consumption that the UAS has learnt by then.
+
 Errors are flown less estimated. Exits 0 where fewer than 1 in 200 returns took longer, or more
-charge, than `Range` with its margin, 1 otherwise, 2 where the input is bad.
+charge, than the estimate with its margin, 1 otherwise, 2 where the input is bad.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, cast, get_args
 
@@ -37,12 +42,13 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
 )
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
-from uas_coverage_env.autopilot import seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot import flight_home, seconds_home, seconds_to_keep
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
+from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.vehicle import DOD, dod_per_s
-from uas_coverage_env.world import LANDED
+from uas_coverage_env.world import CONSUMPTION, LANDED
 
 RETURNS_OF_A_TOWN = 5
 _NEAREST_M = 15.0
@@ -52,6 +58,7 @@ _ALTITUDES_M = (3.0, 45.0)
 _DEEPEST = 0.6
 _ASIDE_STEPS = 15
 _ALLOWED = 1 / 200
+_LEVELS = (None, "light", "moderate")
 
 
 @dataclass(frozen=True)
@@ -63,12 +70,14 @@ class Return:
         x: (14,) the state in which it turned home.
         time_s: Flown until it had landed [s].
         dod: Used until then [-].
+        belief: (N_BELIEF,) what it had learnt when it turned home.
     """
 
     scenario: Scenario
     x: NDArray[np.float64]
     time_s: float
     dod: float
+    belief: NDArray[np.float64]
 
 
 def town(seed: int) -> Scenario:
@@ -97,15 +106,17 @@ def _place(scenario: Scenario, rng: np.random.Generator) -> NDArray[np.float64]:
             return place_m
 
 
-def flown_returns(seed: int, dynamics: Dynamics = "lpv") -> Iterator[Return]:
+def flown_returns(
+    seed: int, dynamics: Dynamics = "lpv", level: str | None = None
+) -> Iterator[Return]:
     """The returns of a town.
 
     Raises:
         RuntimeError: A UAS did not come home.
     """
-    scenario = town(seed)
+    scenario = with_disturbances(town(seed), level, seed)
     rng = np.random.default_rng([seed, 15])
-    world = World(scenario, dynamics=dynamics)
+    world = World(scenario, dynamics=dynamics, seed=seed)
     name, state = world.names[0], world.state
     for _ in range(RETURNS_OF_A_TOWN):
         world.reset()
@@ -115,15 +126,17 @@ def flown_returns(seed: int, dynamics: Dynamics = "lpv") -> Iterator[Return]:
         aside = GoTo(int(rng.integers(len(scenario.waypoints))))
         for _ in range(int(rng.integers(_ASIDE_STEPS))):
             world.step({name: aside})
-        x, turned_s = state.x[0].copy(), world.time_s
+        x, belief, turned_s = state.x[0].copy(), state.belief[0].copy(), world.time_s
         while not world.done and world.time_s < scenario.max_steps * scenario.dt_s:
             world.step({name: GoTo(None)})
         if state.status[0] != LANDED:
             raise RuntimeError(f"the UAS of town {seed} did not come home from {x[:3].tolist()}")
-        yield Return(scenario, x, world.time_s - turned_s, float(state.x[0, DOD] - x[DOD]))
+        dod = float(state.x[0, DOD] - x[DOD])
+        yield Return(scenario, x, world.time_s - turned_s, dod, belief)
 
 
 COLUMNS = ("Range", "Range with margin", "return mode", "milp-mpc")
+IN_WIND = ("as learnt", "as learnt, with margin", "return mode")
 
 
 def estimates(flown: Return) -> tuple[list[float], list[float]]:
@@ -145,11 +158,22 @@ def estimates(flown: Return) -> tuple[list[float], list[float]]:
     )
 
 
-def _table(title: str, errors: NDArray[np.float64], digits: int) -> Table:
+def estimates_in_wind(flown: Return) -> tuple[list[float], list[float]]:
+    """The same of `IN_WIND`."""
+    arena, x = World(flown.scenario).arena, flown.x
+    seconds, margin_s = flight_home(arena, 0, x, flown.belief)
+    keep_s = seconds_to_keep(arena, 0, x, math.inf, flown.belief)
+    times = [seconds, seconds + margin_s, max(seconds_home(arena, 0, x), keep_s)]
+    consumption = 1.0 + max(float(flown.belief[CONSUMPTION]), 0.0)
+    per_s = consumption * float(arena.uas["dod_per_s"][0])
+    return times, [per_s * time_s for time_s in times]
+
+
+def _table(title: str, columns: Sequence[str], errors: NDArray[np.float64], digits: int) -> Table:
     table = Table(title=title)
     for column in ("estimate", "too low", "least", "5 %", "median", "95 %", "99 %", "largest"):
         table.add_column(column)
-    for name, error in zip(COLUMNS, errors.T, strict=True):
+    for name, error in zip(columns, errors.T, strict=True):
         spread = np.percentile(error, [0, 5, 50, 95, 99, 100])
         low = f"{(error > 0.0).sum()} of {len(error)}"
         table.add_row(name, low, *(f"{value:+.{digits}f}" for value in spread))
@@ -160,24 +184,31 @@ def main(
     towns: Annotated[int, typer.Option(min=1, help="How many towns, five returns each.")] = 200,
     first_seed: Annotated[int, typer.Option(min=0, help="Of the towns.")] = 2000,
     dynamics: Annotated[str, typer.Option(help="lpv or nonlinear.")] = "lpv",
+    level: Annotated[str | None, typer.Option(help="light or moderate; None: still.")] = None,
 ) -> None:
     """Fly returns and print by how much estimates of time and charge err."""
     if dynamics not in get_args(Dynamics):
         raise InputError(f"unknown dynamics {dynamics!r}; allowed: {', '.join(get_args(Dynamics))}")
+    if level not in _LEVELS:
+        raise InputError(f"level is {level!r}; it should be light, moderate or None")
+    columns, estimate = (COLUMNS, estimates) if level is None else (IN_WIND, estimates_in_wind)
     times, charges, ways_m = [], [], []
     for seed in range(first_seed, first_seed + towns):
-        for flown in flown_returns(seed, cast(Dynamics, dynamics)):
-            estimated_s, estimated_dod = estimates(flown)
+        for flown in flown_returns(seed, cast(Dynamics, dynamics), level):
+            estimated_s, estimated_dod = estimate(flown)
             times.append(flown.time_s - np.array(estimated_s))
             charges.append(100.0 * (flown.dod - np.array(estimated_dod)))
             ways_m.append(np.linalg.norm((flown.x[:3] - flown.scenario.uas[0].start_m)[:2]))
     console = Console()
     console.width = max(console.width, 110)
     console.print(
-        f"{len(times)} returns ({dynamics}) from {min(ways_m):.0f} to {max(ways_m):.0f} m away"
+        f"{len(times)} returns ({dynamics}, {level or 'still'}) "
+        f"from {min(ways_m):.0f} to {max(ways_m):.0f} m away"
     )
-    console.print(_table("time: flown less estimated [s]", np.array(times), 1))
-    console.print(_table("depth of discharge: flown less estimated [%]", np.array(charges), 2))
+    console.print(_table("time: flown less estimated [s]", columns, np.array(times), 1))
+    console.print(
+        _table("depth of discharge: flown less estimated [%]", columns, np.array(charges), 2)
+    )
     short = (np.array(times)[:, 1] > 0.0) | (np.array(charges)[:, 1] > 0.0)
     raise typer.Exit(0 if short.mean() < _ALLOWED else 1)
 
