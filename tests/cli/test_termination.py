@@ -84,3 +84,35 @@ def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypa
     monkeypatch.setattr(app, "command_group", compare)
     assert main(["planners"]) == 1
     assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
+
+
+SWALLOWS = """
+import signal
+from uas_coverage_env.flight import load_planner
+
+class Swallows:
+    def __init__(self):
+        self._hovers = load_planner("hover")
+
+    def reset(self, brief, seed):
+        self._hovers.reset(brief, seed)
+
+    def act(self, swarm):
+        if swarm.step == 0:
+            try:
+                signal.raise_signal(signal.SIGTERM)
+            except KeyboardInterrupt:
+                pass
+        return self._hovers.act(swarm)
+"""
+
+
+def test_a_signal_that_a_library_swallows_ends_the_scores_after_the_mission(
+    elsewhere, monkeypatch, capsys
+):
+    (elsewhere / "swallowing.py").write_text(SWALLOWS)
+    monkeypatch.syspath_prepend(elsewhere)
+    planners = ["--planners", "swallowing:Swallows"]
+    assert main(["score", "--missions", "3", *planners, "--out", "kept"]) == 1
+    assert len((elsewhere / "kept" / "test" / "scores.jsonl").read_text().splitlines()) == 1
+    assert "what was finished before is kept" in capsys.readouterr().err
