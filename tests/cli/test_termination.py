@@ -86,11 +86,13 @@ def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypa
     assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
 
 
-SWALLOWS = """
+STOPPED = """
 import signal
+
 from uas_coverage_env.flight import load_planner
 
-class Swallows:
+
+class Stopped:
     def __init__(self):
         self._hovers = load_planner("hover")
 
@@ -98,21 +100,15 @@ class Swallows:
         self._hovers.reset(brief, seed)
 
     def act(self, swarm):
-        if swarm.step == 0:
-            try:
-                signal.raise_signal(signal.SIGTERM)
-            except KeyboardInterrupt:
-                pass
+        signal.raise_signal(signal.SIGTERM)
         return self._hovers.act(swarm)
 """
 
 
-def test_a_signal_that_a_library_swallows_ends_the_scores_after_the_mission(
-    elsewhere, monkeypatch, capsys
-):
-    (elsewhere / "swallowing.py").write_text(SWALLOWS)
+def test_a_mission_that_is_stopped_by_hand_is_not_scored(elsewhere, monkeypatch, capsys):
+    (elsewhere / "stopped_planner.py").write_text(STOPPED)
     monkeypatch.syspath_prepend(elsewhere)
-    planners = ["--planners", "swallowing:Swallows"]
-    assert main(["score", "--missions", "3", *planners, "--out", "kept"]) == 1
-    assert len((elsewhere / "kept" / "test" / "scores.jsonl").read_text().splitlines()) == 1
-    assert "what was finished before is kept" in capsys.readouterr().err
+    assert main(["score", "--planners", "stopped_planner:Stopped", "--out", "kept"]) == 1
+    assert not (elsewhere / "kept" / "test" / "scores.jsonl").exists()
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == "error: stopped by hand; what was finished before is kept"

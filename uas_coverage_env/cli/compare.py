@@ -15,7 +15,6 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
-from uas_coverage_env.cli.termination import raise_again
 from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
@@ -219,7 +218,6 @@ def fly_sweep(
             for row in fly_all(todo, jobs, backend, source_sha256, keep):
                 store.add(row)
                 told(row)
-                raise_again()
     except (KeyboardInterrupt, StoppedError):
         return "stopped by hand; the same command goes on"
     except WorkerLostError as error:

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.cli.termination import raise_again
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import load_planner
@@ -69,7 +68,6 @@ def score_command(
 def _scored(store: ScoreStore, planner: str, level: str, missions: int, split: str) -> Score:
     def keep(mission: MissionScore) -> None:
         store.add(level, planner, mission)
-        raise_again()
 
     known = store.missions(level, planner)
     return score(planner, level, missions=missions, split=split, known=known, on_mission=keep)

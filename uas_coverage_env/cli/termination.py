@@ -7,15 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_came: list[int] = []
-"""Signals that have come since the command began."""
-
-
-def raise_again() -> None:
-    """End the command by an interruption that has come before, in case a library swallowed it."""
-    if _came:
-        raise KeyboardInterrupt
-
 
 @contextmanager
 def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
@@ -26,7 +17,7 @@ def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
     Yields:
         Whether one of them has come.
     """
-    _came.clear()
+    came: list[int] = []
     if threading.current_thread() is not threading.main_thread():  # no other may ask for signals
         yield lambda: False
         return
@@ -34,7 +25,7 @@ def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
 
     def stop(number: int, frame: FrameType | None) -> None:
         if os.getpid() == here:
-            _came.append(number)
+            came.append(number)
             raise KeyboardInterrupt
         signal.signal(number, before[number])
         os.kill(os.getpid(), number)
@@ -46,7 +37,7 @@ def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
     before[signal.SIGTERM] = signal.SIG_DFL
     outside = {number: signal.signal(number, stop) for number in numbers}
     try:
-        yield lambda: bool(_came)
+        yield lambda: bool(came)
     finally:
         for number, handler in outside.items():
             signal.signal(number, handler)

@@ -8,6 +8,7 @@ import numpy as np
 
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.flight import Flight
+from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.flight.metrics import (
     accomplished,
     coverage,
@@ -137,6 +138,7 @@ def evaluate(
     Raises:
         InputError: Unknown scenario or planner, or the planner refuses a mission.
         ValueError: A setting is wrong, there is no seed, or an action is not of the action space.
+        KeyboardInterrupt: A mission was stopped by hand.
     """
     source = MissionSource.of(scenario)
     made = MissionSettings.of(settings, beside=("seeds", "swarm_of", "on_episode"))
@@ -157,7 +159,7 @@ def evaluate(
             reward=made.reward,
             reward_weights=made.reward_weights,
         )
-        episodes.append(Episode.of(flight, seed))
+        episodes.append(Episode.of(unless_stopped(flight), seed))
         if on_episode is not None:
             on_episode(episodes[-1])
     if not episodes:

@@ -9,7 +9,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from uas_coverage_env.flight.flight import Flight
 
 
 @contextmanager
@@ -41,3 +44,14 @@ def interruptions_noted() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def unless_stopped(flight: "Flight") -> "Flight":
+    """The same flight, if it came to its end: half a flight says nothing of its planner.
+
+    Raises:
+        KeyboardInterrupt: It was stopped by hand.
+    """
+    if flight.ended == "stopped":
+        raise KeyboardInterrupt
+    return flight

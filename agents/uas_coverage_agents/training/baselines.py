@@ -12,6 +12,7 @@ from uas_coverage_agents.training.score import MEASURES, measured
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.replay.figures import BASELINES
 from uas_coverage_env.scenario import Scenario
 
@@ -55,7 +56,7 @@ def fly_baselines(
             continue
         say(f"flying the {len(scenarios)} missions of the learning curve with {name}")
         try:
-            flown = [measured(rollout(scenario, name)) for scenario in scenarios]
+            flown = [measured(unless_stopped(rollout(scenario, name))) for scenario in scenarios]
         except (InputError, PlannerError) as error:
             say(f"no baseline {name}: {error}")
             continue

@@ -18,6 +18,7 @@ from uas_coverage_env.flight import (
     home,
     rollout,
 )
+from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.scenario import Scenario
 
 MEASURES = (
@@ -48,7 +49,9 @@ def fly(
     return np.array(
         [
             measured(
-                rollout(scenario, runner, safety_filter=safety_filter, return_mode=return_mode)
+                unless_stopped(
+                    rollout(scenario, runner, safety_filter=safety_filter, return_mode=return_mode)
+                )
             )
             for scenario in scenarios
         ]

@@ -58,6 +58,7 @@ from uas_coverage_env.autopilot import velocity_of
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
+from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.scenario import LEVELS, Scenario, with_disturbances
 from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.commands import VELOCITY
@@ -231,9 +232,10 @@ class VelocityTraining:
         first = (self.seed * settings.rounds + number) * settings.towns_per_round
         for k in range(first, first + settings.towns_per_round):
             # without the filter, states come up in which it would have had to help
-            rollout(
+            flight = rollout(
                 mission_of(settings, k), runner, return_mode=False, safety_filter=k % 3 == 0, seed=k
             )
+            unless_stopped(flight)
         rows, outputs = (np.concatenate(part) for part in zip(*runner.labels, strict=True))
         self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
         self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
