@@ -17,9 +17,14 @@ FIRST = ("missions/test_evasion.py", "test_house.py", "docs")
 """One process compiles what most others need, meanwhile the next one works without kernels: `docs`
 begins with building the site."""
 
-APART = ("docs/test_documented_commands.py", "docs/test_notebooks.py", "cli/test_warm_up.py")
-"""Files whose tests have nothing in common, and use all planners: each goes where there is time for
-it, after all others, which have compiled the planners' kernels by then."""
+APART = (
+    "docs/test_documented_commands.py",
+    "docs/test_notebooks.py",
+    "cli/test_warm_up.py",
+    "leaderboard/test_compare_command.py",
+)
+"""Files whose tests have nothing in common, and use all planners or several processes: each goes
+where there is time for it, after all others, which have compiled the kernels by then."""
 
 BY_FILE = ("baselines", "leaderboard", "milp_mpc", "missions")
 """Folders whose files have nothing in common but kernels, which other folders need as well."""
