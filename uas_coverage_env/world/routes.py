@@ -18,31 +18,26 @@ over everything, because there is no way round."""
 
 
 @inlined_kernel
-def box_apart(obstacle, x0, y0, z0, x1, y1, z1):
-    """Whether a segment misses the box in which the obstacle's clearance is below near_m."""
+def level_apart(obstacle, x0, y0, x1, y1):
+    """Whether a segment, seen from above, misses the box in which the clearance is below near_m."""
     lower = obstacle.lower_m
     upper = obstacle.upper_m
-    # no `or`: to know all six takes less time than to guess wrong once
+    # no `or`: to know all takes less time than to guess wrong once
     return (
         (max(x0, x1) < lower[0])
         | (min(x0, x1) > upper[0])
         | (max(y0, y1) < lower[1])
         | (min(y0, y1) > upper[1])
-        | (max(z0, z1) < lower[2])
-        | (min(z0, z1) > upper[2])
     )
 
 
 @inlined_kernel
-def level_apart(obstacle, x0, y0, x1, y1):
-    """The same, looked at from above."""
-    lower = obstacle.lower_m
-    upper = obstacle.upper_m
+def box_apart(obstacle, x0, y0, z0, x1, y1, z1):
+    """The same in space."""
     return (
-        (max(x0, x1) < lower[0])
-        | (min(x0, x1) > upper[0])
-        | (max(y0, y1) < lower[1])
-        | (min(y0, y1) > upper[1])
+        level_apart(obstacle, x0, y0, x1, y1)
+        | (max(z0, z1) < obstacle.lower_m[2])
+        | (min(z0, z1) > obstacle.upper_m[2])
     )
 
 
