@@ -1,0 +1,62 @@
+"""Ctrl-C in the first third of a second, while the program is being imported."""
+
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+INTERRUPTED_AT = """
+import os, signal, sys
+
+class Interrupts:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupts())
+"""
+
+
+def command(way):
+    if way == "-m":
+        return [sys.executable, "-m", "uas_coverage_env"]
+    module, _, function = PROJECT["scripts"]["uas-coverage"].partition(":")
+    script = f"import sys; from {module} import {function}; sys.exit({function}())"
+    return [sys.executable, "-c", script]
+
+
+def interrupted(way, folder, name):
+    """The command in a process of its own that gets SIGINT where it imports a module."""
+    (folder / "sitecustomize.py").write_text(INTERRUPTED_AT.format(name=name))
+    return subprocess.run(
+        [*command(way), "planners"],
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        # as a shell starts it, also where the tests run in the background
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("way", ["script", "-m"])
+@pytest.mark.parametrize(
+    "name", ["lazy_loader", "numpy", "gymnasium.core", "pettingzoo", "typer", "rich.console"]
+)
+def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_word(tmp_path, way, name):
+    ended = interrupted(way, tmp_path, name)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("way", ["script", "-m"])
+def test_ctrl_c_while_a_command_is_imported_is_one_line(tmp_path, way):
+    ended = interrupted(way, tmp_path, "uas_coverage_env.cli.planners")
+    assert ended.returncode == 1
+    assert ended.stderr == "error: stopped by hand; what was finished before is kept\n"
