@@ -113,16 +113,16 @@ def test_ctrl_c_keeps_the_flight_and_fails_the_mission(elsewhere, monkeypatch, c
     monkeypatch.setattr(Hover, "act", interrupted)
     assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 1
     assert Flight.load("mine").steps == 3
-    assert "stopped by hand" in capsys.readouterr().out
+    assert "in 3 steps, stopped;" in capsys.readouterr().out
 
 
 def test_a_planner_that_gives_nonsense_fails_in_one_line(elsewhere, monkeypatch, capsys):
     from uas_coverage_baselines.hover import Hover
 
     monkeypatch.setattr(Hover, "act", lambda planner, swarm: {})
-    assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 1
+    assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 2
     err = capsys.readouterr().err
-    assert re.fullmatch(r"error: planner 'hover' at t = 0 s: .*\n", err)
+    assert re.fullmatch(r"error: planner 'hover' at step 0 \(t = 0 s\): .*\n", err)
     assert not (elsewhere / "mine").exists(), "no empty folder is left behind"
 
 

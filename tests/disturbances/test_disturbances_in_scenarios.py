@@ -95,7 +95,10 @@ def test_a_table_of_another_package_is_read_checked_and_flown(installed, file_wi
         (("[disturbances.gusts]",), "disturbances: gusts: sigma_mps: is missing; add it"),
         ((*GUSTS, "sigma = 1"), "disturbances: gusts: sigma: unknown key; did you mean sigma_mps"),
         (("[disturbances]", "gusts = 3"), "disturbances: gusts should be a table"),
-        (("[disturbances.broken]",), "disturbance 'broken' cannot be loaded: No module"),
+        (
+            ("[disturbances.broken]",),
+            "disturbance 'broken' cannot be loaded: ModuleNotFoundError: No module",
+        ),
         (("[disturbances.number]",), "disturbance 'number' is installed as 3.14"),
     ],
 )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.draw import Picture, legend, picture
 from uas_coverage_env.draw.colours import UAS, of_charge
@@ -235,6 +236,19 @@ def test_a_legend_has_the_tint_of_everything_that_stands_or_lies_on_the_map(vill
     kinds = {**obstacle_kinds(village), **decoration_kinds(village)}
     assert {"forest", "high rise", "water"} <= set(kinds)
     assert set(kinds.values()) <= pixels
+
+
+def test_a_legend_speaks_of_heights_only_where_one_is_written_on_an_obstacle():
+    narrow, wide = (
+        meadow(
+            waypoints=(waypoint((20.0, 20.0, -20.0)),),
+            obstacles=(box("house", (20.0, 110.0, -12.0), (20.0 + side, 170.0, 0.0)),),
+        )
+        for side in (0.5, 60.0)
+    )
+    without, with_heights = (legend(scenario, (), 900) for scenario in (narrow, wide))
+    assert without.shape[0] < with_heights.shape[0]
+    assert differs(without[:20], with_heights[:20]) is None
 
 
 def test_where_a_moving_obstacle_has_been_is_drawn(village, swarm):

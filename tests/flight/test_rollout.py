@@ -343,7 +343,7 @@ def test_commands_that_cannot_be_flown_are_reported_with_planner_and_time(yard, 
     planner: Any = Still()
     act = planner.act
     planner.act = lambda swarm: act(swarm) if swarm.step < 2 else commands(swarm)
-    with pytest.raises(PlannerError, match=r"'Still' at t = 2 s: ") as error:
+    with pytest.raises(PlannerError, match=r"'Still' at step 2 \(t = 2 s\): ") as error:
         rollout(yard, planner)
     assert reason in str(error.value)
 

@@ -3,6 +3,7 @@
 import json
 import re
 import sqlite3
+from pathlib import Path
 
 import numpy as np
 import polars
@@ -162,7 +163,8 @@ def test_a_planner_that_refuses_or_crashes_is_a_row_with_its_reason(
     assert frame["status"].to_list() == ["failed", "failed"]
     refused, crashed = frame["reason"].to_list()
     assert refused.endswith("no map of this place")
-    assert crashed == "ZeroDivisionError: of the plan"
+    assert "at step 0 (t = 0 s): ZeroDivisionError: of the plan (" in crashed
+    assert f"{Path(__file__).name}:" in crashed
     assert frame["energy_Wh"].to_list() == [None, None]
     assert "2 (2 failed)" in (elsewhere / "sweep" / "table.md").read_text()
     # a failure is a result: it is not flown again
@@ -181,7 +183,7 @@ def test_commands_that_cannot_be_flown_fail_the_flight_alone(yard, with_planners
     assert issubclass(PlannerError, ValueError)
     with_planners(Wild)
     assert compare(yard) == 1
-    assert "at t = 0 s" in flights().filter(label="hover")["reason"][0]
+    assert "at step 0 (t = 0 s)" in flights().filter(label="hover")["reason"][0]
 
 
 def test_a_flight_that_is_stopped_by_hand_is_not_kept(yard, capsys, with_planners):

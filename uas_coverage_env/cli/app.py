@@ -1,7 +1,9 @@
 """The commands of `uas-coverage` and what becomes of their mistakes."""
 
 import io
+import os
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Annotated
@@ -14,12 +16,16 @@ from uas_coverage_env.cli.plugins import plugin_entries
 from uas_coverage_env.cli.termination import terminated_as_by_hand
 from uas_coverage_env.compiled.progress import compiling_for
 from uas_coverage_env.files.errors import InputError, PlannerError
+from uas_coverage_env.files.users_code import described, place_of
 
 PROGRAM = "uas-coverage"
 
 # what typer makes of Ctrl-C that no command has caught
 _CTRL_C = 130
 _STOPPED = "stopped by hand; what was finished before is kept"
+
+_TRACEBACK = "UAS_COVERAGE_TRACEBACK"
+"""Environment variable; set, the traceback of an error comes before its line."""
 
 _FEW = 6
 """Commands of a group that a message names; of more, the help."""
@@ -131,7 +137,8 @@ def describe(
 ) -> None:
     """Plan, fly and evaluate coverage missions of a swarm of multicopters.
 
-    Exits 0 on success, 1 where a mission failed, 2 where the input is bad.
+    Exits 0 on success, 1 where a mission failed, 2 where the input is bad or a planner raised an
+    exception (UAS_COVERAGE_TRACEBACK=1 shows its traceback).
     """
     if show_version:
         typer.echo(f"{PROGRAM} {version('uas-coverage-env')}")
@@ -155,9 +162,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _run(argv)
         except Exception as error:
             # an interruption inside a library may come out as any error
-            if not was_stopped():
-                raise
-            return _refuse(f"stopped by hand ({type(error).__name__})", FAILED)
+            if was_stopped():
+                return _refuse(f"stopped by hand ({type(error).__name__})", FAILED)
+            # of a table, a family or a command from another package
+            if place_of(error):
+                return _told(error, described(error))
+            raise
         except KeyboardInterrupt:
             return _refuse(_STOPPED, FAILED)
 
@@ -171,10 +181,8 @@ def _run(argv: Sequence[str] | None) -> int:
             code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
         return _refuse(_of_the_command_line(error), error.exit_code)
-    except InputError as error:
-        return _refuse(str(error), 2)
-    except PlannerError as error:
-        return _refuse(str(error), FAILED)
+    except (InputError, PlannerError) as error:
+        return _told(error, str(error))
     except OSError as error:
         # a folder that is closed to us, a name that is too long, a full disk: a hundred places
         # may raise them, and which call it was is of no use to the user
@@ -214,6 +222,12 @@ def _of_a_file(error: OSError) -> str:
     if error.filename is None:
         return f"a file or the terminal cannot be read or written ({reason})"
     return f"{error.filename}: cannot be read or written ({reason}); check the path and its rights"
+
+
+def _told(error: Exception, message: str) -> int:
+    if os.environ.get(_TRACEBACK):
+        traceback.print_exception(error)
+    return _refuse(message, 2)
 
 
 def _refuse(message: str, code: int) -> int:

@@ -14,7 +14,7 @@ from uas_coverage_env.flight import (
     summary,
 )
 
-_ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped by hand"}
+_ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped"}
 NONE = "-"
 _ALIKE = 0.005
 _NAMED = 8

@@ -40,7 +40,7 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         screen.print(f"violation: {violation}", markup=False, style="red")
     result = summary(flight)
     low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
-    ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped by hand"}
+    ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped"}
     screen.print(
         f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "
         f"{'all home' if result['all_home'] else 'not all home'}; "

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
@@ -21,6 +22,7 @@ from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     Flight,
+    PlannerError,
     accomplished,
     check_directory,
     fly_sorties,
@@ -110,9 +112,9 @@ def run(
     """Fly one mission and write a flight directory.
 
     Ctrl-C or SIGTERM ends the flight after the step that is being flown, a second one at once, and
-    what was flown is kept. Exits 0 where everything is
-    covered, all UAS home, no contact and no limit exceeded (also where --steps ended the run), 1
-    otherwise.
+    what was flown is kept. Exits 0 where everything is covered, all UAS home, no contact and no
+    limit exceeded (also where --steps ended the run), 1 otherwise, 2 where the input is bad or the
+    planner raised an exception; what was flown before that is kept, too.
     """
     if sorties is not None and steps is not None:
         raise InputError("--steps ends a flight in the air: give either --steps or --sorties")
@@ -138,19 +140,26 @@ def run(
 
     screen = console(quiet=quiet or as_json)
     window = ExitStack()
+    trouble: list[PlannerError] = []
 
     def fly(what: Scenario) -> Flight:
         watched, after = flies if watch else None, window if sorties is None else None
         with shown(screen, what, watch=watched, live=live, after=after) as on_step:
-            return rollout(
-                what,
-                flies,
-                seed,
-                dynamics=dynamics,
-                safety_filter=True if safety_filter else None,
-                max_steps=steps,
-                on_step=on_step,
-            )
+            try:
+                return rollout(
+                    what,
+                    flies,
+                    seed,
+                    dynamics=dynamics,
+                    safety_filter=True if safety_filter else None,
+                    max_steps=steps,
+                    on_step=on_step,
+                )
+            except PlannerError as error:
+                if error.flight is None:
+                    raise
+                trouble.append(error)
+                return error.flight
 
     try:
         with compiling_for_flight(flies, quiet=screen.quiet):
@@ -159,6 +168,7 @@ def run(
                 code = keep_sorties(screen, chain, directory, overwrite=overwrite)
                 if as_json:
                     typer.echo((directory / SUMMARY).read_text(), nl=False)
+                _refuse(trouble, directory)
                 raise typer.Exit(code)
             flight = fly(mission)
             keep_flight(flight, directory, overwrite=overwrite)
@@ -168,6 +178,7 @@ def run(
     report_flight(screen, flight, directory)
     if as_json:
         typer.echo(json.dumps(data(flight, str(directory)), indent=2))
+    _refuse(trouble, directory)
     if flight.ended != "stopped":
         window.close()
     raise typer.Exit(_exit_code(flight, steps))
@@ -178,6 +189,12 @@ def free_directory(name: str) -> Path:
     first = Path("flights") / name
     candidates = (first if n == 1 else first.with_name(f"{name}-{n}") for n in count(1))
     return next(path for path in candidates if not path.exists())
+
+
+def _refuse(trouble: Sequence[PlannerError], directory: Path) -> None:
+    """End the command where the planner has failed, once its flight is kept."""
+    for error in trouble:
+        raise PlannerError(f"{error}; what was flown before is in {directory}") from error.__cause__
 
 
 def _exit_code(flight: Flight, steps: int | None) -> int:

@@ -14,6 +14,8 @@ from numba import config, types
 from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
+from uas_coverage_env.files.users_code import described, place_of_function
+
 COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
 
 
@@ -86,9 +88,9 @@ def _address_of(kernel: Any, arguments: tuple[types.Type, ...], result: types.Ty
         )
     try:
         compiled = getattr(kernel, "at_address", kernel).get_compile_result(result(*arguments))
-    except errors.NumbaError as error:
-        reason = " ".join(str(error).split())
-        raise ValueError(f"{name} cannot be compiled: {reason[:400]}") from error
+    except Exception as error:  # numba raises anything at what it cannot compile
+        where = place_of_function(kernel.py_func)
+        raise ValueError(f"{name} cannot be compiled: {described(error)}{where}") from error
     returned = compiled.signature.return_type
     if returned != result:
         raise ValueError(f"{name} returns {returned}; it should return {result}")

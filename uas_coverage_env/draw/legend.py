@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours, marks
 from uas_coverage_env.draw.frame import SMOOTHING, Frame
+from uas_coverage_env.draw.terrain import height_places
 from uas_coverage_env.draw.text import width_of, write
 from uas_coverage_env.scenario import Scenario
 
@@ -114,9 +115,8 @@ def legend(scenario: Scenario, signs: Iterable[str], size_px: int) -> NDArray[np
     widest = max(width_of(words, size) for words, _ in entries) + (_SIGN + _GAP) * unit
     columns = max(1, int((frame.side - 2 * _EDGE * unit) / widest))
     rows = -(-len(entries) // columns)
-    height = SMOOTHING * round(
-        ((rows + bool(scenario.obstacles)) * _ROW + _EDGE) * unit / SMOOTHING
-    )
+    numbers = any(place is not None for place in height_places(scenario, frame))
+    height = SMOOTHING * round(((rows + numbers) * _ROW + _EDGE) * unit / SMOOTHING)
     image = Image.new("RGB", (frame.side, height), colours.PAPER)
     draw = ImageDraw.Draw(image)
     width = (frame.side - 2 * _EDGE * unit) / columns
@@ -125,7 +125,7 @@ def legend(scenario: Scenario, signs: Iterable[str], size_px: int) -> NDArray[np
         y = (n // columns + 0.5) * _ROW * unit
         sign(draw, frame, x + 0.5 * _SIGN * unit, y)
         write(image, (x + _SIGN * unit, y), words, size, colours.INK)
-    if scenario.obstacles:
+    if numbers:
         place = (_EDGE * unit, (rows + 0.4) * _ROW * unit)
         write(image, place, _NUMBERS, size, colours.FAINT)
     return np.asarray(image.reduce(SMOOTHING))

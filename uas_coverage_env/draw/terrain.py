@@ -23,6 +23,8 @@ _SHADOW = np.array([-0.32, 0.32])
 _TALL_M = 50.0
 # Sum of red, green and blue below which dark words cannot be read.
 _DARK = 400
+# Of the letters of heights, in pixels of the design.
+_HEIGHT = 8.5
 
 
 def terrain(scenario: Scenario, frame: Frame) -> "Image":
@@ -46,17 +48,31 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
         if decoration.kind == "pad":
             draw.line([*corners, *corners[:2]], fill=colours.FAINT, width=round(frame.unit))
     _shadows(image, frame, scenario.hulls)
-    points = scenario.waypoints
-    places = frame.pixels(np.array([point.position_m for point in points]))
-    discs = np.column_stack([places, [point.radius_m * frame.scale for point in points]])
-    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        _obstacle(image, draw, frame, obstacle.kind or "", hull, discs)
+    places = height_places(scenario, frame)
+    for obstacle, hull, place in zip(scenario.obstacles, scenario.hulls, places, strict=True):
+        _obstacle(image, draw, frame, obstacle.kind or "", hull, place)
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
     _scale_and_north(image, draw, frame, fence)
     _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
     _margins(image, draw, frame, scenario.name)
     return image
+
+
+def height_places(scenario: Scenario, frame: Frame) -> list[tuple[float, float] | None]:
+    """Where on each obstacle its height stands, hidden by no waypoint; None: nowhere."""
+    points = scenario.waypoints
+    centres = frame.pixels(np.array([point.position_m for point in points]))
+    discs = np.column_stack([centres, [point.radius_m * frame.scale for point in points]])
+    size = _HEIGHT * frame.letter
+    return [
+        free_place(
+            frame.pixels(_outline(hull.vertices_m)),
+            np.array([width_of(_height(hull), size), size]) + frame.unit,
+            discs,
+        )
+        for hull in scenario.hulls
+    ]
 
 
 def scale_step_m(extent_m: float) -> float:
@@ -114,11 +130,11 @@ def _obstacle(
     frame: Frame,
     kind: str,
     hull: ConvexPolytope,
-    discs: NDArray[np.float64],
+    place: tuple[float, float] | None,
 ) -> None:
     """The faces that can be seen from above, lit, in the tint of the kind; darker where taller.
 
-    Its height stands where no waypoint (`discs`, (W, 3) x, y, radius on the canvas) hides it.
+    Its height stands at `place`.
     """
     height_m = float(np.ptp(hull.vertices_m[:, 2]))
     tint = colours.of_obstacle(kind)
@@ -133,11 +149,12 @@ def _obstacle(
     width = round((1 + min(1.0, height_m / _TALL_M)) * frame.unit)
     draw.line(edge, fill=colours.shaded(tint, 0.55), width=width, joint="curve")
     ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.35)
-    words, size = f"{height_m:.0f} m", 8.5 * frame.letter
-    box = np.array([width_of(words, size), size]) + frame.unit
-    place = free_place(frame.pixels(outline), box, discs)
     if place is not None:
-        write(image, place, words, size, ink, align=0.5)
+        write(image, place, _height(hull), _HEIGHT * frame.letter, ink, align=0.5)
+
+
+def _height(hull: ConvexPolytope) -> str:
+    return f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
 
 
 def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> None:

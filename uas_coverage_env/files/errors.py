@@ -1,9 +1,20 @@
 """The errors that the command line reports in one line."""
 
+from typing import Any
+
 
 class InputError(ValueError):
     """A mistake in what a person gave us: one line that names file, field, value and fix."""
 
 
 class PlannerError(ValueError):
-    """A planner gave commands that cannot be flown; names planner, time, UAS and value."""
+    """A planner raised an exception, or gave commands that cannot be flown.
+
+    One line: the planner, the step, and the exception with its place in the planner's code, or the
+    UAS and the value.
+
+    Attributes:
+        flight: What was flown before, a `Flight`; None where nothing was.
+    """
+
+    flight: Any = None

@@ -118,7 +118,7 @@ def demonstrate(scenario: Scenario, planner: Planner | str, seed: int = 0) -> De
 
     Raises:
         InputError: Unknown planner, or it refuses the scenario.
-        PlannerError: The planner gave commands that cannot be flown.
+        PlannerError: The planner raised an exception, or gave commands that cannot be flown.
     """
     observer = Observer(MissionBrief.of(scenario))
     seen: list[tuple[SwarmState, NDArray[np.float32], NDArray[np.int64]]] = []

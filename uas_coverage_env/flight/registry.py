@@ -22,6 +22,7 @@ from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.named_objects import object_named
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import did_you_mean, meant
+from uas_coverage_env.files.users_code import described
 from uas_coverage_env.flight.planner import Planner, PlannerOptions, check_planner
 
 GROUP = "uas_coverage.planners"
@@ -164,8 +165,7 @@ def _own_class(name: str) -> Any:
 
 
 def _not_made(name: str, error: Exception) -> InputError:
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
-    return InputError(f"planner {name!r} cannot be made: {reason}")
+    return InputError(f"planner {name!r} cannot be made: {described(error)}")
 
 
 def _unknown(name: str) -> InputError:

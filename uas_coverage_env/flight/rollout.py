@@ -3,7 +3,7 @@
 import contextlib
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.installed import version_of
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.users_code import described, place_of
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.log import FlightLog
@@ -95,7 +96,7 @@ def rollout(
     Raises:
         InputError: Unknown scenario or planner, no planner, or it refuses the scenario.
         ValueError: Unknown dynamics, a number of steps below one, or a wrong reward.
-        PlannerError: The planner gave commands that cannot be flown.
+        PlannerError: The planner raised an exception, or gave commands that cannot be flown.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
@@ -165,7 +166,11 @@ def rollout(
         def stops() -> bool:
             return interrupted() or (should_stop is not None and should_stop())
 
-        ended = _fly(world, planner, log, limit, seed, tell, stops, plans_on=plans_on)
+        try:
+            ended = _fly(world, planner, log, limit, seed, tell, stops, plans_on=plans_on)
+        except PlannerError as error:
+            error.flight = flown() if log.steps else None
+            raise
     return flown(ended)
 
 
@@ -184,7 +189,7 @@ def _make_ready(
     state = world.swarm_state()
     hover = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
     packed = pack(hover, state.names, state.active, len(state.uncovered))
-    meter.terms(packed, world.step(packed))
+    meter.terms(packed, _stepped(world, packed))
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:
@@ -192,8 +197,11 @@ def _make_ready(
             warm_up(brief)
         planner.reset(brief, seed)
     except ValueError as error:
-        reason = f"planner {name_of(planner)!r} refuses scenario {brief.name!r}: {error}"
+        where = "" if isinstance(error, InputError) else place_of(error)
+        reason = f"planner {name_of(planner)!r} refuses scenario {brief.name!r}: {error}{where}"
         raise InputError(reason) from error
+    except Exception as error:
+        raise _failed(planner, f"cannot begin scenario {brief.name!r}", error) from error
 
 
 def _fly(
@@ -216,8 +224,9 @@ def _fly(
         if should_stop():
             return "stopped"
         commands, packed, decision = _decide(planner, swarm)
-        outcome = world.step(packed)
-        found = getattr(planner, "last_decision", None) if swarm.active else None
+        outcome = _stepped(world, packed)
+        with _blamed(planner, swarm):
+            found = getattr(planner, "last_decision", None) if swarm.active else None
         log.add(commands, packed, decision, found, outcome)
         before, swarm = swarm, world.swarm_state()
         changed = world.revisions != revisions
@@ -235,7 +244,8 @@ def _fly(
             world.take_off(again)
             swarm, changed = world.swarm_state(), True
         if changed:
-            planner.reset(MissionBrief.of(world.known), seed)
+            with _blamed(planner, swarm):
+                planner.reset(MissionBrief.of(world.known), seed)
         tell(swarm, decision)
     return "complete"
 
@@ -250,14 +260,45 @@ def _decide(
     """One decision, checked and timed; none is asked for while all swap packs."""
     if not swarm.active:
         return {}, pack({}, swarm.names, (), len(swarm.uncovered)), 0.0
-    started = time.perf_counter()
-    try:
+    with _blamed(planner, swarm):
+        started = time.perf_counter()
         commands = planner.act(swarm)
         duration_s = time.perf_counter() - started
+    try:
         return commands, pack(commands, swarm.names, swarm.active, len(swarm.uncovered)), duration_s
     except ValueError as error:
-        reason = f"planner {name_of(planner)!r} at t = {swarm.time_s:g} s: {error}"
+        reason = f"planner {name_of(planner)!r} {_when(swarm)}: {error}"
         raise PlannerError(reason) from error
+
+
+def _stepped(world: World, packed: NDArray[np.void]) -> NDArray[np.void]:
+    try:
+        return world.step(packed)
+    except InputError:
+        raise
+    except ValueError as error:  # the commands are checked: it is what a kernel does
+        names = ", ".join(disturbance.name for disturbance in world.disturbances)
+        raise InputError(f"disturbances of the mission ({names}): {error}") from error
+
+
+@contextlib.contextmanager
+def _blamed(planner: Planner, swarm: SwarmState) -> Iterator[None]:
+    """Whatever a planner raises is one line about it, with the place in its code."""
+    try:
+        yield
+    except Exception as error:
+        raise _failed(planner, _when(swarm), error) from error
+
+
+def _failed(planner: Planner, when: str, error: Exception) -> PlannerError:
+    package = type(planner).__module__.partition(".")[0]
+    # what was written for a person needs no place
+    what = str(error) if isinstance(error, InputError) else described(error, package)
+    return PlannerError(f"planner {name_of(planner)!r} {when}: {what}")
+
+
+def _when(swarm: SwarmState) -> str:
+    return f"at step {swarm.step} (t = {swarm.time_s:g} s)"
 
 
 def recorded_versions() -> dict[str, str]:

@@ -12,6 +12,7 @@ from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.users_code import described
 from uas_coverage_env.flight import PlannerError, load_planner, rollout
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.leaderboard.sweep import Entry
@@ -107,8 +108,8 @@ def fly(entry: Entry, source_sha256: str, keep: Path | None = None) -> Row | Non
         )
     except (InputError, PlannerError) as error:
         return Row.failed(entry, str(error), source_sha256)
-    except Exception as error:  # a planner may be anybody's: its crash must not end the sweep
-        return Row.failed(entry, f"{type(error).__name__}: {error}", source_sha256)
+    except Exception as error:  # an error in one flight must not end the sweep
+        return Row.failed(entry, described(error), source_sha256)
     if flight.ended == "stopped":
         return None
     if keep is not None:

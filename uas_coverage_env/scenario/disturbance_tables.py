@@ -7,6 +7,7 @@ from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
 from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import StrictModel, parse
+from uas_coverage_env.files.users_code import described
 
 GROUP = "uas_coverage.disturbances"
 
@@ -46,9 +47,8 @@ def _table(name: str, value: Any) -> DisturbanceTable:
         raise ValueError(f"{name} should be a table [disturbances.{name}]")
     try:
         model = installed[name].load()
-    except (ImportError, AttributeError) as error:
-        reason = " ".join(str(error).split())
-        raise ValueError(f"disturbance {name!r} cannot be loaded: {reason}") from error
+    except Exception as error:  # whatever a user's module raises is one line
+        raise ValueError(f"disturbance {name!r} cannot be loaded: {described(error)}") from error
     if not isinstance(model, type) or not issubclass(model, DisturbanceTable):
         raise ValueError(f"disturbance {name!r} is installed as {model!r}, no DisturbanceTable")
     return parse(value, model, name)

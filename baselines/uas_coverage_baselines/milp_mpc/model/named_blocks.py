@@ -6,6 +6,7 @@ from uas_coverage_baselines.milp_mpc.model.ocp import Block
 from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.named_objects import object_named
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.users_code import described
 
 GROUP = "uas_coverage.blocks"
 """The entry-point group in which packages announce blocks by name."""
@@ -32,8 +33,7 @@ def block_named(name: str) -> Block:
     except InputError:
         raise
     except Exception as error:  # whatever a foreign module raises is one line for its user
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"block {name!r} cannot be made: {reason}") from error
+        raise InputError(f"block {name!r} cannot be made: {described(error)}") from error
     return checked(block, name)
 
 
