@@ -24,6 +24,7 @@ from uas_coverage_env import load_scenario, uas_coverage_v0
 from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
 from uas_coverage_env.env.observation import (
+    OBSERVATION,
     OBSERVATION_SIZE,
     full_state,
     grid,
@@ -77,6 +78,17 @@ def environment_summary() -> str:
         ("Render modes", ", ".join(f"`{mode}`" for mode in RENDER_MODES)),
     ]
     return table((env.metadata["name"], ""), rows)
+
+
+def observation_groups() -> str:
+    """The groups of the default observation, and where each lies."""
+    rows, start = [], 0
+    for group in OBSERVATION:
+        n, features = group.width * group.repeats, ", ".join(f.name for f in group.features)
+        many = f", {group.repeats} of {group.width}" if group.repeats > 1 else ""
+        rows.append((f"{start}-{start + n - 1}", f"`{group.name}`{many}", features))
+        start += n
+    return table(("index", "group", "features"), rows)
 
 
 def picture_channels() -> str:
@@ -239,7 +251,7 @@ def _keys(tables: list[tuple[str, dict[str, Any]]]) -> str:
     parts = []
     for title, part in tables:
         rows = [_key(name, entry, part) for name, entry in part["properties"].items()]
-        parts += [f"### {title}", part["description"]]
+        parts += [f"## {title}", part["description"]]
         if rows:
             parts += [table(("key", "value", "", "meaning"), rows)]
     return "\n\n".join(parts)
@@ -329,6 +341,7 @@ def _without_meanings(rows: str) -> str:
 PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
+    "observation_groups": observation_groups,
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
     "observation_local": lambda: _without_meanings(layout_table(local())),
     "observation_grid": picture_channels,

@@ -42,8 +42,8 @@ def test_the_site_fetches_nothing(site):
     assert styles == []
 
 
-def test_the_environment_page_has_every_feature_of_the_observation(site):
-    text = (site / "environment.html").read_text()
+def test_the_page_of_observations_has_every_feature_of_the_default_one(site):
+    text = (site / "observations.html").read_text()
     for group in OBSERVATION:
         for feature in group.features:
             assert f"{group.name}.{feature.name}" in text
