@@ -1,11 +1,13 @@
 """Code of a user that fails is one line with the place in it, wherever it is flown."""
 
 import json
+import signal
 import sys
 
 import polars
 import pytest
 from small_worlds import meadow
+from uas_coverage_baselines.hover import Hover
 
 from uas_coverage_env import Flight
 from uas_coverage_env.cli import main
@@ -160,3 +162,19 @@ def test_in_python_the_exception_is_the_cause_and_the_flight_is_at_hand(folder):
         rollout("field.toml", Fails())
     assert type(caught.value.__cause__).__name__ == "LinAlgError"
     assert caught.value.flight.steps == 3
+
+
+@pytest.mark.usefixtures("python_handles_interrupts")
+def test_a_second_ctrl_c_that_comes_out_of_a_planner_as_an_error_is_no_error_of_it(
+    capsys, monkeypatch
+):
+    def swallows(planner, swarm):
+        try:
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as interruption:
+            raise TypeError("cannot compare") from interruption
+
+    monkeypatch.setattr(Hover, "act", swallows)
+    said = said_of(capsys, *run("hover"), code=1)
+    assert said == "error: stopped by hand (PlannerError)"

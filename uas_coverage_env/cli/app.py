@@ -164,6 +164,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             # an interruption inside a library may come out as any error
             if was_stopped():
                 return _refuse(f"stopped by hand ({type(error).__name__})", FAILED)
+            if isinstance(error, PlannerError):
+                return _told(error, str(error))
             # of a table, a family or a command from another package
             if place_of(error):
                 return _told(error, described(error))
@@ -181,7 +183,7 @@ def _run(argv: Sequence[str] | None) -> int:
             code = command.main(args=argv, prog_name=PROGRAM, standalone_mode=False) or DONE
     except typer.TyperException as error:
         return _refuse(_of_the_command_line(error), error.exit_code)
-    except (InputError, PlannerError) as error:
+    except InputError as error:
         return _told(error, str(error))
     except OSError as error:
         # a folder that is closed to us, a name that is too long, a full disk: a hundred places

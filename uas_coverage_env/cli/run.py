@@ -193,8 +193,9 @@ def free_directory(name: str) -> Path:
 
 def _refuse(trouble: Sequence[PlannerError], directory: Path) -> None:
     """End the command where the planner has failed, once its flight is kept."""
-    for error in trouble:
-        raise PlannerError(f"{error}; what was flown before is in {directory}") from error.__cause__
+    if trouble:
+        reason = f"{trouble[0]}; what was flown before is in {directory}"
+        raise PlannerError(reason) from trouble[0].__cause__
 
 
 def _exit_code(flight: Flight, steps: int | None) -> int:
