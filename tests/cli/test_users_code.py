@@ -11,7 +11,7 @@ from uas_coverage_baselines.hover import Hover
 
 from uas_coverage_env import Flight
 from uas_coverage_env.cli import main
-from uas_coverage_env.flight import PlannerError, rollout
+from uas_coverage_env.flight import PlannerError, load_planner, rollout
 
 OWN = """\
 import numpy as np
@@ -155,11 +155,9 @@ def test_the_traceback_is_shown_to_who_asks_for_it(capsys, monkeypatch):
     assert err.splitlines()[-1] == f"error: planner 'FailsAtOnce' at step 0 (t = 0 s): {SINGULAR}"
 
 
-def test_in_python_the_exception_is_the_cause_and_the_flight_is_at_hand(folder):
-    from failing_code import Fails
-
+def test_in_python_the_exception_is_the_cause_and_the_flight_is_at_hand():
     with pytest.raises(PlannerError) as caught:
-        rollout("field.toml", Fails())
+        rollout("field.toml", load_planner("failing_code:Fails"))
     assert type(caught.value.__cause__).__name__ == "LinAlgError"
     assert caught.value.flight.steps == 3
 
