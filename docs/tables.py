@@ -85,7 +85,7 @@ def observation_groups() -> str:
     rows, start = [], 0
     for group in OBSERVATION:
         n, features = group.width * group.repeats, ", ".join(f.name for f in group.features)
-        many = f", {group.repeats} of {group.width}" if group.repeats > 1 else ""
+        many = f", {group.repeats} × {group.width} numbers" if group.repeats > 1 else ""
         rows.append((f"{start}-{start + n - 1}", f"`{group.name}`{many}", features))
         start += n
     return table(("index", "group", "features"), rows)
