@@ -5,24 +5,19 @@ It stands beside the packages, since to import any of them takes most of that ti
 
 import os
 import signal
-import sys
 from types import FrameType
 
 _STOPPED = 130  # what shells say of a program that Ctrl-C has ended
 
 
-def end_at_ctrl_c() -> None:
-    """From now on Ctrl-C ends the process at once, without a traceback.
+def main() -> int:
+    """Import the command line and run it; returns the exit code.
 
-    An exception in the middle of an import may be swallowed, or come out as another one.
+    Until it is imported Ctrl-C ends the process at once: an exception in the middle of an import
+    may be swallowed, or come out as another one.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _end)
-
-
-def main() -> int:
-    """Import the command line and run it; returns the exit code."""
-    end_at_ctrl_c()
     from uas_coverage_env.cli import main as run
 
     try:
@@ -35,7 +30,3 @@ def main() -> int:
 
 def _end(number: int, frame: FrameType | None) -> None:
     os._exit(_STOPPED)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -25,19 +25,17 @@ sys.meta_path.insert(0, Interrupts())
 """
 
 
-def command(way):
-    if way == "-m":
-        return [sys.executable, "-m", "uas_coverage_env"]
+def command():
     module, _, function = PROJECT["scripts"]["uas-coverage"].partition(":")
     script = f"import sys; from {module} import {function}; sys.exit({function}())"
     return [sys.executable, "-c", script]
 
 
-def interrupted(way, folder, name):
+def interrupted(folder, name):
     """The command in a process of its own that gets SIGINT where it imports a module."""
     (folder / "sitecustomize.py").write_text(INTERRUPTED_AT.format(name=name))
     return subprocess.run(
-        [*command(way), "planners"],
+        [*command(), "planners"],
         env={**os.environ, "PYTHONPATH": str(folder)},
         # as a shell starts it, also where the tests run in the background
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
@@ -46,17 +44,15 @@ def interrupted(way, folder, name):
     )
 
 
-@pytest.mark.parametrize("way", ["script", "-m"])
 @pytest.mark.parametrize(
     "name", ["lazy_loader", "numpy", "gymnasium.core", "pettingzoo", "typer", "rich.console"]
 )
-def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_word(tmp_path, way, name):
-    ended = interrupted(way, tmp_path, name)
+def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_word(tmp_path, name):
+    ended = interrupted(tmp_path, name)
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
 
 
-@pytest.mark.parametrize("way", ["script", "-m"])
-def test_ctrl_c_while_a_command_is_imported_is_one_line(tmp_path, way):
-    ended = interrupted(way, tmp_path, "uas_coverage_env.cli.planners")
+def test_ctrl_c_while_a_command_is_imported_is_one_line(tmp_path):
+    ended = interrupted(tmp_path, "uas_coverage_env.cli.planners")
     assert ended.returncode == 1
     assert ended.stderr == "error: stopped by hand; what was finished before is kept\n"
