@@ -10,11 +10,11 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from numba import config, types
+from numba import types
 from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
-COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
+from uas_coverage_env.compiled.kernels import COMPILED
 
 
 class Signature:
