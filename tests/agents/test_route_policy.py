@@ -14,7 +14,8 @@ from uas_coverage_agents.route.leg_flight import (
     places_ahead,
     steer_along,
 )
-from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
+from uas_coverage_agents.route.leg_plan import plan_along
+from uas_coverage_agents.route.leg_search import HORIZON, search_workspace
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import build, no_record, route_workspace
 from uas_coverage_agents.route.places import detour_s, places_along

@@ -10,13 +10,12 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from numba import config, types
+from numba import types
 from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
+from uas_coverage_env.compiled.kernels import COMPILED
 from uas_coverage_env.files.users_code import described, place_of_function
-
-COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
 
 
 class Signature:

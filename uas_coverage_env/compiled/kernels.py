@@ -23,6 +23,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.cache import keep_on_disk
 from uas_coverage_env.compiled.compiler import KernelDispatcher
 
+COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
+"""Whether kernels are compiled; with NUMBA_DISABLE_JIT=1 they run as Python."""
+
 
 def _decorator(**options: Any) -> Any:
     """A decorator that compiles with some options; called with more options, it makes another."""
@@ -30,7 +33,7 @@ def _decorator(**options: Any) -> Any:
     def decorate(function: Any = None, /, **more: Any) -> Any:
         if function is None:
             return _decorator(**options, **more)
-        if config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
+        if not COMPILED:
             return function
         compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
         keep_on_disk(compiled)
@@ -71,7 +74,7 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
 
     Called directly it spares numba's look at the type of each argument, a third of a short step.
     """
-    if config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
+    if not COMPILED:
         return function
     return function.compile(tuple(map(typeof, arguments)))
 
@@ -200,7 +203,7 @@ def _prefetched(typing_context, array):
     return types.none(array), generate
 
 
-if not config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
+if COMPILED:
     lowest_bit = _trailing_zeros()
     ahead: Any = intrinsic(_prefetched)
     rarely, prefetch = _expected_false(), ahead

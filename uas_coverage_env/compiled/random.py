@@ -7,10 +7,9 @@ numbers are the same wherever the mission is flown.
 import math
 
 import numpy as np
-from numba import config
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import COMPILED, inlined_kernel, kernel
 
 SEEDS = 2**64
 """Seeds are below."""
@@ -66,6 +65,6 @@ def normal(random: NDArray[np.uint64]) -> float:
     return radius * math.cos(2.0 * math.pi * uniform(random))
 
 
-if config.DISABLE_JIT:  # pyrefly: ignore[missing-attribute]
+if not COMPILED:
     # that the numbers overflow is meant; NumPy warns of it
     mixed, counted, bits = (np.errstate(over="ignore")(each) for each in (mixed, counted, bits))

@@ -11,16 +11,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import config, typeof, types
+from numba import typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.array_views import view_of
+from uas_coverage_env.compiled.kernels import COMPILED
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
-
-_COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
 
 
 def _pointer(builder: Any, pointer: Any, n_bytes: Any) -> Any:
@@ -46,7 +45,7 @@ def _views(context: Any, builder: Any, memory: Memory, starts: list, sizes: Mapp
 
 def _in_kernels(typed: Callable[..., Any], plain: Callable[..., Any]) -> Callable[..., Any]:
     """What kernels call: generated code, or with NUMBA_DISABLE_JIT=1 plain Python."""
-    made: Any = intrinsic(typed) if _COMPILED else plain
+    made: Any = intrinsic(typed) if COMPILED else plain
     return made
 
 

@@ -335,8 +335,8 @@ def _search(arena, around, i, x, reference, layers, plan, kept, has_base, rng, w
 
 
 @allocating_kernel
-def plan_along(
-    arena, around, i, x, reference, targets, layers, plan, kept, rng, workspace, belief=None
+def search_along(
+    arena, around, i, x, reference, targets, layers, plan, kept, rng, workspace, belief
 ):
     """Write the plan whose first row is to be flown by UAS i.
 

@@ -15,7 +15,8 @@ from uas_coverage_agents.route.improvement import CHANGES
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
-from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
+from uas_coverage_agents.route.leg_plan import plan_along
+from uas_coverage_agents.route.leg_search import HORIZON, search_workspace
 from uas_coverage_agents.route.mission import WEIGHT
 from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_missions
 from uas_coverage_env.flight import Assistants

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_agents.route.layers import Layers, value_of
 from uas_coverage_agents.route.leg_flight import AHEAD, EAST, NORTH, observe_places
-from uas_coverage_agents.route.leg_search import HORIZON, plan_along, search_workspace
+from uas_coverage_agents.route.leg_plan import search_by, still_air_code
+from uas_coverage_agents.route.leg_search import HORIZON, search_workspace
 from uas_coverage_agents.route.places import detour_s, write_place
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import fly_kinematically
@@ -136,14 +137,15 @@ def _rest_s(arena, around, i, x, reference, left, n, layers, workspace):
 
 
 @allocating_kernel
-def _fly_until(arena, around, i, flights, f, goal, layers, rng, workspace):
+def _fly_until(code, arena, around, i, flights, f, goal, layers, rng, workspace):
     """Fly flight f on until less than so many waypoints are left, -1: until it has landed."""
     x, reference, left = flights.x[f], flights.reference[f], flights.left[f]
     rules, uas = arena.rules[0], arena.uas[i]
     while flights.n_left[f] > goal:
         step = flights.steps[f]
         plan = flights.plan[f]
-        if step == flights.commands.shape[1] or not plan_along(
+        if step == flights.commands.shape[1] or not search_by(
+            code,
             arena,
             around,
             i,
@@ -155,6 +157,7 @@ def _fly_until(arena, around, i, flights, f, goal, layers, rng, workspace):
             flights.kept[f],
             rng,
             workspace,
+            None,
         ):
             return False
         flights.commands[f, step] = plan[0]
@@ -174,7 +177,7 @@ def _fly_until(arena, around, i, flights, f, goal, layers, rng, workspace):
 
 
 @allocating_kernel
-def _rehearse(arena, around, i, x, route, layers, rng, workspace, flights):
+def _rehearse(code, arena, around, i, x, route, layers, rng, workspace, flights):
     """Simulate flights of UAS i along a route, from rest; the quickest becomes the first of them.
 
     Returns:
@@ -193,7 +196,7 @@ def _rehearse(arena, around, i, x, route, layers, rng, workspace, flights):
         goal -= 1
         flew = False
         for f in range(n_flights):
-            done = _fly_until(arena, around, i, flights, f, goal, layers, rng, workspace)
+            done = _fly_until(code, arena, around, i, flights, f, goal, layers, rng, workspace)
             flights.cost_s[f] = flights.steps[f] * dt_s
             if goal >= 0 or not done:
                 flights.cost_s[f] += _rest_s(
@@ -315,8 +318,8 @@ class Rehearsal:
         if key not in self._known:
             room = self._room
             seconds = _rehearse(
-                self._arena, self._around, u, self._x[u], route, self._layers, self._rng,
-                self._workspace, room,
+                still_air_code(), self._arena, self._around, u, self._x[u], route, self._layers,
+                self._rng, self._workspace, room,
             )  # fmt: skip
             self._known[key] = float(seconds), room.commands[0, : room.steps[0]].copy()
         return self._known[key]
