@@ -81,13 +81,14 @@ class Tour:
     comes_home_by_legs = True
 
     def __init__(
-        self, options: TourOptions | None = None, effort: SearchEffort | None = None
+        self, options: TourOptions | None = None, effort: SearchEffort | None = None, lead=None
     ) -> None:
         self.options = options or TourOptions()
         self._effort = effort or SearchEffort(self.options.moves)
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
         self._has_acted = False
+        self._lead = lead
         self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -131,6 +132,8 @@ class Tour:
         self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
         self._schedule = Schedule(brief, self._arena, self._effort)
+        if self._lead is not None:
+            self._lead.begin(brief, self._arena)
         self._brief, self._has_order = brief, not may_go_on
         if self._has_order:
             self._find_order(self._view(first_sight(brief)), seed)
@@ -197,10 +200,16 @@ class Tour:
         belief = None if self._learnt is None else self._learnt.belief[i]
         is_guided = self._is_guided[i]
         changes = 0 if is_guided else self.options.changes
+        led = None
+        if self._lead is not None and not is_guided and not self._returns[i]:
+            led = self._lead.commands(i, x, task.route, view, belief, swarm, self._n_steps)
+        self.last_led = led
         seconds = improve(
             self._arena, i, task, others_m, plan, self._trial, n_kept, changes, self._rng,
-            self._command, belief,
-        )  # fmt: skip
+            self._command, belief, led,
+        )
+        if led is not None and self._lead is not None:
+            self._lead.flown(i, bool(np.abs(plan.commands[0]-led[0]).max()<1e-6))  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
         # in wind the first step is a hover, for a first look at it

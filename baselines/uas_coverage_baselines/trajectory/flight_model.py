@@ -47,7 +47,7 @@ _ACCELERATION_WEIGHT, _LIFT_WEIGHT = 2e-3, 2e-5  # on squared inputs: break ties
 
 
 class FlightModel(NamedTuple):
-    """x(n+1) = A x(n) + B u(n), and what is allowed of x and u.
+    """x(n+1) = A x(n) + B u(n) + drift, and what is allowed of x and u.
 
     Inputs are the angular accelerations that push north and east [rad/s²], and the lift [N].
     """
@@ -67,6 +67,8 @@ class FlightModel(NamedTuple):
     """(3,)"""
     input_weight: FloatArray
     """(3,) cost of squared inputs."""
+    drift: FloatArray
+    """(10,) what the wind adds to x(n+1); zero in still air."""
 
 
 def flight_model(
@@ -100,7 +102,26 @@ def flight_model(
         input_low=share * np.array([-alpha[0], -alpha[1], vehicle.lift_min_N]),
         input_high=share * np.array([alpha[0], alpha[1], vehicle.lift_max_N]),
         input_weight=np.array([_ACCELERATION_WEIGHT, _ACCELERATION_WEIGHT, _LIFT_WEIGHT]),
+        drift=np.zeros(N_X),
     )
+
+
+def in_wind(model: FlightModel, wind_mps: FloatArray, kept: tuple[float, float]) -> FlightModel:
+    """The same vehicle in a steady wind, with its velocity over ground.
+
+    Args:
+        model: In still air.
+        wind_mps: (2,) north and east.
+        kept: Share of the wind that is kept of the limits of horizontal and vertical speed.
+    """
+    air = np.zeros(N_X)
+    air[[V_NORTH, V_EAST]] = wind_mps
+    drift = air - model.A @ air
+    drift[[NORTH, EAST]] += model.dt_s * wind_mps
+    wind = float(np.hypot(*wind_mps))
+    norms = model.norms.copy()
+    norms[0] -= kept[0] * wind
+    return model._replace(drift=drift, norms=norms, vertical=model.vertical - kept[1] * wind)
 
 
 def reduced_state(x: FloatArray) -> FloatArray:

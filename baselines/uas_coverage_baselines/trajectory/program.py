@@ -37,6 +37,7 @@ _HEIGHT_SPARE_M = 0.2  # within the heights from which a waypoint may be covered
 _LANDING_SHARE = 0.9, 0.85  # of landing distance and speed
 _LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
 _CLEAR_WEIGHT = 2.0  # of 1 m too near
+_AIRSPEED_WEIGHT = 4.0
 _HOPELESS = 3.0  # more violation than this is no matter of faces
 
 
@@ -113,6 +114,7 @@ class FlightProgram:
         bodies: On known paths from step 0.
         earliest: (W,) steps before which a waypoint is not to be visited.
         loose: Factors on the limits of the first stages, for a start beyond them.
+        wind_mps: (3,) in which the airspeed is limited, too; None: still air.
         solved: How many programs were solved: the effort.
     """
 
@@ -125,6 +127,7 @@ class FlightProgram:
     bodies: Sequence[Body] = ()
     earliest: IntArray | None = None
     loose: FloatArray | None = None
+    wind_mps: FloatArray | None = None
     solved: int = field(default=0)
 
     def solve(
@@ -231,6 +234,17 @@ class FlightProgram:
         ]
         if self.asked is not None:
             made += _as_asked(self.asked, route, visits)
+        if self.wind_mps is not None:
+            stages = np.arange(1, n_steps)
+            made.append(
+                _balls(
+                    stages,
+                    VELOCITY,
+                    np.broadcast_to(self.wind_mps, (len(stages), 3)),
+                    np.full(len(stages), 12.0),
+                    _AIRSPEED_WEIGHT,
+                )
+            )
         if len(self.space.keep_m):
             stage, normal, bound = separating_rows(self.space, path_m, _NEAR_M)
             made.append(_planes(stage, normal, bound))
