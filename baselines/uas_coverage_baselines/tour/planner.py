@@ -201,7 +201,7 @@ class Tour:
         is_guided = self._is_guided[i]
         changes = 0 if is_guided else self.options.changes
         led = None
-        if self._lead is not None and not is_guided and not self._returns[i]:
+        if self._lead is not None and not is_guided:
             led = self._lead.commands(i, x, task.route, view, belief, swarm, self._n_steps)
         self.last_led = led
         seconds = improve(
