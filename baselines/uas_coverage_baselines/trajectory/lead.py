@@ -15,7 +15,7 @@ from uas_coverage_env.autopilot.belief import wind_growth
 from uas_coverage_env.world.state import WIND
 
 KEPT = (0.1, 0.04)
-P = dict(margin=0.3, tube_s=3, kept=0.02, budget=80, idle=4, later=(0, 1), ahead=6, least=4, redraft=True, inset=0.3, blend=0.0)
+P = dict(margin=0.3, tube_s=3, kept=0.02, budget=80, idle=4, later=(0, 1, 2), ahead=6, least=4, redraft=True, inset=1.5, per_step=0.3, blend=0.0)
 
 class Lead:
     def __init__(self, **p): self.p = {**P, **p}
@@ -30,7 +30,7 @@ class Lead:
         self.stats = dict(asked=0, none=0, led=0, tracked=0, planned=0, failed=0, shorter=0)
     def flown(self, i, led):
         self.stats['led'] += led
-    def program(self, u, wind, start, ahead, end):
+    def program(self, u, wind, start, ahead, end, visits=None):
         """Of the next waypoints; the flight ends at the one after them, or landed."""
         fleet = self.fleets[0]
         program = fleet.program(u, {}, [], None)
@@ -39,7 +39,10 @@ class Lead:
         if np.hypot(*wind) > 1e-9:
             model = in_wind(model, wind, KEPT)
             air = np.append(wind, 0.0)
-        radius_m = fleet.radius_m - np.minimum(self.p['inset'], 0.1 * fleet.radius_m)
+        inset = np.minimum(self.p['inset'], 0.15 * fleet.radius_m)
+        if visits is not None and len(ahead):
+            inset[ahead] = np.minimum(inset[ahead], 0.1 + self.p['per_step'] * (visits - 1))
+        radius_m = fleet.radius_m - inset
         if end >= 0:
             landing = Landing(fleet.waypoints_m[end], radius_m[end], 20.0)
             program = replace(program, landing=landing)
@@ -72,8 +75,8 @@ class Lead:
             fits = n and (rest == route[:n]).all() and (old_end == (route[n] if len(route) > n else -1)) or (n == 0 and len(route) == 0 and old_end == -1)
             grow = n < len(ahead) and (self.p['redraft'] or n < self.p['least'])
             if fits and flight.steps > 1:
-                program = self.program(u, wind, start, rest, old_end)
                 visits = flight.visits[keep] - 1
+                program = self.program(u, wind, start, rest, old_end, np.maximum(visits, 1))
                 left = Flight(np.maximum(visits, 1), flight.x[1:], flight.u[1:], flight.costate[1:], flight.violation, flight.missed_m[keep])
                 new = None
                 for later in self.p['later']:
