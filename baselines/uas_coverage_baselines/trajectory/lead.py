@@ -15,7 +15,7 @@ from uas_coverage_env.autopilot.belief import wind_growth
 from uas_coverage_env.world.state import WIND
 
 KEPT = (0.1, 0.04)
-P = dict(margin=0.3, tube_s=3, kept=0.02, budget=80, idle=4, later=(0, 1, 2), ahead=6, least=4, redraft=True, inset=1.5, per_step=0.3, blend=0.0)
+P = dict(margin=0.3, tube_s=3, kept=0.02, budget=80, idle=4, later=(0, 1, 2), ahead=6, least=4, redraft=True, inset=1.5, per_step=0.3, blend=0.7)
 
 class Lead:
     def __init__(self, **p): self.p = {**P, **p}
@@ -50,6 +50,7 @@ class Lead:
     def commands(self, u, x, route, view, belief, swarm, n):
         self.stats['asked'] += 1
         wind = np.zeros(2) if belief is None else belief[WIND:WIND+2].copy()
+        own = wind
         if belief is not None and self.p['blend']:
             grown = wind_growth(-float(x[2]), 20.0)
             wind = (1-self.p['blend'])*wind + self.p['blend']*grown*view.wind_mps
@@ -62,7 +63,7 @@ class Lead:
             self.flights.pop(u, None)
             self.stats['none'] += 1
             return None
-        return self._commands(u, wind, flight, n)
+        return self._commands(u, own, flight, n)
     def _found(self, u, wind, start, route, swarm):
         known = self.flights.get(u)
         M = self.p['ahead']
