@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot.belief import GUSTS, VERTICAL_GUSTS
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     LIFT,
@@ -106,22 +107,25 @@ def flight_model(
     )
 
 
-def in_wind(model: FlightModel, wind_mps: FloatArray, kept: tuple[float, float]) -> FlightModel:
+def in_wind(model: FlightModel, wind_mps: FloatArray) -> FlightModel:
     """The same vehicle in a steady wind, with its velocity over ground.
+
+    In air that moves, a UAS flies as in still air, seen from the air. As the inner loop does, the
+    limits of speed leave room for gusts.
 
     Args:
         model: In still air.
         wind_mps: (2,) north and east.
-        kept: Share of the wind that is kept of the limits of horizontal and vertical speed.
     """
     air = np.zeros(N_X)
     air[[V_NORTH, V_EAST]] = wind_mps
     drift = air - model.A @ air
     drift[[NORTH, EAST]] += model.dt_s * wind_mps
-    wind = float(np.hypot(*wind_mps))
-    norms = model.norms.copy()
-    norms[0] -= kept[0] * wind
-    return model._replace(drift=drift, norms=norms, vertical=model.vertical - kept[1] * wind)
+    speed_mps = float(np.hypot(wind_mps[0], wind_mps[1]))
+    norms = model.norms - np.array([GUSTS * speed_mps, 0.0, 0.0])
+    return model._replace(
+        drift=drift, norms=norms, vertical=model.vertical - VERTICAL_GUSTS * speed_mps
+    )
 
 
 def reduced_state(x: FloatArray) -> FloatArray:

@@ -69,7 +69,7 @@ class Trajectory:
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
         self._has_acted = False
-        self._in_wind = InWind()
+        self._in_wind = InWind(self.options.margin_m)
         self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
