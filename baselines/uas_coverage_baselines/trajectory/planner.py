@@ -57,7 +57,7 @@ class Trajectory:
     An order of the waypoints is searched, the flights along it are convex programs that are made
     shorter as long as nothing is violated, and what is flown is verified with a backup trajectory.
     Plans are made anew where the state is another, or something moves otherwise. There is no clock
-    in any of it: the same seed flies the same mission. In a stated wind `tour`'s pursuit flies.
+    in any of it: the same seed flies the same mission. In a stated wind `tour` flies, see `InWind`.
     """
 
     Options = TrajectoryOptions
