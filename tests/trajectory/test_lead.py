@@ -108,7 +108,7 @@ class _AtTheTower:
 
 def test_what_leads_into_an_obstacle_is_not_flown():
     effort = SearchEffort(20_000, total_weight=0.6)
-    planner = Tour(effort=effort, leads=lambda brief, arena: _AtTheTower())
+    planner = Tour(effort=effort, make_leader=lambda brief, arena: _AtTheTower())
     flight = rollout(steady(), planner, max_steps=60, safety_filter=False)
     assert not flight.violations
     assert flight.breaches == 0

@@ -56,7 +56,7 @@ _OFF_MPS = 0.6  # a mean deviation with which no plan comes true
 _OFF_SHARE = 0.1  # of the last step in that mean
 
 
-class Leads(Protocol):
+class Leader(Protocol):
     """Plans in a wind what `Tour` flies where it is safe."""
 
     def commands(
@@ -99,8 +99,7 @@ class Tour:
     Args:
         options: See `TourOptions`.
         effort: Of the order's searches; None: by the options.
-        leads: Makes what plans ahead in a wind, of a mission and its arena, or None; None: nothing
-            does.
+        make_leader: Of a mission and its arena, what plans ahead in a wind; None: nothing does.
     """
 
     Options = TourOptions
@@ -110,11 +109,11 @@ class Tour:
         self,
         options: TourOptions | None = None,
         effort: SearchEffort | None = None,
-        leads: Callable[[MissionBrief, Arena], Leads | None] | None = None,
+        make_leader: Callable[[MissionBrief, Arena], Leader | None] | None = None,
     ) -> None:
         self.options = options or TourOptions()
         self._effort = effort or SearchEffort(self.options.moves)
-        self._make_lead = leads
+        self._make_leader = make_leader
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
         self._has_acted = False
@@ -146,7 +145,9 @@ class Tour:
         self._learnt: LearntWind | None = None
         if brief.conditions is not None:
             self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
-        self._lead = None if self._make_lead is None else self._make_lead(brief, self._arena)
+        self._leader: Leader | None = None
+        if self._make_leader is not None:
+            self._leader = self._make_leader(brief, self._arena)
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
@@ -244,11 +245,11 @@ class Tour:
 
     def _led(self, i: int, x: FloatArray, task: PursuitTask, step: int) -> FloatArray | None:
         """What is flown where it is safe, (0, 3) where there is no plan; None: no one plans."""
-        if self._lead is None or self._learnt is None:
+        if self._leader is None or self._learnt is None:
             return None
         led = None
         if not self._is_guided[i] and (task.cover_m >= 0.0).all():
-            led = self._lead.commands(i, step, x, task.route, self._learnt, self._n_steps)
+            led = self._leader.commands(i, step, x, task.route, self._learnt, self._n_steps)
         return np.zeros((0, 3)) if led is None else led
 
     def _task(self, i: int, view: View) -> PursuitTask:

@@ -42,7 +42,7 @@ class InWind:
             self._tour = None
             return False
         if self._tour is None or effort != self._effort:
-            self._tour, self._effort = Tour(effort=effort, leads=self._lead), effort
+            self._tour, self._effort = Tour(effort=effort, make_leader=self._lead), effort
         self._tour.reset(brief, seed)
         return True
 
