@@ -58,7 +58,7 @@ _GROWTH = 0.2
 """Of a wind, what it grows by while the height grows by a factor of e: by the logarithmic law, at
 some metres above open country."""
 
-_VERTICAL_GUSTS = 0.04
+VERTICAL_GUSTS = 0.04
 """What is kept of the limits of climb and descent for gusts, of the wind believed in."""
 
 MOST_SINK_MPS2 = 3.0
@@ -114,7 +114,7 @@ def ground_speed(most_mps, kept, wind_north_mps, wind_east_mps, north, east):
 @inlined_kernel
 def vertical_margin_mps(belief):
     """By how much slower than its limits a UAS climbs and descends in the wind believed in."""
-    return _VERTICAL_GUSTS * math.sqrt(belief[WIND] ** 2 + belief[WIND + 1] ** 2)
+    return VERTICAL_GUSTS * math.sqrt(belief[WIND] ** 2 + belief[WIND + 1] ** 2)
 
 
 @inlined_kernel

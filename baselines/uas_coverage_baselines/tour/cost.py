@@ -144,7 +144,7 @@ def _seconds_to(arena, i, task, x, covered, belief):
 
 
 @allocating_kernel
-def _surroundings_cost(arena, i, task, plan, n_flown, others_m):
+def surroundings_cost(arena, i, task, plan, n_flown, others_m):
     """Cost of coming near to other UAS and to what moves."""
     cost = 0.0
     for j in range(others_m.shape[0]):
@@ -206,4 +206,4 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s, belief=None):
         cost += _seconds_to(arena, i, task, plan.x[n_steps], plan.covered[n_steps], belief)
     if cost > limit_s:
         return math.inf
-    return cost + _surroundings_cost(arena, i, task, plan, n_flown, around.others_m)
+    return cost + surroundings_cost(arena, i, task, plan, n_flown, around.others_m)

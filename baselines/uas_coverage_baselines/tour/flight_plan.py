@@ -9,8 +9,15 @@ from __future__ import annotations
 
 import math
 
-from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, cost_s, distances_kept
-from uas_coverage_baselines.tour.pursuit import LEGS, aim, begin, pull_clear, push_to_guidance
+from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, cost_s, distances_kept, surroundings_cost
+from uas_coverage_baselines.tour.pursuit import (
+    LEGS,
+    aim,
+    begin,
+    pull_clear,
+    push_to,
+    push_to_guidance,
+)
 from uas_coverage_env.compiled.kernels import allocating_kernel
 
 _STRETCH_S = 5.0  # the longest stretch that a change touches
@@ -73,7 +80,9 @@ def _copy(plan, other, first):
 
 
 @allocating_kernel
-def improve(arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, command, belief=None):
+def improve(
+    arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, command, belief=None, led=None
+):
     """Plan the coming seconds of a UAS.
 
     Args:
@@ -89,6 +98,8 @@ def improve(arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, comma
         rng: Source of random numbers.
         command: A record of COMMAND_DTYPE, written.
         belief: (N_BELIEF,) of its inner loop; None: in still air.
+        led: (N, 3) commands that are flown as they are where they are safe; None, or none: those
+            found here.
 
     Returns:
         Estimated flight time to the end [s]; above SAFE_BELOW_S where the plan is not safe.
@@ -102,6 +113,17 @@ def improve(arena, i, task, others_m, plan, trial, n_kept, n_changes, rng, comma
         aim(arena, i, task, trial, leg)
         if leg >= n_kept:
             aim(arena, i, task, plan, leg)
+    if led is not None and len(led):
+        trial.share[:] = 1.0
+        push_to(arena, i, task, trial, led, command, belief)
+        cost = cost_s(arena, i, task, trial, 0, around, command, math.inf, belief)
+        n_steps = len(led)
+        if (
+            cost < SAFE_BELOW_S
+            and surroundings_cost(arena, i, task, trial, n_steps, others_m) <= 0.0
+        ):
+            _copy(plan, trial, 0)
+            return cost
     trial.push[:] = 0.0
     trial.share[:] = 1.0
     best = cost_s(arena, i, task, trial, 0, around, command, math.inf, belief)

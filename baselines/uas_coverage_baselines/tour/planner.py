@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,15 @@ from uas_coverage_env.mission import (
     without,
 )
 from uas_coverage_env.vehicle import VX, VY, VZ
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, Command, GoTo, SwarmState, Velocity
+from uas_coverage_env.world import (
+    COMMAND_DTYPE,
+    FLYING,
+    Arena,
+    Command,
+    GoTo,
+    SwarmState,
+    Velocity,
+)
 
 FloatArray = NDArray[np.float64]
 _HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improve
@@ -45,6 +54,21 @@ _LEG_SEARCHES = 3
 _SURPRISE_MPS = 0.3  # a larger deviation means that another flew: the filter, return mode
 _OFF_MPS = 0.6  # a mean deviation with which no plan comes true
 _OFF_SHARE = 0.1  # of the last step in that mean
+
+
+class Leader(Protocol):
+    """Plans in a wind what `Tour` flies where it is safe."""
+
+    def commands(
+        self,
+        uas: int,
+        step: int,
+        x: FloatArray,
+        route: NDArray[np.int64],
+        learnt: LearntWind,
+        n_steps: int,
+    ) -> FloatArray | None:
+        """(N, 3) velocities north and east [m/s], and altitudes [m]; None: no plan."""
 
 
 class TourOptions(AssistedOptions):
@@ -75,16 +99,21 @@ class Tour:
     Args:
         options: See `TourOptions`.
         effort: Of the order's searches; None: by the options.
+        make_leader: Of a mission and its arena, what plans ahead in a wind; None: nothing does.
     """
 
     Options = TourOptions
     comes_home_by_legs = True
 
     def __init__(
-        self, options: TourOptions | None = None, effort: SearchEffort | None = None
+        self,
+        options: TourOptions | None = None,
+        effort: SearchEffort | None = None,
+        make_leader: Callable[[MissionBrief, Arena], Leader | None] | None = None,
     ) -> None:
         self.options = options or TourOptions()
         self._effort = effort or SearchEffort(self.options.moves)
+        self._make_leader = make_leader
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
         self._has_acted = False
@@ -116,6 +145,9 @@ class Tour:
         self._learnt: LearntWind | None = None
         if brief.conditions is not None:
             self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
+        self._leader: Leader | None = None
+        if self._make_leader is not None:
+            self._leader = self._make_leader(brief, self._arena)
         n_uas = len(brief.uas)
         self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
         self._rng = np.random.default_rng([seed, n_uas])
@@ -199,7 +231,7 @@ class Tour:
         changes = 0 if is_guided else self.options.changes
         seconds = improve(
             self._arena, i, task, others_m, plan, self._trial, n_kept, changes, self._rng,
-            self._command, belief,
+            self._command, belief, self._led(i, x, task, swarm.step),
         )  # fmt: skip
         others_m[i] = plan.path_m
         mode = "covering" if len(task.route) else "return"
@@ -210,6 +242,15 @@ class Tour:
             return GoTo(int(task.route[0]) if len(task.route) else None, mode)
         north_mps, east_mps, altitude_m = plan.commands[0].tolist()
         return Velocity(north_mps, east_mps, altitude_m, mode)
+
+    def _led(self, i: int, x: FloatArray, task: PursuitTask, step: int) -> FloatArray | None:
+        """What is flown where it is safe, (0, 3) where there is no plan; None: no one plans."""
+        if self._leader is None or self._learnt is None:
+            return None
+        led = None
+        if not self._is_guided[i] and (task.cover_m >= 0.0).all():
+            led = self._leader.commands(i, step, x, task.route, self._learnt, self._n_steps)
+        return np.zeros((0, 3)) if led is None else led
 
     def _task(self, i: int, view: View) -> PursuitTask:
         schedule = self._schedule

@@ -269,6 +269,17 @@ def push_to_guidance(arena, i, task, plan, command, belief=None):
 
 
 @allocating_kernel
+def push_to(arena, i, task, plan, wanted, command, belief=None):
+    """Choose the pushes so that given commands (N, 3) are flown, within the limits."""
+    for k in range(plan.commands.shape[0]):
+        plan.push[k] = 0.0
+        _pursue(arena, i, task, plan, k)
+        for axis in range(3):
+            plan.push[k, axis] = wanted[k, axis] - plan.commands[k, axis]
+        fly_step(arena, i, task, plan, k, command, belief)
+
+
+@allocating_kernel
 def aim(arena, i, task, plan, leg):
     """Aim a leg anew: at the side of the sphere where the flight turns, and climbs or descends."""
     waypoint = arena.waypoints[task.route[leg]]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot.belief import GUSTS, VERTICAL_GUSTS
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import (
     LIFT,
@@ -47,7 +48,7 @@ _ACCELERATION_WEIGHT, _LIFT_WEIGHT = 2e-3, 2e-5  # on squared inputs: break ties
 
 
 class FlightModel(NamedTuple):
-    """x(n+1) = A x(n) + B u(n), and what is allowed of x and u.
+    """x(n+1) = A x(n) + B u(n) + drift, and what is allowed of x and u.
 
     Inputs are the angular accelerations that push north and east [rad/s²], and the lift [N].
     """
@@ -67,6 +68,8 @@ class FlightModel(NamedTuple):
     """(3,)"""
     input_weight: FloatArray
     """(3,) cost of squared inputs."""
+    drift: FloatArray
+    """(10,) what the wind adds to x(n+1); zero in still air."""
 
 
 def flight_model(
@@ -100,6 +103,28 @@ def flight_model(
         input_low=share * np.array([-alpha[0], -alpha[1], vehicle.lift_min_N]),
         input_high=share * np.array([alpha[0], alpha[1], vehicle.lift_max_N]),
         input_weight=np.array([_ACCELERATION_WEIGHT, _ACCELERATION_WEIGHT, _LIFT_WEIGHT]),
+        drift=np.zeros(N_X),
+    )
+
+
+def in_wind(model: FlightModel, wind_mps: FloatArray) -> FlightModel:
+    """The same vehicle in a steady wind, with its velocity over ground.
+
+    In air that moves, a UAS flies as in still air, seen from the air. As the inner loop does, the
+    limits of speed leave room for gusts.
+
+    Args:
+        model: In still air.
+        wind_mps: (2,) north and east.
+    """
+    air = np.zeros(N_X)
+    air[[V_NORTH, V_EAST]] = wind_mps
+    drift = air - model.A @ air
+    drift[[NORTH, EAST]] += model.dt_s * wind_mps
+    speed_mps = float(np.hypot(wind_mps[0], wind_mps[1]))
+    norms = model.norms - np.array([GUSTS * speed_mps, 0.0, 0.0])
+    return model._replace(
+        drift=drift, norms=norms, vertical=model.vertical - VERTICAL_GUSTS * speed_mps
     )
 
 

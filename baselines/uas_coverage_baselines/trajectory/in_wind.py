@@ -1,6 +1,8 @@
-"""In a stated wind no flight that is planned in still air comes true: the pursuit of `tour` flies.
+"""In a stated wind no flight that is planned in still air comes true: `tour` flies.
 
 It follows an order of its own, searched with the moves and the weight of energy of `trajectory`.
+In winds up to a moderate one, flights of the coming half minute are planned (`lead`), and flown
+where `tour` finds them safe; else its pursuit.
 """
 
 from __future__ import annotations
@@ -9,9 +11,12 @@ from collections.abc import Mapping
 
 from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour import Tour
+from uas_coverage_baselines.trajectory.lead import Lead
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.world import Command, SwarmState
+from uas_coverage_env.world import Arena, Command, SwarmState
+
+_LED_MPS = 7.0  # in a stronger mean wind the pursuit flies alone
 
 
 def blows(brief: MissionBrief) -> bool:
@@ -20,9 +25,14 @@ def blows(brief: MissionBrief) -> bool:
 
 
 class InWind:
-    """Flies the missions in which a wind blows."""
+    """Flies the missions in which a wind blows.
 
-    def __init__(self) -> None:
+    Args:
+        margin_m: Planned beyond the distances that count as a breach.
+    """
+
+    def __init__(self, margin_m: float) -> None:
+        self._margin_m = margin_m
         self._tour: Tour | None = None
         self._effort: SearchEffort | None = None
 
@@ -32,9 +42,15 @@ class InWind:
             self._tour = None
             return False
         if self._tour is None or effort != self._effort:
-            self._tour, self._effort = Tour(effort=effort), effort
+            self._tour, self._effort = Tour(effort=effort, make_leader=self._lead), effort
         self._tour.reset(brief, seed)
         return True
+
+    def _lead(self, brief: MissionBrief, arena: Arena) -> Lead | None:
+        conditions = brief.conditions
+        if conditions is None or conditions.mean_mps > _LED_MPS:
+            return None
+        return Lead(brief, arena, self._margin_m)
 
     def act(self, swarm: SwarmState) -> tuple[Mapping[str, Command], Decision | None] | None:
         """The commands of a step and what is decided; None where nothing is flown here."""

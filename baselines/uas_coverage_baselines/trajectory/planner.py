@@ -57,7 +57,7 @@ class Trajectory:
     An order of the waypoints is searched, the flights along it are convex programs that are made
     shorter as long as nothing is violated, and what is flown is verified with a backup trajectory.
     Plans are made anew where the state is another, or something moves otherwise. There is no clock
-    in any of it: the same seed flies the same mission. In a stated wind `tour`'s pursuit flies.
+    in any of it: the same seed flies the same mission. In a stated wind `tour` flies, see `InWind`.
     """
 
     Options = TrajectoryOptions
@@ -69,7 +69,7 @@ class Trajectory:
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
         self._has_acted = False
-        self._in_wind = InWind()
+        self._in_wind = InWind(self.options.margin_m)
         self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:

@@ -37,6 +37,7 @@ _HEIGHT_SPARE_M = 0.2  # within the heights from which a waypoint may be covered
 _LANDING_SHARE = 0.9, 0.85  # of landing distance and speed
 _LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
 _CLEAR_WEIGHT = 2.0  # of 1 m too near
+_AIRSPEED_WEIGHT = 4.0  # of 1 m/s too much
 _HOPELESS = 3.0  # more violation than this is no matter of faces
 
 
@@ -46,6 +47,19 @@ class Landing:
 
     home_m: FloatArray
     distance_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True)
+class Air:
+    """Air that moves.
+
+    Attributes:
+        wind_mps: (3,) its velocity, north, east and down.
+        speed_mps: Highest airspeed.
+    """
+
+    wind_mps: FloatArray
     speed_mps: float
 
 
@@ -113,6 +127,7 @@ class FlightProgram:
         bodies: On known paths from step 0.
         earliest: (W,) steps before which a waypoint is not to be visited.
         loose: Factors on the limits of the first stages, for a start beyond them.
+        air: In which the airspeed is limited, too; None: in still air.
         solved: How many programs were solved: the effort.
     """
 
@@ -125,6 +140,7 @@ class FlightProgram:
     bodies: Sequence[Body] = ()
     earliest: IntArray | None = None
     loose: FloatArray | None = None
+    air: Air | None = None
     solved: int = field(default=0)
 
     def solve(
@@ -231,6 +247,11 @@ class FlightProgram:
         ]
         if self.asked is not None:
             made += _as_asked(self.asked, route, visits)
+        if self.air is not None:
+            stages = np.arange(1, n_steps)
+            wind_mps = np.tile(self.air.wind_mps, (len(stages), 1))
+            most_mps = np.full(len(stages), self.air.speed_mps)
+            made.append(_balls(stages, VELOCITY, wind_mps, most_mps, _AIRSPEED_WEIGHT))
         if len(self.space.keep_m):
             stage, normal, bound = separating_rows(self.space, path_m, _NEAR_M)
             made.append(_planes(stage, normal, bound))

@@ -67,7 +67,7 @@ def evaluate(model, loose, rows, x, u, values):
                 value += model.A[i, j] * x[n, j]
             for j in range(N_U):
                 value += model.B[i, j] * u[n, j]
-            values.dynamics[n, i] = value
+            values.dynamics[n, i] = value + model.drift[i]
     for k in range(len(rows.stage)):
         n, bound = rows.stage[k], rows.bound[k]
         value = 0.0

@@ -24,13 +24,13 @@ from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 
-_KEPT_BACK = 0.02  # share of the limits that is left to what the model does not know
+KEPT_BACK = 0.02  # share of the limits that is left to what the model does not know
 _SETTLING = np.linspace(1.0, 0.0, 8)[:-1]  # share of an excess that is allowed in the first steps
 _LATER = (0, 1, 2, 4)  # steps
 
 
-def _loose(model: FlightModel, start: FloatArray) -> FloatArray:
-    """Factors on the limits of the first steps, for a start that is beyond them."""
+def loosened(model: FlightModel, start: FloatArray) -> FloatArray:
+    """(K,) factors on the limits of the first steps, for a start that is beyond them."""
     norms = np.linalg.norm(start[NORMS], axis=1) / model.norms
     vertical = np.array([-start[V_DOWN], start[V_DOWN]]) / model.vertical
     excess = max(float(norms.max()), float(vertical.max()), 1.0) - 1.0
@@ -61,8 +61,8 @@ def tracked(
         return None
     start = reduced_state(swarm.x[uas])
     program = fleet.program(uas, others_m, movers, None)
-    model = flight_model(fleet.arena.vehicles[uas], _KEPT_BACK)
-    program = replace(program, model=model, loose=_loose(model, start))
+    model = flight_model(fleet.arena.vehicles[uas], KEPT_BACK)
+    program = replace(program, model=model, loose=loosened(model, start))
     for later in _LATER:
         new = retimed(program, start, route, rest, rest.visits + later, steps + later)
         if new.is_clear and trouble_alone(fleet, uas, swarm.x[uas], new, loose=True) is None:
