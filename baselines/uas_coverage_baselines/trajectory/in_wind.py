@@ -1,8 +1,8 @@
 """In a stated wind no flight that is planned in still air comes true: `tour` flies.
 
 It follows an order of its own, searched with the moves and the weight of energy of `trajectory`.
-In winds up to a moderate one, flights of the coming half minute are planned (`lead`), and flown
-where `tour` finds them safe; else its pursuit.
+In light wind, flights of the coming half minute are planned (`lead`), and flown where `tour` finds
+them safe; else its pursuit.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Arena, Command, SwarmState
 
-_LED_MPS = 7.0  # in a stronger mean wind the pursuit flies alone
+_LED_MPS = 4.0  # in a stronger mean wind the pursuit flies alone
 
 
 def blows(brief: MissionBrief) -> bool:
