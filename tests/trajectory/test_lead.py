@@ -5,7 +5,6 @@ import pytest
 from small_fleets import every_waypoint, field
 from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour import Tour
-from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_baselines.trajectory.flight_model import (
     flight_model,
     in_wind,
@@ -87,8 +86,10 @@ def test_what_leads_visits_all_waypoints_and_lands_within_its_airspeed(led):
 
 def test_a_mission_in_a_steady_wind_takes_less_than_by_the_pursuit_alone():
     effort = SearchEffort(20_000, total_weight=0.6)
-    pursued = rollout(steady(4.0), Tour(effort=effort))
-    led = rollout(steady(4.0), Trajectory(Trajectory.Options(moves=20_000)))
+    pursued, led = (
+        rollout(steady(), Tour(effort=effort, make_leader=make_leader))
+        for make_leader in (None, lambda brief, arena: Lead(brief, arena, 0.3))
+    )
     assert accomplished(pursued)
     assert accomplished(led)
     assert led.safety_filter
