@@ -23,6 +23,7 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
     "trajectory": ({}, None),
     "learned-waypoint": ({}, None),
     "learned-velocity": ({}, None),
+    "learned-route": ({}, None),
     "milp-mpc": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
     "milp-mpc-guided": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
 }
@@ -34,10 +35,11 @@ _MISSIONS = {
     "tour": (3, 60),
     "trajectory": (2, 30),
     "learned-waypoint": (1, 30),
+    "learned-route": (1, 30),
     "milp-mpc": (2, 30),
     "milp-mpc-guided": (2, 30),
 }
-_OTHERS = (10, 300)
+_OTHERS = (10, 400)
 
 
 class _Timed:
