@@ -136,7 +136,7 @@ def test_a_uas_that_has_landed_rests_and_exceeds_nothing():
 
 
 def test_the_limits_are_told_in_the_documentation_as_they_are():
-    text = Path(__file__).parents[2].joinpath("docs", "environment.md").read_text(encoding="utf-8")
+    text = Path(__file__).parents[2].joinpath("docs", "rules.md").read_text(encoding="utf-8")
     for bit, limit in enumerate(LIMITS):
         assert f"| {bit} | `{limit.name}` | {limit.unit} | {limit.meaning} |" in text
     assert f"tolerance is {LPV_TOLERANCE:.0%} of the limit" in text.replace(" %", "%")

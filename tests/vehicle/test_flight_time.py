@@ -18,7 +18,7 @@ from uas_coverage_env.vehicle.range import (
 
 SPEEDS = Speeds(level_mps=10.0, climb_mps=3.0, descent_mps=2.0)
 PACES = {name: value for name, value in vars(range).items() if isinstance(value, Pace)}
-DOCS = Path(__file__).parents[2] / "docs" / "range.md"
+DOCS = Path(__file__).parents[2] / "docs" / "range_method.md"
 
 
 def test_of_level_flight_and_descent_at_once_the_slower_decides():
