@@ -14,7 +14,9 @@ from uas_coverage_env.flight import (
     summary,
 )
 
-_ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped"}
+ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped"}
+"""What ended a flight before the mission did."""
+
 NONE = "-"
 _ALIKE = 0.005
 _NAMED = 8
@@ -28,7 +30,7 @@ def verdict(flight: Flight) -> str:
         return "mission accomplished: everything covered, every UAS home, no violation"
     result = summary(flight)
     lacks = [
-        _ENDED[flight.ended],
+        ENDED[flight.ended],
         "" if result["coverage"] == 1.0 else f"{result['coverage']:.0%} covered",
         "" if result["all_home"] else f"not home: {_not_home(flight)}",
         _several(len(flight.violations), "violation"),
@@ -64,7 +66,7 @@ def figures(flight: Flight) -> dict[str, str]:
         "seed": str(flight.seed),
         "model": flight.dynamics,
         "accomplished": "yes" if accomplished(flight) else "no",
-        "ended": _ENDED[flight.ended] or "complete",
+        "ended": ENDED[flight.ended] or "complete",
         "covered": f"{result['coverage']:.0%}",
         "ground seen": ", ".join(f"{name} {share:.1%}" for name, share in seen.items()) or NONE,
         "all home": "yes" if result["all_home"] else f"not {_not_home(flight)}",

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from uas_coverage_env.cli.figures_of_flight import beside_the_best, by_uas, verdict
+from uas_coverage_env.cli.figures_of_flight import ENDED, beside_the_best, by_uas, verdict
 from uas_coverage_env.flight import (
     Flight,
     accomplished,
@@ -40,9 +40,9 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         screen.print(f"violation: {violation}", markup=False, style="red")
     result = summary(flight)
     low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
-    ended = {"complete": "", "steps": ", limit of steps reached", "stopped": ", stopped"}
+    steps = ", ".join(filter(None, (f"{flight.steps} steps", ENDED[flight.ended])))
     screen.print(
-        f"covered {result['coverage']:.0%} in {flight.steps} steps{ended[flight.ended]}; "
+        f"covered {result['coverage']:.0%} in {steps}; "
         f"{'all home' if result['all_home'] else 'not all home'}; "
         f"{result['energy_Wh']:.2f} Wh; {len(flight.violations)} violations, "
         f"{flight.breaches} breaches{low}",
