@@ -147,22 +147,20 @@ class Lead:
         before = self._ahead.get(uas)
         if before is None or before.flight.steps < 2:
             return None
-        kept = np.isin(before.route, route)
-        rest, old = before.route[kept], before.flight
+        kept = np.flatnonzero(np.isin(before.route, route))
+        rest, left = before.route[kept], before.flight.after(1, kept)
         n = len(rest)
         end = int(route[n]) if n < len(route) else -1
         if not np.array_equal(rest, route[:n]) or end != before.end:
             return None
         if n < min(_AHEAD, len(route)):  # one has been visited: the flight may go on farther
             return None
-        visits = np.maximum(old.visits[kept] - 1, 1)
+        visits = np.maximum(left.visits, 1)
         inside_m = self._inside_m
         soon_m = _INSIDE_SOON_M + _INSIDE_PER_STEP_M * (visits - 1)
         inside_m[rest] = np.minimum(inside_m[rest], soon_m)
         program = self._program(uas, start, end, wind_mps, inside_m)
-        left = Flight(
-            *(visits, old.x[1:], old.u[1:], old.costate[1:]), old.violation, old.missed_m[kept]
-        )
+        left = replace(left, visits=visits)
         for later in _LATER:
             new = retimed(program, start, rest, left, visits + later, left.steps + later)
             if new.is_clear:

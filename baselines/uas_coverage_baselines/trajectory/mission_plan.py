@@ -110,19 +110,9 @@ class Planned:
 
     def rest(self, step: int, uncovered: NDArray[np.bool_]) -> tuple[IntArray, Flight]:
         """The route that is left at a sample, in order of time, and the flight along it."""
-        left, done = self.open_visits(step, uncovered), step - self.course.begin
-        flight = self.flight
-        route, visits, missed_m = self.route[left], flight.visits[left], flight.missed_m[left]
-        order = np.argsort(visits, kind="stable")
-        rest = Flight(
-            visits[order] - done,
-            flight.x[done:],
-            flight.u[done:],
-            flight.costate[done:],
-            flight.violation,
-            missed_m[order],
-        )
-        return route[order], rest
+        left = np.flatnonzero(self.open_visits(step, uncovered))
+        left = left[np.argsort(self.flight.visits[left], kind="stable")]
+        return self.route[left], self.flight.after(step - self.course.begin, left)
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,17 @@ class Flight:
     violation: float
     missed_m: FloatArray
 
+    def after(self, steps: int, visits: IntArray) -> Flight:
+        """What is left of it after some steps, with some of its visits (indices)."""
+        return Flight(
+            self.visits[visits] - steps,
+            self.x[steps:],
+            self.u[steps:],
+            self.costate[steps:],
+            self.violation,
+            self.missed_m[visits],
+        )
+
     @property
     def steps(self) -> int:
         """N."""
