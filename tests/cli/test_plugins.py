@@ -12,11 +12,14 @@ def greet(name: str) -> None:
 
 
 @pytest.fixture(autouse=True)
-def others(monkeypatch):
-    """A command of another package, and one whose package is broken."""
+def others(tmp_path, monkeypatch):
+    """A command of another package, one whose package is missing, and one whose package fails."""
+    (tmp_path / "failing_commands.py").write_text('raise RuntimeError("no licence")')
+    monkeypatch.syspath_prepend(tmp_path)
     entries = [
         EntryPoint("greet", f"{__name__}:greet", plugins.GROUP),
         EntryPoint("broken", "no_such_package_at_all:command", plugins.GROUP),
+        EntryPoint("failing", "failing_commands:command", plugins.GROUP),
     ]
     monkeypatch.setattr(plugins, "entry_points", lambda group: entries)
 
@@ -28,8 +31,18 @@ def test_another_package_adds_a_command(capsys):
 
 def test_a_broken_command_says_so_when_it_is_called_and_harms_no_other(capsys):
     assert main(["broken"]) == 2
-    said = "error: command 'broken' cannot be loaded: No module named 'no_such_package_at_all'\n"
+    said = (
+        "error: command 'broken' cannot be loaded: ModuleNotFoundError: "
+        "No module named 'no_such_package_at_all'\n"
+    )
     assert capsys.readouterr().err == said
+
+
+def test_a_command_whose_module_raises_is_one_line_with_its_place(capsys):
+    assert main(["failing"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: command 'failing' cannot be loaded: RuntimeError: no licence (")
+    assert said.endswith("failing_commands.py:1)\n")
 
 
 def test_commands_of_other_packages_are_listed_with_what_they_say(capsys):

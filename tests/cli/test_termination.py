@@ -1,35 +1,98 @@
-"""Ctrl-C and SIGTERM: one line, and what was flown is kept."""
+"""Ctrl-C, SIGTERM and SIGHUP: one line, and what was flown is kept."""
 
+import errno
+import io
 import json
 import os
 import signal
+import sys
 from contextlib import contextmanager
 from functools import partial
 
 import pytest
+from rich.console import Console
 
-from uas_coverage_env import Flight
-from uas_coverage_env.cli import app, main, run
+from uas_coverage_env import Flight, load_scenario
+from uas_coverage_env.cli import app, main, progress, run
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-def test_sigterm_ends_a_flight_as_ctrl_c_does_and_keeps_what_was_flown(elsewhere, monkeypatch):
-    @contextmanager
-    def terminating(*_, **__):
-        def on_step(progress):
-            if progress.swarm.step == 4:
-                os.kill(os.getpid(), signal.SIGTERM)
+@contextmanager
+def ending(number):
+    """In place of what is shown: a signal that comes at the fourth step."""
 
-        yield on_step
+    def on_step(progress):
+        if progress.swarm.step == 4:
+            os.kill(os.getpid(), number)
 
-    handler = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(run, "shown", terminating)
+    yield on_step
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "SIGTERM",
+        pytest.param("SIGHUP", marks=pytest.mark.skipif(os.name != "posix", reason="POSIX")),
+    ],
+)
+def test_a_scheduler_or_a_lost_terminal_ends_a_flight_as_ctrl_c_does_and_what_was_flown_is_kept(
+    elsewhere, monkeypatch, name
+):
+    number = getattr(signal, name)
+    handler = signal.getsignal(number)
+    monkeypatch.setattr(run, "shown", lambda *_, **__: ending(number))
     assert main(["run", "open_field", "--planner", "hover", "--out", "mine"]) == 1
     flight = Flight.load("mine")
     assert flight.ended == "stopped"
     assert 4 <= flight.steps <= 5
-    assert signal.getsignal(signal.SIGTERM) is handler
+    assert signal.getsignal(number) is handler
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX")
+def test_nohup_flies_on_when_the_terminal_is_lost(elsewhere, monkeypatch):
+    handler = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    monkeypatch.setattr(run, "shown", lambda *_, **__: ending(signal.SIGHUP))
+    try:
+        main(["run", "open_field", "--planner", "hover", "--steps", "6", "--out", "mine"])
+    finally:
+        signal.signal(signal.SIGHUP, handler)
+    assert Flight.load("mine").steps == 6
+
+
+class _Gone(io.StringIO):
+    """A terminal or a pipe whose other end goes away once something has been written."""
+
+    def __init__(self, reason, *, terminal):
+        super().__init__()
+        self.reason, self.terminal = reason, terminal
+
+    def isatty(self):
+        return self.terminal
+
+    def write(self, text):
+        if self.tell():
+            raise OSError(self.reason, os.strerror(self.reason))
+        return super().write(text)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_terminal_that_is_gone_takes_no_flight_with_it(elsewhere, monkeypatch, terminal):
+    monkeypatch.setattr(progress, "_SECONDS_BETWEEN_LINES", 0.0)
+    with monkeypatch.context() as gone:
+        gone.setattr(sys, "stdout", _Gone(errno.EIO, terminal=terminal))
+        main(["run", "open_field", "--planner", "hover", "--steps", "6", "--out", "mine"])
+    assert Flight.load("mine").steps == 6
+
+
+@pytest.mark.parametrize("error", [OSError, SystemExit])
+def test_other_errors_than_those_of_the_terminal_are_not_hidden(error):
+    def fails():
+        raise error
+
+    out = Console(file=_Gone(errno.EIO, terminal=True), force_terminal=True)
+    with pytest.raises(error), progress.shown(out, load_scenario("open_field")):
+        fails()
 
 
 @pytest.mark.usefixtures("python_handles_interrupts")

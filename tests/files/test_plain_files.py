@@ -23,6 +23,11 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
         read_bytes(tmp_path / "pipe")
 
 
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    (tmp_path / "notes.toml").write_bytes(b"\xef\xbb\xbfname = 1\r\n")
+    assert read_text(tmp_path / "notes.toml") == "name = 1\n"
+
+
 @posix
 def test_a_device_behind_a_link_is_refused(tmp_path):
     (tmp_path / "zeros").symlink_to("/dev/zero")

@@ -337,6 +337,19 @@ def test_a_wrong_field_is_named(saved, name, path, value, words):
         assert "is missing" in refusal(saved)
 
 
+@pytest.mark.parametrize("name", ["flight.csv", "rewards.csv"])
+def test_a_sample_that_is_there_twice_is_refused(saved, name):
+    lines = (saved / name).read_text().splitlines(keepends=True)
+    (saved / name).write_text("".join([*lines, lines[3]]))
+    words = f"line {len(lines) + 1}: sample 1 of left is there twice"
+    assert refusal(saved) == f"{saved / name}: was damaged: {words}"
+
+
+def test_a_planner_that_predicts_nothing_needs_no_file_of_predictions(flight, saved):
+    (saved / "plan.csv").unlink()
+    assert Flight.load(saved) == flight
+
+
 def test_a_folder_without_a_flight_is_named(tmp_path):
     with pytest.raises(InputError, match=r"scenario\.json: cannot be read"):
         Flight.load(tmp_path)

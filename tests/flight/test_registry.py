@@ -4,6 +4,7 @@ from typing import Literal
 import pytest
 from pydantic import Field
 
+from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     PlannerOptions,
@@ -117,8 +118,53 @@ def test_planners_are_described_as_a_person_types_them():
 
 @pytest.mark.usefixtures("tuned")
 def test_a_planner_whose_package_is_missing_is_refused_in_one_line():
-    with pytest.raises(InputError, match="'broken' cannot be loaded: No module named"):
+    with pytest.raises(InputError, match=r"'broken' cannot be loaded: .*No module named"):
         load_planner("broken")
+
+
+class Bare:
+    """Has no options."""
+
+    def reset(self, brief, seed):
+        pass
+
+    def act(self, swarm):
+        return {}
+
+
+@pytest.fixture
+def announced(tmp_path, monkeypatch):
+    """What another package announces beside the planners of this one, which come before it."""
+    (tmp_path / "failing_planners.py").write_text('raise RuntimeError("no licence")')
+    monkeypatch.syspath_prepend(tmp_path)
+    ours = [entry for entry in entry_points(registry.GROUP) if entry.name == "hover"]
+    others = [
+        EntryPoint("bare", f"{__name__}:Bare", registry.GROUP),
+        EntryPoint("failing", "failing_planners:Planner", registry.GROUP),
+        EntryPoint("hover", f"{__name__}:Bare", registry.GROUP),
+    ]
+    monkeypatch.setattr(registry, "entry_points", lambda group: [*ours, *others])
+
+
+@pytest.mark.usefixtures("announced")
+def test_an_announced_planner_needs_no_options():
+    assert isinstance(load_planner("bare"), Bare)
+    with pytest.raises(InputError, match="'bare' has no option 'speed'; allowed: none"):
+        load_planner("bare", {"speed": 1})
+
+
+@pytest.mark.usefixtures("announced")
+def test_a_package_that_fails_is_one_line_and_harms_no_other_planner():
+    with pytest.raises(InputError, match="'failing' cannot be loaded: RuntimeError: no licence"):
+        load_planner("failing")
+    missing = {planner.name: planner.missing for planner in describe_planners()}
+    assert missing["failing"].startswith("RuntimeError: no licence")
+    assert not missing["bare"]
+
+
+@pytest.mark.usefixtures("announced")
+def test_a_planner_of_this_package_keeps_its_name():
+    assert type(load_planner("hover")).__name__ == "Hover"
 
 
 def test_a_planner_that_was_not_announced_goes_by_the_name_of_its_class():

@@ -8,6 +8,7 @@ import pytest
 
 from uas_coverage_env import evaluate
 from uas_coverage_env.env import CoverageParallelEnv
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.scenario import SERIES, Family, Size, installed_families, warnings
 from uas_coverage_env.scenario import families as package
 from uas_coverage_env.scenario.families import BUILT_IN
@@ -144,6 +145,21 @@ def test_a_family_of_ones_own_is_announced_by_an_entry_point(monkeypatch):
     env = CoverageParallelEnv("mine", max_cycles=2)
     env.reset(seed=0)
     assert len(env.scenario.waypoints) == 3
+
+
+def test_a_family_that_cannot_be_loaded_says_so_when_it_is_asked_for_and_harms_no_other(
+    monkeypatch,
+):
+    class Entry:
+        name = "broken"
+
+        def load(self):
+            raise RuntimeError("no licence")
+
+    monkeypatch.setattr(package, "entry_points", lambda group: [Entry()])
+    assert CoverageParallelEnv("village").reset(seed=0)
+    with pytest.raises(InputError, match="family 'broken' cannot be loaded: RuntimeError: no lic"):
+        CoverageParallelEnv("broken")
 
 
 def test_a_family_in_wind_has_the_wind_of_the_level():

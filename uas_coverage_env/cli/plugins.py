@@ -9,9 +9,9 @@ from importlib.metadata import EntryPoint
 from typing import Any, NoReturn
 
 from uas_coverage_env.cli.lazy import CommandEntry
-from uas_coverage_env.cli.output import one_line
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.installed import entry_points
+from uas_coverage_env.files.users_code import described
 
 GROUP = "uas_coverage.commands"
 
@@ -26,7 +26,7 @@ def _loader(entry: EntryPoint) -> Callable[[], Any]:
     def load() -> Any:
         try:
             return entry.load()
-        except (ImportError, AttributeError) as error:
+        except Exception as error:  # whatever another package raises harms no other command
             return _refusal(entry, error)
 
     return load
@@ -35,6 +35,6 @@ def _loader(entry: EntryPoint) -> Callable[[], Any]:
 def _refusal(entry: EntryPoint, error: Exception) -> Callable[[], NoReturn]:
     def refuse() -> NoReturn:
         """Not available here."""
-        raise InputError(f"command {entry.name!r} cannot be loaded: {one_line(str(error))}")
+        raise InputError(f"command {entry.name!r} cannot be loaded: {described(error)}")
 
     return refuse

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -52,7 +52,8 @@ def shown(
         with _lines(out, ascii_map) as write:
 
             def update(progress: Progress) -> None:
-                write(progress)
+                with _lost_alone():
+                    write(progress)
                 if window is not None:
                     window(progress)
                 if server is not None:
@@ -68,6 +69,11 @@ def shown(
             after.callback(window.stay)
         elif window is not None:
             window.close()
+
+
+def _lost_alone() -> AbstractContextManager[object]:
+    """What goes to a terminal or a pipe that is gone by now is lost, and not the flight as well."""
+    return suppress(OSError, SystemExit)  # with the latter rich answers a broken pipe
 
 
 def _window(out: Console, scenario: Scenario, planner: Planner) -> FlightWindow | None:
@@ -88,7 +94,11 @@ def _lines(out: Console, ascii_map: AsciiMap | None) -> Iterator[Callable[[Progr
     with ExitStack() as ending:
         compiling = ending.enter_context(ExitStack())
         compiling.enter_context(compilation_shown())
-        ending.callback(live.stop)
+
+        @ending.callback
+        def stop() -> None:
+            with _lost_alone():
+                live.stop()
 
         def update(progress: Progress) -> None:
             if not live.is_started:  # all is compiled

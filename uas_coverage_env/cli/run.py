@@ -111,8 +111,8 @@ def run(
 ) -> None:
     """Fly one mission and write a flight directory.
 
-    Ctrl-C or SIGTERM ends the flight after the step that is being flown, a second one at once, and
-    what was flown is kept. Exits 0 where everything is covered, all UAS home, no contact and no
+    Ctrl-C, SIGTERM or a lost terminal ends the flight after the step that is being flown, a second
+    one at once, and what was flown is kept. Exits 0 where everything is covered, all UAS home, no contact and no
     limit exceeded (also where --steps ended the run), 1 otherwise, 2 where the input is bad or the
     planner raised an exception; what was flown before that is kept, too.
     """

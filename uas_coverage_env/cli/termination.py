@@ -1,4 +1,4 @@
-"""What ends a command from outside: Ctrl-C, and a scheduler or a container by SIGTERM."""
+"""What ends a command from outside: Ctrl-C, a scheduler by SIGTERM, a lost terminal by SIGHUP."""
 
 import os
 import signal
@@ -10,9 +10,10 @@ from types import FrameType
 
 @contextmanager
 def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
-    """In this process, SIGTERM does what Ctrl-C does: what was flown up to there is kept.
+    """In this process, SIGTERM and SIGHUP do what Ctrl-C does: what was flown so far is kept.
 
-    Its child processes, which inherit the handler, end at once as before.
+    SIGHUP comes where a connection to a remote machine breaks; where it is ignored (`nohup`), it
+    still is. Its child processes, which inherit the handler, end at once as before.
 
     Yields:
         Whether one of them has come.
@@ -30,11 +31,14 @@ def terminated_as_by_hand() -> Iterator[Callable[[], bool]]:
         signal.signal(number, before[number])
         os.kill(os.getpid(), number)
 
-    numbers: list[int] = [signal.SIGTERM]
+    endings: list[int] = [signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        endings.append(signal.SIGHUP)  # Windows has none
+    numbers = list(endings)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         numbers.append(signal.SIGINT)
     before = {number: signal.getsignal(number) for number in numbers}
-    before[signal.SIGTERM] = signal.SIG_DFL
+    before |= dict.fromkeys(endings, signal.SIG_DFL)
     outside = {number: signal.signal(number, stop) for number in numbers}
     try:
         yield lambda: bool(came)

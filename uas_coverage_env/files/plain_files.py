@@ -42,10 +42,12 @@ def read_bytes(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
 def read_text(path: Path, most_bytes: int = MOST_BYTES) -> str:
     """The text of a plain file in UTF-8, see `read_bytes`.
 
+    Windows' editors and spreadsheets begin it with a byte order mark, which is no part of it.
+
     Raises:
         UnicodeDecodeError: It is not UTF-8.
     """
-    return read_bytes(path, most_bytes).decode("utf-8").replace("\r\n", "\n")
+    return read_bytes(path, most_bytes).decode("utf-8-sig").replace("\r\n", "\n")
 
 
 def write_beside(path: Path, content: bytes) -> Path:

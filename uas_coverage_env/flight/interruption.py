@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from uas_coverage_env.flight.flight import Flight
 
+_ENDINGS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+
 
 @contextmanager
 def interruptions_noted() -> Iterator[Callable[[], bool]]:
@@ -34,7 +38,7 @@ def interruptions_noted() -> Iterator[Callable[[], bool]]:
         noted.append(number)
 
     if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _ENDINGS:
             handler = signal.getsignal(number)
             if callable(handler):
                 before[number] = handler

@@ -135,7 +135,7 @@ def read_flight(directory: Path) -> dict[str, Any]:
         "moving_position_m": _read(
             directory / "moving_obstacles.csv", lambda text: _moving_array(text, scenario, steps)
         ),
-        "plan": _read(directory / "plan.csv", lambda text: _plan_array(text, scenario)),
+        "plan": _plan(directory / "plan.csv", scenario),
         **_reward_fields(directory / REWARD_FILE, scenario, steps),
     }
 
@@ -166,7 +166,7 @@ def _flight_arrays(text: str, scenario: Scenario) -> dict[str, Any]:
         u[k, i] = [_number(told[name]) for name in INPUT_COLUMNS]
         covered[k] = _whole("covered", told["covered"], most_covered)
         last[i] = k
-        found[k, i] = True
+        _note(found, k, i, told["uas"])
 
     _each(rows, put)
     for i, name in enumerate(index):
@@ -200,6 +200,13 @@ def _moving_array(text: str, scenario: Scenario, steps: int) -> NDArray[np.float
     return np.array(positions_m, dtype=np.float64).reshape(steps + 1, len(names), 3)
 
 
+def _plan(path: Path, scenario: Scenario) -> NDArray[np.void]:
+    """Empty where there is no such file: a planner that predicts nothing has none."""
+    if not path.exists():
+        return np.empty(0, dtype=PLAN_DTYPE)
+    return _read(path, lambda text: _plan_array(text, scenario))
+
+
 def _plan_array(text: str, scenario: Scenario) -> NDArray[np.void]:
     index = {uas.name: i for i, uas in enumerate(scenario.uas)}
 
@@ -231,12 +238,14 @@ def _reward_arrays(text: str, scenario: Scenario, steps: int) -> dict[str, Any]:
     rows = _rows(text, (*REWARD_COLUMNS, *names))
     index = {uas.name: i for i, uas in enumerate(scenario.uas)}
     terms = np.zeros((steps, len(index), len(names)))
+    found = np.zeros(terms.shape[:2], np.bool_)
 
     def put(row: list[str]) -> None:
         k, i = _step(row[0], scenario), _chosen("uas", row[1], index)
         if k >= steps:
             raise ValueError(f"{_short(row[0])} s is not before the end of the flight")
         terms[k, i] = [_number(value) for value in row[first:]]
+        _note(found, k, i, row[1])
 
     _each(rows, put)
     return {"reward_terms": terms, "reward_names": names}
@@ -313,6 +322,13 @@ def _rows(text: str, header: Sequence[str]) -> list[list[str]]:
         if len(row) != len(header):
             raise ValueError(f"line {line}: holds {len(row)} values, not {len(header)}")
     return rows[1:]
+
+
+def _note(found: NDArray[np.bool_], sample: int, i: int, uas: str) -> None:
+    """Note that the row of a sample has come, which it may once: of two, one would be lost."""
+    if found[sample, i]:
+        raise ValueError(f"sample {sample} of {uas} is there twice")
+    found[sample, i] = True
 
 
 def _each(rows: Sequence[list[str]], reader: Callable[[list[str]], T]) -> list[T]:

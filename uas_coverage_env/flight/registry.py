@@ -28,6 +28,8 @@ from uas_coverage_env.flight.planner import Planner, PlannerOptions, check_plann
 GROUP = "uas_coverage.planners"
 KINDS = "uas_coverage.planner_kinds"
 
+_OURS = "uas_coverage_"
+
 _SECTION = re.compile(r"^(?:Args|Attributes|Raises):$", re.MULTILINE)
 
 
@@ -81,15 +83,16 @@ def load_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner
     kind, colon, argument = name.partition(":")
     installed = _installed(KINDS if colon else GROUP)
     if kind not in installed and argument:
-        return _own_planner(name, options or {})
+        return _made(name, _own_class(name), options or {})
     if kind not in installed or (colon and not argument):
         raise _unknown(name)
     try:
         planner_class = installed[kind].load()
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"planner {name!r} cannot be loaded: {error}") from error
-    checked = _checked_options(name, planner_class.Options, options or {})
-    return planner_class(checked, argument) if colon else planner_class(checked)
+    except Exception as error:  # whatever another package raises is one line
+        raise InputError(f"planner {name!r} cannot be loaded: {described(error)}") from error
+    if not colon:
+        return _made(name, planner_class, options or {})
+    return planner_class(_checked_options(name, planner_class.Options, options or {}), argument)
 
 
 def describe_planners() -> tuple[PlannerDescription, ...]:
@@ -136,12 +139,14 @@ def options_of(planner: Planner) -> dict[str, Any]:
     return options.model_dump(mode="json") if isinstance(options, BaseModel) else {}
 
 
-def _own_planner(name: str, options: Mapping[str, Any]) -> Planner:
-    planner_class = _own_class(name)
+def _made(name: str, planner_class: Any, options: Mapping[str, Any]) -> Planner:
+    """A planner of a class, which takes its options, if it has any."""
     model = getattr(planner_class, "Options", None)
     checked = _checked_options(name, model or PlannerOptions, options)
     try:
         planner = planner_class(checked) if model else planner_class()
+    except InputError:
+        raise
     except Exception as error:  # whatever a user's class raises is one line
         raise _not_made(name, error) from error
     check_planner(planner, name)
@@ -176,7 +181,10 @@ def _unknown(name: str) -> InputError:
 
 
 def _installed(group: str) -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=group) if entry.group == group}
+    """Name -> planner; a name of this package stays that of its planner, whoever else takes it."""
+    announced = [entry for entry in entry_points(group=group) if entry.group == group]
+    announced.sort(key=lambda entry: entry.module.startswith(_OURS))
+    return {entry.name: entry for entry in announced}
 
 
 def _checked_options(name: str, model: type[BaseModel], given: Mapping[str, Any]) -> BaseModel:
@@ -203,8 +211,8 @@ def _checked_options(name: str, model: type[BaseModel], given: Mapping[str, Any]
 def _description(name: str, entry: EntryPoint) -> PlannerDescription:
     try:
         planner_class = entry.load()
-    except (ImportError, AttributeError) as error:
-        return PlannerDescription(name, "", missing=" ".join(str(error).split()))
+    except Exception as error:  # whatever another package raises harms no other planner
+        return PlannerDescription(name, "", missing=described(error))
     return _described(
         f"{name}:{planner_class.argument}" if entry.group == KINDS else name, planner_class
     )

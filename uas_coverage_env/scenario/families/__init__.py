@@ -7,11 +7,14 @@ is known by its name.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
 
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.installed import entry_points
+from uas_coverage_env.files.users_code import described
 from uas_coverage_env.scenario.families.courtyards import courtyards
 from uas_coverage_env.scenario.families.irregular import irregular
 from uas_coverage_env.scenario.families.low_charge import low_charge, with_charge_for
@@ -79,9 +82,24 @@ BUILT_IN: Mapping[str, Family] = {
 
 
 def installed_families() -> dict[str, Family]:
-    """Name -> family: those of this package, and those that others have announced."""
+    """Name -> family: those of this package, and those that others have announced.
+
+    One that cannot be loaded says so where a mission is drawn from it.
+    """
     others = {entry.name: entry for entry in entry_points(group=GROUP)}
-    return {**{name: entry.load() for name, entry in others.items()}, **BUILT_IN}
+    return {**{name: _loaded(entry) for name, entry in others.items()}, **BUILT_IN}
+
+
+def _loaded(entry: EntryPoint) -> Family:
+    try:
+        return entry.load()
+    except Exception as error:  # whatever another package raises harms no other family
+        reason = f"family {entry.name!r} cannot be loaded: {described(error)}"
+
+    def refuse(rng: Rng, size: Size) -> Scenario:
+        raise InputError(reason)
+
+    return Family(refuse)
 
 
 __all__ = [
