@@ -24,6 +24,10 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
             ["figure", ".", "--kind", "maps"],
             "Invalid value for '--kind': 'maps' is not one of 'map'",
         ),
+        (
+            ["run", "village", "--seed", "-1"],
+            "Invalid value for '--seed': '-1' should be greater than or equal to 0",
+        ),
         (["run", "generated"], "did you mean generated:SEED?"),
         (["compare", "--scenarios", "dve", "--planners", "tour", "--out", "o"], "mean dev?"),
         (["compare", "--scenarios", "tets", "--planners", "tour", "--out", "o"], "mean test?"),

@@ -190,6 +190,7 @@ PLAIN = ObservationBlock("plain", 1, (Feature("zero", 1, 0, 1, "always 0"),), no
         ({"observation": (BEACON, BEACON)}, "give each a name of its own"),
         ({"observation": ()}, "give each a name of its own"),
         ({"reward": SLOW}, "give a tuple of terms"),
+        ({"reward": "coverage"}, "reward is 'coverage'; give a tuple of terms"),
         ({"reward": (*REWARD, 3.0)}, "3.0 is no RewardTerm"),
         ({"reward": (SLOW, SLOW)}, "give each a name of its own"),
         ({"reward_weights": {"slow": 1.0}}, "no reward term 'slow'"),

@@ -18,6 +18,7 @@ from practice_grounds import practice_ground
 from uas_coverage_env import ContactKind, UasStatus, load_scenario, uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE, CoverageSwarmEnv
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.scenario import GeneratedScenarios
 from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES
 from uas_coverage_env.world.codes import CommandKind
 
@@ -289,6 +290,17 @@ def test_a_spec_goes_through_json_with_its_scenario(scenario):
     assert inner.action_space == env.action_space
     assert copy.spec is not None
     assert copy.spec.to_json() == gymnasium.make(copy.spec).spec.to_json()
+
+
+def test_a_spec_goes_through_json_with_the_ranges_of_generated_scenarios():
+    ranges = GeneratedScenarios(n_uas=(2, 2), n_waypoints=(8, 12), n_obstacles=(1, 3))
+    env = gymnasium.make(ID, scenario=ranges)
+    assert env.spec is not None
+    copy = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
+    assert (env.reset(seed=3)[0] == copy.reset(seed=3)[0]).all()
+    inner: Any = copy.unwrapped
+    assert len(inner.scenario.uas) == 2
+    assert 8 <= len(inner.scenario.waypoints) <= 12
 
 
 def test_a_spec_of_many_missions_goes_through_json():

@@ -98,6 +98,11 @@ FLAT = box((90, 110), (90, 110), (0, 0))
             "0.5, where no planner can start; move it further in",
         ),
         (
+            [place("uas", 0, START, [50.0, 10.0, 0.0])],
+            "uas[0].start_m: (50, 10, 0) is 0 m from the geofence, within its margin_m "
+            "0.5, where no planner can start; move it further in",
+        ),
+        (
             [place("uas", 0, START, [100.0, 89.75, -1.0])],
             "uas[0].start_m: (100, 89.75, -1) is 0.25 m from obstacle 'hut', closer than radius_m "
             "0.4: the UAS would be lost at once; move it away",

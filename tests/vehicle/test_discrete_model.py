@@ -152,12 +152,16 @@ def test_outputs_and_battery_rows_are_one_battery(name, dod, u_th_V, excess_N, d
         ({"dod": 0.1, "dt_s": 3.0}, "dt_s is 3"),
         ({"dod": 0.1, "dt_s": float("nan")}, "dt_s is nan"),
         ({"dod": 0.1, "order": 1}, "order is 1"),
+        ({"dod": 0.1, "order": 1000}, "order is 1000; give a whole number from 2 to 50"),
+        ({"dod": "half"}, "dod is 'half'"),
+        ({"dod": 0.1, "dt_s": "1"}, "dt_s is '1'"),
+        ({"vehicle": "s500_v2", "dod": 0.1}, r"vehicle is 's500_v2'; .* load_vehicle"),
         ({"dod": 0.1, "order": 0}, "order is 0"),
     ],
 )
 def test_a_linear_model_out_of_range_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
-        linear_model(S500, **arguments)
+        linear_model(**{"vehicle": S500, **arguments})
 
 
 @pytest.mark.parametrize(
@@ -172,6 +176,9 @@ def test_a_linear_model_out_of_range_is_refused(arguments, message):
         ([1.0], float("nan"), 1.0, "soc_0 is nan"),
         ([1.0], 1.0, 0.0, "dt_s is 0"),
         ([1.0], 1.0, 2.5, "dt_s is 2.5"),
+        ([1.0], 1.0, None, "dt_s is None"),
+        ([1.0], "full", 1.0, "soc_0 is 'full'"),
+        ([1.0 + 1.0j], 1.0, 1.0, "dtype complex128; give real numbers"),
     ],
 )
 def test_a_replay_that_makes_no_sense_is_refused(current_A, soc_0, dt_s, message):

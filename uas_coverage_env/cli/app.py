@@ -207,6 +207,9 @@ def _of_the_command_line(error: typer.TyperException) -> str:
     if close:
         return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"
     message = error.format_message().replace("Value error, ", "")  # pydantic's word for its reason
+    mistakes = getattr(error.__cause__, "errors", None)  # pydantic's, which does not say the value
+    if mistakes:
+        message = message.replace("Input should", f"{mistakes()[0]['input']!r} should")
     what = getattr(getattr(error, "param", None), "help", None)
     if message.startswith("Missing ") and message.endswith("'.") and what:
         return f"{message.removesuffix('.')}: {what}"

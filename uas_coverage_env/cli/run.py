@@ -112,9 +112,9 @@ def run(
     """Fly one mission and write a flight directory.
 
     Ctrl-C, SIGTERM or a lost terminal ends the flight after the step that is being flown, a second
-    one at once, and what was flown is kept. Exits 0 where everything is covered, all UAS home, no contact and no
-    limit exceeded (also where --steps ended the run), 1 otherwise, 2 where the input is bad or the
-    planner raised an exception; what was flown before that is kept, too.
+    one at once, and what was flown is kept. Exits 0 where everything is covered, all UAS home, no
+    contact and no limit exceeded (also where --steps ended the run), 1 otherwise, 2 where the input
+    is bad or the planner raised an exception; what was flown before that is kept, too.
     """
     if sorties is not None and steps is not None:
         raise InputError("--steps ends a flight in the air: give either --steps or --sorties")

@@ -24,7 +24,7 @@ def checked_blocks(
     Raises:
         ValueError: They are not of this class, too few, or two have one name.
     """
-    if isinstance(blocks, kind) or not isinstance(blocks, Sequence):
+    if isinstance(blocks, kind | str) or not isinstance(blocks, Sequence):
         raise ValueError(f"{argument} is {blocks!r}; give a tuple of {nouns}")
     for block in blocks:
         if not isinstance(block, kind):

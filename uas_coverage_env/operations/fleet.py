@@ -49,7 +49,7 @@ def parse_fleet(text: str) -> list[Member]:
         load_vehicle(name)
         fleet += [Member(name, camera or None)] * int(count[:4] or 1)
     if len(fleet) > MOST_UAS:
-        raise InputError(f"--fleet: {len(fleet)} UAS, more than {MOST_UAS}; take fewer")
+        raise InputError(f"--fleet {text[:80]!r}: more than {MOST_UAS} UAS; take fewer")
     return fleet
 
 

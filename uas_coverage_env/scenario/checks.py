@@ -123,7 +123,7 @@ def _starts_and_fixed_things(scenario: UncheckedScenario) -> Iterator[str]:
             yield f"{start} lies {outside_m:.3g} m outside the geofence; move it inside"
         elif outside_m > -margin_m:
             yield (
-                f"{start} is {-outside_m:.3g} m from the geofence, within its margin_m "
+                f"{start} is {abs(outside_m):.3g} m from the geofence, within its margin_m "
                 f"{margin_m:g}, where no planner can start; move it further in"
             )
         for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):

@@ -35,7 +35,8 @@ def _checked_name(name: str) -> str:
     # names are columns of CSV files, keys of dictionaries and parts of file names
     if not 0 < len(name) <= _LONGEST_NAME or not _NAME_LETTERS.issuperset(name):
         raise ValueError(
-            f"{name[:80]!r} is no valid name; use 1 to {_LONGEST_NAME} letters, digits, _ or -"
+            f"{name[:80]!r} is no valid name; use 1 to {_LONGEST_NAME} letters A to Z or a to z, "
+            "digits, _ or -"
         )
     return name
 

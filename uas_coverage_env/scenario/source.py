@@ -1,7 +1,7 @@
 """Where the missions of an environment come from: one scenario, or one drawn at each reset."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +17,8 @@ ScenarioGenerator = Callable[[np.random.Generator], Scenario]
 """Draws a scenario, the same one from a generator of random numbers in the same state."""
 
 _EXAMPLES = 32
+# What an `EnvSpec` that was written as JSON has of a family of generated scenarios.
+_RANGES = {field.name for field in fields(GeneratedScenarios)}
 # Room for what is asked for, and for rare draws: it costs nothing, a mission refused much.
 _SPARE, _MOVING = 2, 4
 
@@ -119,6 +121,8 @@ class MissionSource:
             InputError: There is no scenario or family of this name, or the file is wrong.
             ValueError: It is none of what is allowed.
         """
+        if isinstance(missions, Mapping) and set(missions) == _RANGES:
+            missions = GeneratedScenarios(**missions)
         if isinstance(missions, str):
             missions = FAMILIES.get(missions) or installed_families().get(missions, missions)
         if isinstance(missions, MissionSource):

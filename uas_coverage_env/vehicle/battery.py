@@ -123,17 +123,21 @@ def simulate_battery(
         the voltage under that current.
 
     Raises:
-        ValueError: current not one-dimensional or not finite, soc_0 or dt_s out of range, or a
-            battery that the current empties or overcharges.
+        ValueError: no vehicle, current not one-dimensional or not finite, soc_0 or dt_s out of
+            range, or a battery that the current empties or overcharges.
     """
-    current = np.asarray(current_A, float)
+    check_vehicle(vehicle)
+    given = np.asarray(current_A)
+    if given.dtype.kind not in "iufb":
+        raise ValueError(f"current_A has dtype {given.dtype}; give real numbers")
+    current = given.astype(float)
     if current.ndim != 1:
         raise ValueError(f"current_A has shape {current.shape}; give one value per step")
     if not np.isfinite(current).all():
         sample = int(np.argmin(np.isfinite(current)))
         raise ValueError(f"current_A[{sample}] is {current[sample]}; give finite values")
-    if not 0.0 <= soc_0 <= 1.0:
-        raise ValueError(f"soc_0 is {soc_0}; give a state of charge in [0, 1]")
+    if not is_number(soc_0) or not 0.0 <= soc_0 <= 1.0:
+        raise ValueError(f"soc_0 is {soc_0!r}; give a state of charge in [0, 1]")
     check_step(dt_s)
     battery = vehicle.battery
     drawn = np.concatenate([[0.0], np.cumsum(current)])[: len(current)]
@@ -161,5 +165,20 @@ def check_step(dt_s: float) -> None:
     Raises:
         ValueError: dt_s outside (0, 2].
     """
-    if not 0.0 < dt_s <= 2.0:
-        raise ValueError(f"dt_s is {dt_s}; give a step in (0, 2] seconds")
+    if not is_number(dt_s) or not 0.0 < dt_s <= 2.0:
+        raise ValueError(f"dt_s is {dt_s!r}; give a step in (0, 2] seconds")
+
+
+def check_vehicle(vehicle: object) -> None:
+    """Refuse what is no vehicle: its name, most often.
+
+    Raises:
+        ValueError: It has no parameters.
+    """
+    if not isinstance(vehicle, Parts):
+        raise ValueError(f"vehicle is {vehicle!r}; give parameters, as load_vehicle(name) does")
+
+
+def is_number(value: object) -> bool:
+    """Whether it can be compared with others."""
+    return isinstance(value, int | float | np.integer | np.floating)

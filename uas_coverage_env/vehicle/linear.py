@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.vehicle.battery import (
     BatterySegment,
     check_step,
+    check_vehicle,
+    is_number,
     polarisation_decay,
     segment_at,
 )
@@ -32,6 +34,9 @@ from uas_coverage_env.vehicle.layout import (
     Z,
 )
 from uas_coverage_env.vehicle.params import VehicleParams
+
+_MOST_ORDER = 50
+"""Of the Taylor series; many before it, further terms are below the last digit."""
 
 FloatArray = NDArray[np.float64]
 
@@ -99,19 +104,21 @@ def linear_model(
         vehicle: parameters.
         dod: depth of discharge in [0, 1] that selects the segment of the discharge curve.
         dt_s: [s] sampling time in (0, 2].
-        order: N_dis, at least 2; 4 is the lowest in which a torque moves the position at once.
+        order: N_dis, from 2 to 50; 4 is the lowest in which a torque moves the position at once.
 
     Returns:
         The matrices; they are shared and cannot be written to.
 
     Raises:
-        ValueError: dod, dt_s or order out of range, or a step too long for the vehicle's drag.
+        ValueError: no vehicle, dod, dt_s or order out of range, or a step too long for the
+            vehicle's drag.
     """
+    check_vehicle(vehicle)
     check_step(dt_s)
-    if not 0.0 <= dod <= 1.0:
-        raise ValueError(f"dod is {dod}; give a depth of discharge in [0, 1]")
-    if not isinstance(order, (int, np.integer)) or order < 2:
-        raise ValueError(f"order is {order}; give a whole number, 2 at least")
+    if not is_number(dod) or not 0.0 <= dod <= 1.0:
+        raise ValueError(f"dod is {dod!r}; give a depth of discharge in [0, 1]")
+    if not isinstance(order, (int, np.integer)) or not 2 <= order <= _MOST_ORDER:
+        raise ValueError(f"order is {order!r}; give a whole number from 2 to {_MOST_ORDER}")
     return _on_segment(vehicle, segment_at(vehicle, dod), float(dt_s), int(order))
 
 
