@@ -186,6 +186,11 @@ def test_a_replay_that_makes_no_sense_is_refused(current_A, soc_0, dt_s, message
         simulate_battery(S500, current_A, soc_0, dt_s)
 
 
+def test_a_replay_needs_a_vehicle_and_not_its_name():
+    with pytest.raises(ValueError, match=r"vehicle is 's500_v2'; .* load_vehicle"):
+        simulate_battery("s500_v2", [1.0], 1.0)
+
+
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     names,
