@@ -303,6 +303,15 @@ def test_a_damaged_shapefile_is_refused(cut, capsys):
     assert "names no coordinate system" in refused(capsys, "karhula.shp", *HOME)
 
 
+def test_a_shapefile_that_was_cut_off_is_one_line_without_warnings_of_its_reader(capsys, recwarn):
+    for path in EXAMPLES.glob("karhula.*"):
+        shutil.copy(path, ".")
+    data = Path("karhula.shp").read_bytes()
+    Path("karhula.shp").write_bytes(data[:120])
+    assert "is no sound shapefile" in refused(capsys, "karhula.shp", *HOME)
+    assert not recwarn
+
+
 def test_a_shapefile_in_projected_metres_is_read_by_its_projection():
     import pyproj
 

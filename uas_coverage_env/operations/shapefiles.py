@@ -1,6 +1,7 @@
 """ESRI shapefiles: the polygons of a layer, in whatever coordinates its .prj names."""
 
 import io
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -34,11 +35,14 @@ def read_shapefile(path: Path) -> Iterator[Drawn]:
         if ending == "shp" or path.with_suffix(f".{ending}").is_file()
     }
     try:
-        with closing(shapefile.Reader(**parts)) as reader:
-            for number, entry in enumerate(reader.iterShapeRecords()):
-                fields = entry.record.as_dict() if entry.record else {}
-                if entry.shape is not None:
-                    yield from _drawn(path, number, entry.shape, fields, to_degrees)
+        # what its reader warns of is an error a little later, or harmless
+        ignored = warnings.catch_warnings(action="ignore")
+        with ignored, closing(shapefile.Reader(**parts)) as reader:
+            entries = list(reader.iterShapeRecords())
+        for number, entry in enumerate(entries):
+            fields = entry.record.as_dict() if entry.record else {}
+            if entry.shape is not None:
+                yield from _drawn(path, number, entry.shape, fields, to_degrees)
     except InputError:
         raise
     except Exception as error:  # whatever bytes at random lead to: struct, index, memory, ...
