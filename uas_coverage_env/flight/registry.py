@@ -1,6 +1,7 @@
 """Planners by name: whatever announces itself in one of two entry-point groups, or MODULE:CLASS.
 
-`uas_coverage.planners`: a name is one planner, a class made as `PlannerClass(options)`.
+`uas_coverage.planners`: a name is one planner, a class made as `PlannerClass(options)`, or
+    without arguments where it has no `Options`; names of this package are not taken by others.
 `uas_coverage.planner_kinds`: a name is a kind of which there are many, flown as `KIND:ARGUMENT`;
     a class made as `PlannerClass(options, argument)`, with a text `argument` on the class that
     names its argument and on the planner that holds it.
