@@ -26,7 +26,7 @@ IN_TURNS = {
 @pytest.fixture(scope="module")
 def village(tmp_path_factory):
     directory = tmp_path_factory.mktemp("flights") / "village"
-    # one team for each decision, which halves the work: the missions below weigh up two
+    # one team for each decision, which halves the work: the generated missions weigh up two
     chosen = {**IN_TURNS, "teams": "1"}
     options = [word for item in chosen.items() for word in ("--option", "=".join(item))]
     code = main(["run", "village", *options, "--out", str(directory)])
@@ -101,7 +101,9 @@ def test_generated_missions_are_flown_without_a_violation(seed, n_uas):
 
 @pytest.mark.slow
 def test_a_mixed_fleet_flies_through_the_corridor():
-    flight = rollout(load_scenario("corridor"), load_planner("milp-mpc", IN_TURNS))
+    flight = rollout(
+        load_scenario("corridor"), load_planner("milp-mpc", {**IN_TURNS, "teams": "1"})
+    )
     assert flight.violations == ()
     assert flight.breaches == 0
     assert flight.covered[-1] == len(flight.scenario.waypoints)
