@@ -17,7 +17,7 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 from uas_coverage_agents.policy import load_policy
-from uas_coverage_agents.training import command, loop
+from uas_coverage_agents.training import command, curve, loop
 from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.training.loop import curve_scenarios
 from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
@@ -42,6 +42,12 @@ def trained(tmp_path_factory):
     directory = tmp_path_factory.mktemp("trained") / "run"
     assert train(directory) == 0
     return directory
+
+
+@pytest.fixture
+def curve_without_picture(monkeypatch):
+    """A dozen times in a training, to draw the curve takes longer than to learn until then."""
+    monkeypatch.setattr(curve, "write", curve.write_table)
 
 
 def refusal(capsys, *arguments: str) -> str:
@@ -97,6 +103,7 @@ def test_a_baseline_that_is_no_planner_is_refused_before_anything_is_begun(tmp_p
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.usefixtures("curve_without_picture")
 def test_a_killed_training_goes_on_to_the_same_weights(trained, tmp_path, capsys):
     script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
     command_line = [sys.executable, "-c", script, "train", TINY]
@@ -133,6 +140,7 @@ def test_the_same_command_again_says_the_same_without_training(trained, capsys):
     assert read_curve(trained) == curve
 
 
+@pytest.mark.usefixtures("curve_without_picture")
 def test_another_seed_gives_other_weights(trained, tmp_path):
     assert train(tmp_path / "other", "--seed", "1", "--steps", "128") == 0
     other = load_policy(tmp_path / "other" / "policy")
@@ -140,6 +148,7 @@ def test_another_seed_gives_other_weights(trained, tmp_path):
     assert other.description.weights_sha256 != first.description.weights_sha256
 
 
+@pytest.mark.usefixtures("curve_without_picture")
 def test_the_minutes_of_a_training_begin_with_its_first_step(tmp_path, monkeypatch):
     now_s, fly = [0.0], TrainingRun.flights
 
@@ -166,6 +175,7 @@ def test_other_settings_are_not_mixed_into_a_training(trained, capsys):
         assert "holds a training with other settings" in line
 
 
+@pytest.mark.usefixtures("curve_without_picture")
 def test_overwrite_starts_anew_and_removes_only_what_is_ours(tmp_path):
     directory = tmp_path / "run"
     assert train(directory, "--steps", "64") == 0

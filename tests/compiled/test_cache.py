@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from new_process import in_new_process
 
 from uas_coverage_env.compiled import source_digest
 
@@ -87,7 +88,12 @@ def craft(tmp_path):
 def called(
     folder: Path, module: str, name: str, number: float = 3.0, program=PROGRAM, **environment: str
 ):
-    """What a kernel returns in a new process, and how many versions it took from the cache."""
+    """What a kernel returns in a new process, and how many versions it took from the cache.
+
+    With a program or an environment of its own, Python is started for it.
+    """
+    if program is PROGRAM and not environment:
+        return in_new_process(str(folder), module, name, number)
     done = subprocess.run(
         [sys.executable, "-c", program, module, name, str(number), str(PACKAGE)],
         env={

@@ -14,7 +14,7 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_env import rollout
 from uas_coverage_env.flight import accomplished
 
-QUICK = {"deterministic": True, "at_once": 1, "horizon": 12, "threads": 1, "teams": 2}
+QUICK = {"deterministic": True, "at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
 
 
 def milp(planner):

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from programs import refusal
+
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "throughput.py"
 
 
@@ -27,6 +29,6 @@ def test_our_environments_take_turns_and_are_counted(tmp_path):
 
 
 def test_an_unknown_peer_is_one_line():
-    done = run("--peers", "nobody")
-    assert done.returncode == 2
-    assert "there is no peer 'nobody'" in done.stdout
+    code, said, _ = refusal(BENCHMARK, "--peers", "nobody")
+    assert code == 2
+    assert "there is no peer 'nobody'" in said

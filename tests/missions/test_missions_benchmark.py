@@ -3,11 +3,13 @@
 import dataclasses
 import subprocess
 import sys
+from pathlib import Path
 
 import mission_statistics
 import missions
 import numpy as np
 import pytest
+from programs import refusal
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import seed_range
@@ -135,7 +137,7 @@ def test_the_command_prints_two_tables_and_keeps_the_flights(tmp_path):
 
 
 def test_the_command_refuses_in_one_line():
-    result = run("--planners", "lawnmower,teleport")
-    assert result.returncode == 2
-    assert result.stderr.startswith("error: unknown planner 'teleport'")
-    assert result.stderr.count("\n") == 1
+    code, _, line = refusal(Path(missions.__file__), "--planners", "lawnmower,teleport")
+    assert code == 2
+    assert line.startswith("error: unknown planner 'teleport'")
+    assert line.count("\n") == 1

@@ -73,7 +73,7 @@ def reference(model, rows, steps, start):
     bounds += [(0.0, None)] * len(rows.stage)
     weight = np.concatenate([np.tile(model.input_weight, steps), np.zeros(len(rows.stage))])
     price = np.concatenate([np.zeros(n_u), rows.weight])
-    found = minimize(
+    found = minimize(  # pyrefly: ignore[no-matching-overload]  # constraints may be arrays
         lambda z: 0.5 * np.sum(weight * z**2) + price @ z,
         np.concatenate([np.zeros(n_u), np.full(len(rows.stage), 50.0)]),
         jac=lambda z: weight * z + price,

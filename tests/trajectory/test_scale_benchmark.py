@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from programs import refusal
+
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "scale.py"
 
 
@@ -26,14 +28,14 @@ def test_each_size_is_planned_and_flown_and_drawn(tmp_path):
 
 
 def test_a_wrong_size_is_one_line():
-    done = run("--sizes", "2by50")
-    assert done.returncode == 2
-    assert "--sizes '2by50': should be UASxWAYPOINTS" in done.stderr
-    assert done.stderr.count("\n") == 1
+    code, _, line = refusal(BENCHMARK, "--sizes", "2by50")
+    assert code == 2
+    assert "--sizes '2by50': should be UASxWAYPOINTS" in line
+    assert line.count("\n") == 1
 
 
 def test_a_mission_that_no_battery_lasts_for_is_one_line():
-    done = run("--sizes", "1x2000", "--no-fly")
-    assert done.returncode == 2
-    assert "--sizes 1x2000: n_waypoints is 2000" in done.stderr
-    assert done.stderr.count("\n") == 1
+    code, _, line = refusal(BENCHMARK, "--sizes", "1x2000", "--no-fly")
+    assert code == 2
+    assert "--sizes 1x2000: n_waypoints is 2000" in line
+    assert line.count("\n") == 1

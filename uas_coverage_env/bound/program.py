@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csr_array, csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
 
 from uas_coverage_env.geometry.linear_programs import linprog
@@ -283,7 +283,7 @@ class Program:
             inner = at < home
             np.add.at(used, (waypoint, at), np.where(inner, 0.5 * share, share))
         used += used.T
-        flow = csr_matrix(np.round(_CAPACITY * used).astype(np.int32))
+        flow = csr_array(np.round(_CAPACITY * used).astype(np.int32))
         found, seen = [], np.zeros(home, dtype=bool)
         groups = connected_components(flow, directed=False)[1]
         for group in np.unique(groups[:home]):
@@ -295,7 +295,7 @@ class Program:
                 continue
             result = maximum_flow(flow, source, home)
             if result.flow_value < 2.0 * _CAPACITY * (1.0 - _SLACK):
-                rest = flow - result.flow
+                rest = csr_array(flow - result.flow)
                 rest.data = np.maximum(rest.data, 0)
                 rest.eliminate_zeros()
                 inside = np.zeros(home + 1, dtype=bool)
@@ -306,5 +306,5 @@ class Program:
         return [Cut(inside, 1) for inside in found if inside.tobytes() not in known]
 
 
-def _reached(graph: csr_matrix, source: int) -> IntArray:
+def _reached(graph: csr_array, source: int) -> NDArray[np.int32]:
     return breadth_first_order(graph, source, return_predecessors=False)

@@ -244,11 +244,11 @@ class Tour:
         return Velocity(north_mps, east_mps, altitude_m, mode)
 
     def _led(self, i: int, x: FloatArray, task: PursuitTask, step: int) -> FloatArray | None:
-        """What is flown where it is safe, (0, 3) where there is no plan; None: no one plans."""
-        if self._leader is None or self._learnt is None:
+        """What is flown where it is safe, (0, 3) where there is no plan; None: in still air."""
+        if self._learnt is None:
             return None
         led = None
-        if not self._is_guided[i] and (task.cover_m >= 0.0).all():
+        if self._leader is not None and not self._is_guided[i] and (task.cover_m >= 0.0).all():
             led = self._leader.commands(i, step, x, task.route, self._learnt, self._n_steps)
         return np.zeros((0, 3)) if led is None else led
 

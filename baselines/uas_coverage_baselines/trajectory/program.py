@@ -270,7 +270,8 @@ class FlightProgram:
             made.append(_planes(*height_rows(self.space, path_m)))
         made += self._fence_rows(path_m)
         made += [rows for body in self.bodies if (rows := _apart(body, path_m)) is not None]
-        return SoftRows(*(np.concatenate(parts) for parts in zip(*made, strict=True)))
+        # joined, copies of one row are stored by columns: a layout that kernels are compiled for
+        return SoftRows(*(np.ascontiguousarray(np.concatenate(p)) for p in zip(*made, strict=True)))
 
     def _fence_rows(self, path_m: FloatArray) -> list[SoftRows]:
         space = self.space

@@ -245,10 +245,7 @@ class Milp:
         cost = np.zeros(self._n_columns)
         for picked, values in self._cost:
             np.add.at(cost, picked, values)
-        rows, picked, values = (
-            np.concatenate([entry[k] for entry in self._entries]) if self._entries else np.zeros(0)
-            for k in range(3)
-        )
+        rows, picked, values = (_joined([entry[k] for entry in self._entries]) for k in range(3))
         integer = _joined(self._integer).astype(bool)
         for columns in self._whole:
             integer[columns] = True
