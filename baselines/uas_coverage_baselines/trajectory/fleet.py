@@ -13,7 +13,13 @@ from uas_coverage_baselines.routing import FreshPacks, Packs, RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.movers import Movers
-from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
+from uas_coverage_baselines.trajectory.program import (
+    Allowance,
+    Asked,
+    Flight,
+    FlightProgram,
+    Landing,
+)
 from uas_coverage_baselines.trajectory.retiming import (
     Draft,
     draft,
@@ -34,7 +40,8 @@ IntArray = NDArray[np.int64]
 _LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
 _LANDING_S = 4.0
 _SPARE_S = 6.0  # of the battery, left in routes
-_ROOM = 0.06  # share of the limits left to tracking where the plant is not the model
+_ROOM = 0.03  # share of the limits left to tracking where the plant is not the model
+_ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
 _LATER_SHARE = 0.96  # of budgets of flights not planned yet: they differ from routes by 1.6 %
 _LATER_STEPS = 12  # to make way for another
 
@@ -102,7 +109,12 @@ class Fleet:
     def leave_room(self) -> None:
         """Plan with part of the limits from now on: what flies is not what is planned with."""
         self.programs = [
-            replace(program, model=flight_model(self.arena.vehicles[u], _ROOM, self._speed_share))
+            replace(
+                program,
+                model=flight_model(self.arena.vehicles[u], _ROOM, self._speed_share),
+                reserve=_ROOM / (1.0 - _ROOM),
+                allowance=_ALLOWANCE,
+            )
             for u, program in enumerate(self.programs)
         ]
 
@@ -176,7 +188,6 @@ class Fleet:
         paths_m: Mapping[int, FloatArray],
         movers: Sequence[Body],
         earliest: IntArray | None,
-        loose: FloatArray | None = None,
     ) -> FlightProgram:
         """The program of a UAS, clear of the paths of others and of what moves."""
         bodies = [
@@ -189,7 +200,6 @@ class Fleet:
             self.programs[uas],
             bodies=(*bodies, *movers),
             earliest=earliest,
-            loose=loose,
             solved=0,
         )
 

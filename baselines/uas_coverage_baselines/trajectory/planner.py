@@ -25,7 +25,7 @@ from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
-from uas_coverage_baselines.trajectory.tracking import tracked
+from uas_coverage_baselines.trajectory.tracking import Tracking, tracked, with_room
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.flight.planner import Decision
@@ -276,20 +276,21 @@ class Trajectory:
             if not self._is_disturbed and not filtered[u]:
                 self._is_disturbed = True
                 self._fleet.leave_room()
-                self._planned = {}
+                for k in list(self._planned):
+                    self._plan_like_before(k, with_room, swarm, movers)
                 return
-            others = {
-                k: other.course.rest(swarm.step).path_m(10**6)
-                for k, other in self._planned.items()
-                if k != u
-            }
-            bodies = self._fleet.bodies(movers, u)
-            new = tracked(self._fleet, u, planned, swarm, others, bodies)
-            if new is None:
-                del self._planned[u]
-            else:
-                self._failures.add(float(obeys * (new.course.end - planned.course.end)))
-                self._planned[u] = new
+            later = self._plan_like_before(u, tracked, swarm, movers)
+            self._failures.add(float(obeys * later))
+
+    def _plan_like_before(self, uas: int, like: Tracking, swarm: SwarmState, movers: Movers) -> int:
+        """Plan the same visits from where a UAS is; steps by which its flight ends later."""
+        planned = self._planned.pop(uas)
+        others = {k: p.course.rest(swarm.step).path_m(10**6) for k, p in self._planned.items()}
+        new = like(self._fleet, uas, planned, swarm, others, self._fleet.bodies(movers, uas))
+        if new is None:
+            return 0
+        self._planned[uas] = new
+        return new.course.end - planned.course.end
 
     def _earliest(self, opens: NDArray[np.int64], later: int) -> NDArray[np.int64]:
         """(W,) steps, from a sample so much later, before which waypoints are not to be visited."""
@@ -306,7 +307,9 @@ class Trajectory:
         waited = self._brief.dt_s * (swarm.step - self._planned_at) >= _AGAIN_S
         if missing and (waited or any(u in self._had for u in missing)):
             return "no plan"
-        if not np.array_equal(flying & self._may_fly, self._may_fly & self._flew(swarm)):
+        flew = self._flew(swarm)
+        early = self._down & flew  # home before its time
+        if not np.array_equal((flying | early) & self._may_fly, self._may_fly & flew):
             return "a UAS is lost"
         if (flying & self._silent_then).any() or self._back.any():
             return "a UAS is back"
