@@ -7,7 +7,7 @@ from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env import Scenario, rollout
-from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.flight import accomplished, energy_Wh, fallback_reasons
 from uas_coverage_env.flight.metrics import home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
@@ -129,6 +129,13 @@ def test_on_the_nonlinear_plant_it_tracks_its_plan_without_harm(small_town):
     flight = rollout(small_town, planner(), dynamics="nonlinear")
     assert accomplished(flight)
     assert is_harmless(flight)
+
+
+def test_in_narrow_gaps_on_the_nonlinear_plant_it_follows_its_plan_without_harm():
+    flight = rollout("walls:3100", planner(), dynamics="nonlinear")
+    assert accomplished(flight)
+    assert is_harmless(flight)
+    assert not fallback_reasons(flight)
 
 
 def test_a_weak_battery_gets_a_short_route():

@@ -287,10 +287,9 @@ class Trajectory:
         planned = self._planned.pop(uas)
         others = {k: p.course.rest(swarm.step).path_m(10**6) for k, p in self._planned.items()}
         new = like(self._fleet, uas, planned, swarm, others, self._fleet.bodies(movers, uas))
-        if new is None:
-            return 0
-        self._planned[uas] = new
-        return new.course.end - planned.course.end
+        if new is not None:
+            self._planned[uas] = new
+        return 0 if new is None else new.course.end - planned.course.end
 
     def _earliest(self, opens: NDArray[np.int64], later: int) -> NDArray[np.int64]:
         """(W,) steps, from a sample so much later, before which waypoints are not to be visited."""
@@ -307,9 +306,7 @@ class Trajectory:
         waited = self._brief.dt_s * (swarm.step - self._planned_at) >= _AGAIN_S
         if missing and (waited or any(u in self._had for u in missing)):
             return "no plan"
-        flew = self._flew(swarm)
-        early = self._down & flew  # home before its time
-        if not np.array_equal((flying | early) & self._may_fly, self._may_fly & flew):
+        if not np.array_equal(flying & self._may_fly, self._may_fly & self._flew(swarm)):
             return "a UAS is lost"
         if (flying & self._silent_then).any() or self._back.any():
             return "a UAS is back"
@@ -344,11 +341,11 @@ class Trajectory:
         return None
 
     def _flew(self, swarm: SwarmState) -> BoolArray:
-        """(U,) UAS that are flying by plan, or have ended as planned."""
+        """(U,) UAS that should be flying: by plan they have not ended, and are not home early."""
         ends = np.ones(len(swarm.status), np.bool_)
         for u, end in self._ends.items():
             ends[u] = swarm.step < end
-        return ends
+        return ends & ~self._down
 
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
         first, self._step = self.mission_plan is None and self._order is None, swarm.step
