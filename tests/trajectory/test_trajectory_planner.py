@@ -133,7 +133,9 @@ def test_on_the_nonlinear_plant_it_tracks_its_plan_without_harm(small_town):
     assert is_harmless(flight)
 
 
-def test_on_the_nonlinear_plant_flights_under_way_get_room_and_no_other_order(small_town, monkeypatch):
+def test_on_the_nonlinear_plant_flights_under_way_get_room_and_no_other_order(
+    small_town, monkeypatch
+):
     planned_at = []
 
     def planned(fleet, moment, step, *rest):

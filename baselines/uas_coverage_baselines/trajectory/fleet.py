@@ -42,6 +42,7 @@ _LANDING_S = 4.0
 _SPARE_S = 6.0  # of the battery, left in routes
 _ROOM = 0.03  # share of the limits left to tracking where the plant is not the model
 _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
+_PACE = 0.91  # of the budgets of routes, there: flights are slower, and come some steps later still
 _LATER_SHARE = 0.96  # of budgets of flights not planned yet: they differ from routes by 1.6 %
 _LATER_STEPS = 12  # to make way for another
 
@@ -85,7 +86,7 @@ class Fleet:
         moving_margin_m: float = 0.0,
     ) -> None:
         self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
-        self._moving_margin_m = moving_margin_m
+        self._moving_margin_m, self._pace = moving_margin_m, 1.0
         self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
@@ -108,6 +109,7 @@ class Fleet:
 
     def leave_room(self) -> None:
         """Plan with part of the limits from now on: what flies is not what is planned with."""
+        self._pace = _PACE
         self.programs = [
             replace(
                 program,
@@ -146,7 +148,7 @@ class Fleet:
             less_s: (U,) taken off the budgets: what routes took more than expected.
         """
         left_s = self.brief.max_steps * self.brief.dt_s - moment.time_s
-        budget_s = np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
+        budget_s = self._pace * np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
         return RoutingTask.of(
             self.terrain,
             moment.x,

@@ -288,7 +288,7 @@ class Trajectory:
         others = {k: p.course.rest(swarm.step).path_m(10**6) for k, p in self._planned.items()}
         new = like(self._fleet, uas, planned, swarm, others, self._fleet.bodies(movers, uas))
         if new is not None:
-            self._planned[uas] = new
+            self._planned[uas], self._ends[uas] = new, new.course.end
         return 0 if new is None else new.course.end - planned.course.end
 
     def _earliest(self, opens: NDArray[np.int64], later: int) -> NDArray[np.int64]:
