@@ -1,13 +1,15 @@
 import numpy as np
 import pytest
+import uas_coverage_baselines.trajectory.planner as planner_module
 import uas_coverage_baselines.trajectory.program as program_module
 from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import box, meadow, mover, waypoint
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
+from uas_coverage_baselines.trajectory.mission_plan import plan_mission
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env import Scenario, rollout
-from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.flight import accomplished, energy_Wh, fallback_reasons
 from uas_coverage_env.flight.metrics import home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
@@ -129,6 +131,28 @@ def test_on_the_nonlinear_plant_it_tracks_its_plan_without_harm(small_town):
     flight = rollout(small_town, planner(), dynamics="nonlinear")
     assert accomplished(flight)
     assert is_harmless(flight)
+
+
+def test_on_the_nonlinear_plant_flights_under_way_get_room_and_no_other_order(
+    small_town, monkeypatch
+):
+    planned_at = []
+
+    def planned(fleet, moment, step, *rest):
+        planned_at.append(step)
+        return plan_mission(fleet, moment, step, *rest)
+
+    monkeypatch.setattr(planner_module, "plan_mission", planned)
+    flight = rollout(small_town, planner(), dynamics="nonlinear")
+    assert accomplished(flight)
+    assert not set(planned_at) & set(range(1, 30))
+
+
+def test_in_narrow_gaps_on_the_nonlinear_plant_it_follows_its_plan_without_harm():
+    flight = rollout("walls:3100", planner(), dynamics="nonlinear")
+    assert accomplished(flight)
+    assert is_harmless(flight)
+    assert not fallback_reasons(flight)
 
 
 def test_a_weak_battery_gets_a_short_route():

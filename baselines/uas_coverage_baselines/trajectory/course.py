@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.trajectory.fleet import Fleet
-from uas_coverage_baselines.trajectory.flight_model import rollout
+from uas_coverage_baselines.trajectory.flight_model import excess, reduced_state, rollout
 from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.space import apart_m, spare_of_rules_m
 from uas_coverage_env.vehicle import (
@@ -79,24 +79,22 @@ def course_of(fleet: Fleet, uas: int, begin: int, x: FloatArray, flight: Flight)
     return Course(begin, states, inputs, True)
 
 
-def trouble_alone(
-    fleet: Fleet, uas: int, x: FloatArray, flight: Flight, loose: bool = False
-) -> str | None:
+def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: Flight) -> str | None:
     """Why a flight must not be flown, None where nothing is wrong; other UAS are left aside.
+
+    Limits are not looked at where the UAS is beyond one already: no plan led it there.
 
     Args:
         fleet: The mission.
         uas: Index of the UAS.
         x: (14,) its state.
         flight: From there.
-        loose: The UAS is where no plan led it, perhaps beyond a limit: these are not looked at.
     """
-    if not flight.is_clear:
-        return "no flight"
     states, _, used = rollout(fleet.arena.vehicles[uas], x, flight.u)
     if not np.isfinite(states).all():
         return "not finite"
-    if used.max() > _LIMIT_USED and not loose:
+    is_beyond = excess(fleet.programs[uas].model, reduced_state(x)) > 0.0
+    if used.max() > _LIMIT_USED and not is_beyond:
         return "beyond a limit of the vehicle"
     path_m = np.ascontiguousarray(states[:, :3])
     if float(spare_of_rules_m(fleet.programs[uas].space, path_m, True)) < -_ROUNDING_M:

@@ -13,7 +13,13 @@ from uas_coverage_baselines.routing import FreshPacks, Packs, RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.movers import Movers
-from uas_coverage_baselines.trajectory.program import Asked, Flight, FlightProgram, Landing
+from uas_coverage_baselines.trajectory.program import (
+    Allowance,
+    Asked,
+    Flight,
+    FlightProgram,
+    Landing,
+)
 from uas_coverage_baselines.trajectory.retiming import (
     Draft,
     draft,
@@ -34,7 +40,9 @@ IntArray = NDArray[np.int64]
 _LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
 _LANDING_S = 4.0
 _SPARE_S = 6.0  # of the battery, left in routes
-_ROOM = 0.06  # share of the limits left to tracking where the plant is not the model
+_ROOM = 0.03  # share of the limits left to tracking where the plant is not the model
+_ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
+_PACE = 0.91  # of the budgets of routes, there: flights are slower, and come some steps later still
 _LATER_SHARE = 0.96  # of budgets of flights not planned yet: they differ from routes by 1.6 %
 _LATER_STEPS = 12  # to make way for another
 
@@ -78,7 +86,7 @@ class Fleet:
         moving_margin_m: float = 0.0,
     ) -> None:
         self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
-        self._moving_margin_m = moving_margin_m
+        self._moving_margin_m, self._pace = moving_margin_m, 1.0
         self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
@@ -101,8 +109,14 @@ class Fleet:
 
     def leave_room(self) -> None:
         """Plan with part of the limits from now on: what flies is not what is planned with."""
+        self._pace = _PACE
         self.programs = [
-            replace(program, model=flight_model(self.arena.vehicles[u], _ROOM, self._speed_share))
+            replace(
+                program,
+                model=flight_model(self.arena.vehicles[u], _ROOM, self._speed_share),
+                reserve=_ROOM / (1.0 - _ROOM),
+                allowance=_ALLOWANCE,
+            )
             for u, program in enumerate(self.programs)
         ]
 
@@ -134,7 +148,7 @@ class Fleet:
             less_s: (U,) taken off the budgets: what routes took more than expected.
         """
         left_s = self.brief.max_steps * self.brief.dt_s - moment.time_s
-        budget_s = np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
+        budget_s = self._pace * np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
         return RoutingTask.of(
             self.terrain,
             moment.x,
@@ -176,7 +190,6 @@ class Fleet:
         paths_m: Mapping[int, FloatArray],
         movers: Sequence[Body],
         earliest: IntArray | None,
-        loose: FloatArray | None = None,
     ) -> FlightProgram:
         """The program of a UAS, clear of the paths of others and of what moves."""
         bodies = [
@@ -189,7 +202,6 @@ class Fleet:
             self.programs[uas],
             bodies=(*bodies, *movers),
             earliest=earliest,
-            loose=loose,
             solved=0,
         )
 

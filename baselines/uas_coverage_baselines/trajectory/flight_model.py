@@ -107,6 +107,13 @@ def flight_model(
     )
 
 
+def excess(model: FlightModel, start: FloatArray) -> float:
+    """The share by which a state (10,) is beyond the limits of a model; 0 within them."""
+    norms = np.linalg.norm(start[NORMS], axis=1) / model.norms
+    vertical = np.array([-start[V_DOWN], start[V_DOWN]]) / model.vertical
+    return max(float(norms.max()), float(vertical.max()), 1.0) - 1.0
+
+
 def in_wind(model: FlightModel, wind_mps: FloatArray) -> FlightModel:
     """The same vehicle in a steady wind, with its velocity over ground.
 

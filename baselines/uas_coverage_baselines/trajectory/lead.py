@@ -29,7 +29,6 @@ from uas_coverage_baselines.trajectory.flight_model import (
 )
 from uas_coverage_baselines.trajectory.program import Air, Flight, FlightProgram, Landing
 from uas_coverage_baselines.trajectory.retiming import draft, finished, retimed, shorten
-from uas_coverage_baselines.trajectory.tracking import KEPT_BACK, loosened
 from uas_coverage_baselines.trajectory.work import done
 from uas_coverage_env.autopilot.belief import wind_growth
 from uas_coverage_env.mission import MEAN_HEIGHT_M, LearntWind, MissionBrief
@@ -45,6 +44,7 @@ _PROGRAMS_AGAIN = 4  # to make a flight that is followed shorter
 _LATER = (0, 1, 2)  # steps
 _AGAIN_S = 3.0  # where no flight was found, another is looked for after this time
 _TUBE_S = 3.0  # flights keep so much more from obstacles as turbulence leads off in this time
+_KEPT_BACK = 0.02  # share of the limits that is left to what the model does not know
 _MEAN_SHARE = 0.5  # of the mean wind of the fleet in what is planned with: gusts pass
 _INSIDE_M, _INSIDE_SHARE = 1.5, 0.15  # of a waypoint's radius, at most, that flights visit within
 _INSIDE_SOON_M, _INSIDE_PER_STEP_M = 0.1, 0.3  # less is kept of a visit that is near
@@ -123,14 +123,13 @@ class Lead:
         if end >= 0:
             fast_mps = 2.0 * float(vehicle.v_xy_max_mps)
             landing = Landing(fleet.waypoints_m[end], float(radius_m[end]), fast_mps)
-        model = in_wind(flight_model(vehicle, KEPT_BACK), wind_mps)
+        model = in_wind(flight_model(vehicle, _KEPT_BACK), wind_mps)
         air = Air(np.append(wind_mps, 0.0), float(vehicle.v_xy_max_mps))
         return replace(
             program,
             model=model,
             landing=landing,
             radius_m=radius_m,
-            loose=loosened(model, start),
             air=air,
             solved=0,
         )

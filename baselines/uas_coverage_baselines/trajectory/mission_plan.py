@@ -336,7 +336,8 @@ def _verified(
     planned: dict[int, Planned] = {}
     troubles: dict[int, str] = {}
     for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):
-        why = trouble_alone(fleet, u, moment.x[u], flights[u])
+        clear = flights[u].is_clear
+        why = trouble_alone(fleet, u, moment.x[u], flights[u]) if clear else "no flight"
         course = course_of(fleet, u, step, moment.x[u], flights[u])
         if why is None and not all(
             are_apart(fleet, u, k, course, other.course) for k, other in planned.items()

@@ -25,7 +25,7 @@ from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
-from uas_coverage_baselines.trajectory.tracking import tracked
+from uas_coverage_baselines.trajectory.tracking import Tracking, tracked, with_room
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.flight.planner import Decision
@@ -276,20 +276,20 @@ class Trajectory:
             if not self._is_disturbed and not filtered[u]:
                 self._is_disturbed = True
                 self._fleet.leave_room()
-                self._planned = {}
+                for k in list(self._planned):
+                    self._plan_like_before(k, with_room, swarm, movers)
                 return
-            others = {
-                k: other.course.rest(swarm.step).path_m(10**6)
-                for k, other in self._planned.items()
-                if k != u
-            }
-            bodies = self._fleet.bodies(movers, u)
-            new = tracked(self._fleet, u, planned, swarm, others, bodies)
-            if new is None:
-                del self._planned[u]
-            else:
-                self._failures.add(float(obeys * (new.course.end - planned.course.end)))
-                self._planned[u] = new
+            later = self._plan_like_before(u, tracked, swarm, movers)
+            self._failures.add(float(obeys * later))
+
+    def _plan_like_before(self, uas: int, like: Tracking, swarm: SwarmState, movers: Movers) -> int:
+        """Plan the same visits from where a UAS is; steps by which its flight ends later."""
+        planned = self._planned.pop(uas)
+        others = {k: p.course.rest(swarm.step).path_m(10**6) for k, p in self._planned.items()}
+        new = like(self._fleet, uas, planned, swarm, others, self._fleet.bodies(movers, uas))
+        if new is not None:
+            self._planned[uas], self._ends[uas] = new, new.course.end
+        return 0 if new is None else new.course.end - planned.course.end
 
     def _earliest(self, opens: NDArray[np.int64], later: int) -> NDArray[np.int64]:
         """(W,) steps, from a sample so much later, before which waypoints are not to be visited."""
@@ -341,11 +341,11 @@ class Trajectory:
         return None
 
     def _flew(self, swarm: SwarmState) -> BoolArray:
-        """(U,) UAS that are flying by plan, or have ended as planned."""
+        """(U,) UAS that should be flying: by plan they have not ended, and are not home early."""
         ends = np.ones(len(swarm.status), np.bool_)
         for u, end in self._ends.items():
             ends[u] = swarm.step < end
-        return ends
+        return ends & ~self._down
 
     def _make_plan(self, swarm: SwarmState, movers: Movers) -> None:
         first, self._step = self.mission_plan is None and self._order is None, swarm.step

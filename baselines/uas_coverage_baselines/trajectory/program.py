@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY, FlightModel
+from uas_coverage_baselines.trajectory.flight_model import (
+    POSITION,
+    VELOCITY,
+    FlightModel,
+    excess,
+)
 from uas_coverage_baselines.trajectory.interior_point import solve
 from uas_coverage_baselines.trajectory.rows import SoftRows
 from uas_coverage_baselines.trajectory.space import (
@@ -29,15 +35,16 @@ TOLERANCE_M = 0.02
 
 _NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
 _FENCE_NEAR_M = 25.0
-_INSIDE_M = 0.05  # of a waypoint's radius, or a fiftieth of it
+_SMALL_M = 2.5  # spheres with a smaller radius are visited less far inside
 _FORGIVEN = 0.8  # share of that by which a visit may miss: it is inside the radius still
 _SLOW_SHARE = 0.97  # of the speed at which a waypoint may be covered
 _SLOW_WEIGHT = 2.0  # of 1 m/s too much
 _HEIGHT_SPARE_M = 0.2  # within the heights from which a waypoint may be covered
-_LANDING_SHARE = 0.9, 0.85  # of landing distance and speed
 _LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
 _CLEAR_WEIGHT = 2.0  # of 1 m too near
 _AIRSPEED_WEIGHT = 4.0  # of 1 m/s too much
+_SETTLING = np.linspace(1.0, 0.0, 8)[:-1]  # share of an excess that the first steps may have
+_SETTLED = 1.05
 _HOPELESS = 3.0  # more violation than this is no matter of faces
 
 
@@ -61,6 +68,20 @@ class Air:
 
     wind_mps: FloatArray
     speed_mps: float
+
+
+class Allowance(NamedTuple):
+    """What visits and landings keep, for what the model does not know."""
+
+    inside_m: float
+    """So far inside their spheres waypoints are visited."""
+    landing_distance: float
+    """Used share of the landing distance."""
+    landing_speed: float
+    """Used share of the landing speed."""
+
+
+AS_MODELLED = Allowance(0.05, 0.9, 0.85)
 
 
 @dataclass(frozen=True)
@@ -137,7 +158,8 @@ class FlightProgram:
         asked: What is asked beside; None: nothing of any waypoint.
         bodies: On known paths from step 0.
         earliest: (W,) steps before which a waypoint is not to be visited.
-        loose: Factors on the limits of the first stages, for a start beyond them.
+        reserve: Of the limits in `model`, by which the first steps may be beyond them.
+        allowance: Of visits and of the landing.
         air: In which the airspeed is limited, too; None: in still air.
         solved: How many programs were solved: the effort.
     """
@@ -150,8 +172,9 @@ class FlightProgram:
     asked: Asked | None = None
     bodies: Sequence[Body] = ()
     earliest: IntArray | None = None
-    loose: FloatArray | None = None
     air: Air | None = None
+    reserve: float = 0.0
+    allowance: Allowance = AS_MODELLED
     solved: int = field(default=0)
 
     def solve(
@@ -166,7 +189,7 @@ class FlightProgram:
         """The flight that visits at given steps and lands at the last.
 
         Args:
-            start: (10,) state.
+            start: (10,) state. Where it is beyond a limit, so are the first steps, ever less.
             route: (K,) waypoints.
             visits: (K,) a step in 1..N for each.
             guess: (N+1, 10) states, or (N+1, 3) positions.
@@ -181,9 +204,8 @@ class FlightProgram:
             return _unsolved(visits, guess)
         u = np.zeros((n_steps, 3)) if inputs is None else inputs
         loose = np.ones(n_steps + 1)
-        if self.loose is not None:
-            m = min(len(self.loose), n_steps)
-            loose[1 : m + 1] = self.loose[:m]
+        more = max(_SETTLED * excess(self.model, start), self.reserve)
+        loose[1 : len(_SETTLING) + 1] += more * _SETTLING[:n_steps]
         flight = _unsolved(visits, guess)
         x = guess
         for _ in range(rounds):
@@ -196,7 +218,7 @@ class FlightProgram:
                 return flight if np.isfinite(flight.violation) else _unsolved(visits, guess)
             x, u = found.x, found.u
             missed_m = found.violation[: len(route)]
-            forgiven = missed_m < _FORGIVEN * self._inside_m(route)
+            forgiven = self._is_visited(route, missed_m)
             violation = float(found.violation.sum() - missed_m[forgiven].sum())
             flight = Flight(visits, x, u, found.costate, violation, missed_m)
             if violation > _HOPELESS:
@@ -230,9 +252,16 @@ class FlightProgram:
             spare = min(spare, float(gap))
         return spare
 
+    def visits_all(self, route: IntArray, flight: Flight) -> bool:
+        """Whether a flight passes through all spheres, whatever else it violates."""
+        return bool(self._is_visited(route, flight.missed_m).all())
+
+    def _is_visited(self, route: IntArray, missed_m: FloatArray) -> NDArray[np.bool_]:
+        return missed_m < _FORGIVEN * self._inside_m(route)
+
     def _inside_m(self, route: IntArray) -> FloatArray:
         """(K,) how far inside their spheres visits are planned."""
-        return np.minimum(_INSIDE_M, 0.02 * self.radius_m[route])
+        return self.allowance.inside_m * np.minimum(1.0, self.radius_m[route] / _SMALL_M)
 
     def _at_path_speed(self, path_m: FloatArray) -> FloatArray:
         """(N+1, 10) states along positions, with the velocities of their differences."""
@@ -246,13 +275,23 @@ class FlightProgram:
         n_steps = len(path_m) - 1
         inside_m = self.radius_m[route] - self._inside_m(route)
         made = [_balls(visits, POSITION, self.waypoints_m[route], inside_m, 1.0)]
-        distance, speed = _LANDING_SHARE
         end = np.array([n_steps])
         home = self.landing
         made += [
-            _balls(end, POSITION, home.home_m[None], np.array([distance * home.distance_m]), 1.0),
             _balls(
-                *(end, VELOCITY, np.zeros((1, 3)), np.array([speed * home.speed_mps])),
+                end,
+                POSITION,
+                home.home_m[None],
+                np.array([self.allowance.landing_distance * home.distance_m]),
+                1.0,
+            ),
+            _balls(
+                *(
+                    end,
+                    VELOCITY,
+                    np.zeros((1, 3)),
+                    np.array([self.allowance.landing_speed * home.speed_mps]),
+                ),
                 _LANDING_WEIGHT,
             ),
         ]

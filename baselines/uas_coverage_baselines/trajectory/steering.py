@@ -29,8 +29,10 @@ FAILURES = 4.0
 _FORGIVEN_PER_STEP = 0.1
 
 _OFF_MPS = 0.6
-"""A velocity that is off by so much after a step is no plan's; the nonlinear plant is off by less.
-"""
+"""A velocity that is off by so much after a step is no plan's; the nonlinear plant is off by more
+in one of some hundred steps."""
+
+_OFF_COUNTS = 0.5  # three times within some steps it is a force, or another vehicle
 
 
 class Failures:
@@ -46,7 +48,7 @@ class Failures:
     def see(self, off_mps: float) -> None:
         """A velocity that is not the planned one, after a step [m/s]."""
         if off_mps > _OFF_MPS:
-            self._steps += 2.0 * FAILURES
+            self._steps += _OFF_COUNTS * FAILURES
 
     def next_step(self) -> None:
         """Forgive a little."""
