@@ -37,6 +37,10 @@ _TIGHT_M = 3.0
 """A corner so near to what routes avoid of two obstacles lies in a gap that is seen through from
 there alone: UAS come to rest at it before they turn."""
 
+_TO_HOME = 0.85
+"""Of the way from where braking would end to home, what a UAS that lands in wind flies in a second
+or a step, whichever takes longer: a velocity held for a step puts off the end by that step's way."""
+
 _SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
 _TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
 _SHARE_WHEN_TURNED = 0.4
@@ -132,9 +136,11 @@ def _is_tight(arena, x, y):
 
 
 @kernel
-def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
+def _approach_speed(arena, i, x, target, stop, lands, distance_m, leg, altitude1_m):
     """Speed towards the end of a leg [m/s]: slower for turns, a stop, and a climb or descent."""
     uas = arena.uas[i]
+    if lands:
+        return min(uas.speed_mps, _TO_HOME * distance_m / max(arena.rules[0].dt_s, 1.0))
     if stop:
         return min(uas.speed_mps, 0.28 * distance_m)
     if leg == ROUND_CORNER:
@@ -214,9 +220,15 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         lead_s = min(LEAD_S, 0.5 * left_m / (math.hypot(x[VX], x[VY]) + 1e-9))
     ahead_x = end_x - x[X] - lead_s * x[VX]
     ahead_y = end_y - x[Y] - lead_s * x[VY]
+    path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
+    # in still air, recorded flights and trained policies depend on a slower landing
+    lands = belief is not None and arena.rules[0].disturbed and target < 0 and leg != ROUND_CORNER
+    if lands:
+        fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
+        ahead_x, ahead_y = end_x - path_m[-1, X], end_y - path_m[-1, Y]
     distance_m = math.hypot(ahead_x, ahead_y)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
-    approach_mps = _approach_speed(arena, i, x, target, stop, distance_m, leg, -z1)
+    approach_mps = _approach_speed(arena, i, x, target, stop, lands, distance_m, leg, -z1)
     speed_mps = min(speed_mps, approach_mps)
     altitude_m = _altitude(arena, i, x, -z1, 0.0 if low else way_m, needed_m)
     north_mps = 0.0
@@ -226,7 +238,6 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         east_mps = ahead_y / distance_m * speed_mps
     # what is in the way of a descent is not in the way of staying up
     level_m = max(altitude_m, -x[Z] - x[VZ])
-    path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     for share in _SHARES_OF_SPEED:
         for wanted_m in (altitude_m, level_m):
             write_command(command, VELOCITY, share * north_mps, share * east_mps, wanted_m)
