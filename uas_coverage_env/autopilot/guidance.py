@@ -39,7 +39,8 @@ there alone: UAS come to rest at it before they turn."""
 
 _TO_HOME = 0.85
 """Of the way from where braking would end to home, what a UAS that lands in wind flies in a second
-or a step, whichever takes longer: a velocity held for a step puts off the end by that step's way."""
+or a step, whichever is longer: a velocity held for a step moves that end on by the way of a step.
+"""
 
 _SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
 _TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
