@@ -6,7 +6,8 @@ from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.disturbances import constant_wind
-from uas_coverage_env.scenario import with_disturbances
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.scenario import sample_scenario, with_disturbances
 from uas_coverage_env.scenario.air import Gust, Wind
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, X, Y
@@ -118,6 +119,17 @@ def test_in_wind_a_uas_brakes_late_and_lands_where_it_comes_to_rest(from_deg, dt
     assert dt_s * len(distances_m) <= 17.0 + 2.0 * dt_s
     reached = next(k for k, distance_m in enumerate(distances_m) if distance_m < 2.0)
     assert max(distances_m[reached:]) < 2.0
+
+
+def test_in_a_wind_beyond_half_its_airspeed_a_uas_comes_home_slowly():
+    # which a crosswind alone would make 1 s longer
+    assert len(flight_home(8.0, 90.0, 1.0)) - len(flight_home(5.0, 90.0, 1.0)) >= 3
+
+
+@pytest.mark.parametrize("seed", [3024, 3049])
+def test_strong_wind_blows_no_uas_over_the_fence_beside_its_home(seed):
+    scenario = sample_scenario(seed, (1, 2), (8, 12), (3, 8), disturbances="strong")
+    assert rollout(scenario, "nearest-waypoint", seed).violations == ()
 
 
 def test_the_plant_lands_as_soon_in_wind_as_the_linear_model():
