@@ -6,10 +6,11 @@ from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.disturbances import constant_wind
-from uas_coverage_env.scenario import with_disturbances
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.scenario import sample_scenario, with_disturbances
 from uas_coverage_env.scenario.air import Gust, Wind
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle import DOD, X, Y
 from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
 
 FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)
@@ -93,3 +94,48 @@ def test_home_is_found_from_above_a_roof_right_below_the_ceiling(wind_mps):
         outcome = world.step({"uas_1": GoTo(None)})
         assert outcome["breaches"][0] == 0
     assert world.state.status[0] == LANDED
+
+
+def flight_home(wind_mps, from_deg, dt_s, dynamics="lpv"):
+    """Distances from home [m] at the samples of a flight home from 120 m away, until it lands."""
+    scenario = meadow([(100.0, 30.0, -1.0)], waypoints=FAR, dt_s=dt_s)
+    wind = (constant_wind(wind_mps, from_deg),) if wind_mps else None
+    world = World(scenario, disturbances=wind, dynamics=dynamics)
+    world.state.departed[0] = True
+    world.state.x[0, :3] = 100.0, 150.0, -10.0
+    distances_m = []
+    while not world.done:
+        world.step({"uas_1": GoTo(None)})
+        distances_m.append(float(np.hypot(*(world.state.x[0, [X, Y]] - (100.0, 30.0)))))
+    assert world.state.status[0] == LANDED
+    return distances_m
+
+
+@pytest.mark.parametrize("dt_s", [0.2, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("from_deg", [0.0, 90.0])
+def test_in_wind_a_uas_brakes_late_and_lands_where_it_comes_to_rest(from_deg, dt_s):
+    distances_m = flight_home(3.0, from_deg, dt_s)
+    # 10 s at full speed, 3 s each to reach it and to brake, and what steps do not divide
+    assert dt_s * len(distances_m) <= 17.0 + 2.0 * dt_s
+    reached = next(k for k, distance_m in enumerate(distances_m) if distance_m < 2.0)
+    assert max(distances_m[reached:]) < 2.0
+
+
+def test_in_a_wind_beyond_half_its_airspeed_a_uas_comes_home_slowly():
+    # which a crosswind alone would make 1 s longer
+    assert len(flight_home(8.0, 90.0, 1.0)) - len(flight_home(5.0, 90.0, 1.0)) >= 3
+
+
+@pytest.mark.parametrize("seed", [3024, 3049])
+def test_strong_wind_blows_no_uas_over_the_fence_beside_its_home(seed):
+    scenario = sample_scenario(seed, (1, 2), (8, 12), (3, 8), disturbances="strong")
+    assert rollout(scenario, "nearest-waypoint", seed).violations == ()
+
+
+def test_the_plant_lands_as_soon_in_wind_as_the_linear_model():
+    linear, plant = (len(flight_home(3.0, 90.0, 1.0, kind)) for kind in ("lpv", "nonlinear"))
+    assert abs(linear - plant) <= 1
+
+
+def test_in_still_air_a_uas_lands_as_recorded_flights_and_trained_policies_know_it():
+    assert len(flight_home(0.0, 0.0, 1.0)) == 20

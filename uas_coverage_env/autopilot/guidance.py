@@ -21,7 +21,7 @@ from uas_coverage_env.world.routes import (
     level_apart,
     route,
 )
-from uas_coverage_env.world.state import FLYING
+from uas_coverage_env.world.state import FLYING, WIND
 
 LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
@@ -36,6 +36,15 @@ HEADROOM_M = 0.5
 _TIGHT_M = 3.0
 """A corner so near to what routes avoid of two obstacles lies in a gap that is seen through from
 there alone: UAS come to rest at it before they turn."""
+
+_TO_HOME = 0.85
+"""Of the way from where braking would end to home, what a UAS that lands in wind flies in a second
+or a step, whichever is longer: a velocity held for a step moves that end on by the way of a step.
+"""
+
+_WIND_TO_HURRY = 0.5
+"""Of the highest airspeed: in a stronger wind a gust may take all of it, and braking takes longer
+than simulated. There, as in still air, a UAS comes home slowly."""
 
 _SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
 _TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
@@ -131,10 +140,24 @@ def _is_tight(arena, x, y):
     return n_near > 1
 
 
+@inlined_kernel
+def _brakes_late(arena, i, belief, target, leg):
+    """Whether a UAS on the last leg home brakes as late as it can, in the wind believed in.
+
+    In still air it does not: recorded flights and trained policies know the slower landing.
+    """
+    if belief is None or not arena.rules[0].disturbed or target >= 0 or leg == ROUND_CORNER:
+        return False
+    wind_mps = math.hypot(belief[WIND], belief[WIND + 1])
+    return wind_mps <= _WIND_TO_HURRY * arena.vehicles[i].reference_max_mps
+
+
 @kernel
-def _approach_speed(arena, i, x, target, stop, distance_m, leg, altitude1_m):
+def _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, altitude1_m):
     """Speed towards the end of a leg [m/s]: slower for turns, a stop, and a climb or descent."""
     uas = arena.uas[i]
+    if brakes_late:
+        return min(uas.speed_mps, _TO_HOME * distance_m / max(arena.rules[0].dt_s, 1.0))
     if stop:
         return min(uas.speed_mps, 0.28 * distance_m)
     if leg == ROUND_CORNER:
@@ -214,9 +237,14 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         lead_s = min(LEAD_S, 0.5 * left_m / (math.hypot(x[VX], x[VY]) + 1e-9))
     ahead_x = end_x - x[X] - lead_s * x[VX]
     ahead_y = end_y - x[Y] - lead_s * x[VY]
+    path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
+    brakes_late = _brakes_late(arena, i, belief, target, leg)
+    if brakes_late:
+        fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
+        ahead_x, ahead_y = end_x - path_m[-1, X], end_y - path_m[-1, Y]
     distance_m = math.hypot(ahead_x, ahead_y)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
-    approach_mps = _approach_speed(arena, i, x, target, stop, distance_m, leg, -z1)
+    approach_mps = _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, -z1)
     speed_mps = min(speed_mps, approach_mps)
     altitude_m = _altitude(arena, i, x, -z1, 0.0 if low else way_m, needed_m)
     north_mps = 0.0
@@ -226,7 +254,6 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         east_mps = ahead_y / distance_m * speed_mps
     # what is in the way of a descent is not in the way of staying up
     level_m = max(altitude_m, -x[Z] - x[VZ])
-    path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     for share in _SHARES_OF_SPEED:
         for wanted_m in (altitude_m, level_m):
             write_command(command, VELOCITY, share * north_mps, share * east_mps, wanted_m)
