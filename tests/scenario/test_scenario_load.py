@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from uas_coverage_env import rollout
 from uas_coverage_env import scenario as room
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import SERIES, load_scenario, scenario_names, warnings
@@ -180,3 +181,29 @@ def test_a_drawn_area_is_no_scenario_yet_and_the_message_says_how_it_becomes_one
     with pytest.raises(InputError, match="uas-coverage import") as refusal:
         load_scenario(name)
     assert f"--out {name.rpartition('/')[2].partition('.')[0]}.toml" in str(refusal.value)
+
+
+def test_the_scenario_of_a_flight_is_flown_again_by_its_path(tmp_path):
+    flight = rollout("open_field", "nearest-waypoint", seed=0, max_steps=3)
+    flight.save(tmp_path / "flight")
+    path = tmp_path / "flight" / "scenario.json"
+    assert load_scenario(path) == load_scenario(str(path)) == load_scenario("open_field")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("{", "is not valid JSON: Expecting property name"),
+        ("[1]", "is not valid JSON: it should hold one object"),
+        ('{"schema": "1"}', 'schema: should be a whole number, not "1"'),
+        ("[" * 100_000, "brackets are nested too deeply"),
+    ],
+)
+def test_a_wrong_json_file_is_one_line(tmp_path, text, expected):
+    path = tmp_path / "mission.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_scenario(path)
+    line = str(caught.value)
+    assert line.startswith(f"{path}: {expected}")
+    assert len(line.splitlines()) == 1

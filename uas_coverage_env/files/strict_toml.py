@@ -1,4 +1,4 @@
-"""Strict reading of TOML files: every mistake is one line with file, field, value and fix."""
+"""Strict reading of TOML and JSON: every mistake is one line with file, field, value and fix."""
 
 import datetime
 import json
@@ -6,7 +6,7 @@ import math
 import re
 import tomllib
 import types
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar, Union, get_args, get_origin
@@ -95,21 +95,40 @@ def read_toml(path: str | Path, model: type[M], *, context: Any = None) -> M:
         InputError: The file is missing, is not TOML, is larger than 16 MiB, or does not fit the
             model; one line.
     """
-    source = str(path)
-    try:
-        text = read_text(Path(path), _MOST_BYTES)
+
+    def loads(text: str) -> dict[str, Any]:
         if found := _KEYS_IN_A_ROW.search(text):
             line = text.count("\n", 0, found.start()) + 1
             raise InputError(
-                f"{source}: line {line}: names keys more than {_MOST_KEYS} deep; flatten the tables"
+                f"{path}: line {line}: names keys more than {_MOST_KEYS} deep; flatten the tables"
             )
-        data = tomllib.loads(text)
+        return tomllib.loads(text)
+
+    return parse(_loaded(Path(path), loads, "TOML"), model, str(path), context=context)
+
+
+def read_json(path: str | Path, model: type[M], *, context: Any = None) -> M:
+    """Read a file of one JSON object into a pydantic model; as `read_toml`."""
+
+    def loads(text: str) -> dict[str, Any]:
+        data = json.loads(text)
+        if not isinstance(data, dict):
+            raise ValueError("it should hold one object, { ... }")
+        return data
+
+    return parse(_loaded(Path(path), loads, "JSON"), model, str(path), context=context)
+
+
+def _loaded(path: Path, loads: Callable[[str], dict[str, Any]], kind: str) -> dict[str, Any]:
+    source = str(path)
+    try:
+        return loads(read_text(path, _MOST_BYTES))
     except InputError:
         raise
     except FileNotFoundError:
         raise _error(source, "no such file; check the path") from None
     except IsADirectoryError:
-        raise _error(source, "is a folder; give the path of a TOML file") from None
+        raise _error(source, f"is a folder; give the path of a {kind} file") from None
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise _error(source, f"cannot be read ({reason}); check the path and its rights") from None
@@ -119,8 +138,7 @@ def read_toml(path: str | Path, model: type[M], *, context: Any = None) -> M:
     except RecursionError:
         raise _error(source, "brackets are nested too deeply; flatten the arrays") from None
     except ValueError as error:
-        raise _error(source, f"is not valid TOML: {error}; correct the syntax there") from None
-    return parse(data, model, source, context=context)
+        raise _error(source, f"is not valid {kind}: {error}; correct the syntax there") from None
 
 
 def parse(data: Mapping[str, Any], model: type[M], source: str, *, context: Any = None) -> M:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from uas_coverage_env.files.strict_toml import InputError, read_toml
+from uas_coverage_env.files.strict_toml import InputError, read_json, read_toml
 from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.scenario.family import ALIASES, SERIES
 from uas_coverage_env.scenario.model import Scenario
@@ -24,8 +24,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
     Args:
         name_or_path: The name of a shipped scenario, the name and the seed of a generated one as
-            in `town:7` or `streets:seed=7` (see `SERIES`, `ALIASES`), or the path of a TOML file in
-            the same format; a string is a path where it ends in `.toml` or contains a folder.
+            in `town:7` or `streets:seed=7` (see `SERIES`, `ALIASES`), or the path of a file in
+            the same format, TOML or, where it ends in `.json`, the `scenario.json` of a flight; a
+            string is a path where it ends in `.toml` or `.json` or contains a folder.
 
     Raises:
         InputError: There is no such scenario, or something in it is wrong: one line that names
@@ -43,7 +44,8 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         path = Path(name_or_path)
     else:
         return _generated(str(name_or_path))
-    return read_toml(path, Scenario, context={"folder": path.parent})
+    read = read_json if path.suffix.lower() == ".json" else read_toml
+    return read(path, Scenario, context={"folder": path.parent})
 
 
 def _generated(text: str) -> Scenario:
@@ -69,4 +71,4 @@ def is_path(name_or_path: str | Path) -> bool:
     if isinstance(name_or_path, Path):
         return True
     path = Path(name_or_path) if isinstance(name_or_path, str) else Path()
-    return path.suffix == ".toml" or len(path.parts) > 1
+    return path.suffix in (".toml", ".json") or len(path.parts) > 1
