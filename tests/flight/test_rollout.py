@@ -213,12 +213,11 @@ def test_ctrl_c_leaves_the_flight_so_far(yard, listed, interrupted):
     assert len(flight.u) == len(flight.covered) == len(flight.moving_position_m) == 6
 
 
-@pytest.mark.parametrize(
-    "number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)]
-)
+@pytest.mark.parametrize("name", sorted({"SIGINT", "SIGTERM", "SIGHUP"} & set(dir(signal))))
 def test_a_signal_ends_the_flight_after_the_step_and_is_handled_as_before_after_it(
-    yard, listed, number
+    yard, listed, name
 ):
+    number = getattr(signal, name)
     act, finished = listed.act, []
 
     def interrupted(swarm):

@@ -56,7 +56,7 @@ def tracked(
     """
     route, rest = planned.rest(swarm.step, swarm.uncovered)
     if rest.steps < 2:  # too late for another
-        return _checked(fleet, uas, swarm, route, rest)
+        return _checked(fleet, uas, swarm, route, rest) if rest.steps else None
     program = fleet.program(uas, others_m, movers, None)
     model = flight_model(fleet.arena.vehicles[uas], _KEPT_BACK)
     space = program.space._replace(keep_m=program.space.keep_m + _WIDER_M)
@@ -74,6 +74,8 @@ def with_room(
 ) -> Planned | None:
     """The same visits by a flight that leaves the room of the fleet; arguments as for `tracked`."""
     route, rest = planned.rest(swarm.step, swarm.uncovered)
+    if rest.steps < 2:
+        return tracked(fleet, uas, planned, swarm, others_m, movers)
     program = fleet.program(uas, others_m, movers, None)
     slower = 1.0 + program.reserve
     visits = np.ceil(slower * rest.visits).astype(np.int64)
