@@ -96,7 +96,7 @@ def understood(words):
         options = dict(option.split("=", 1) for option in given["option"] or ())
         if given["planner"] not in PLACEHOLDERS and not given["planner"].startswith("policy:"):
             load_planner(given["planner"], options)
-        if not given["scenario"].endswith(".toml"):
+        if not given["scenario"].endswith((".toml", ".json")):
             load_scenario(given["scenario"])
     if command.name == "compare":
         named = ",".join(given["planners"]).split(",")
