@@ -4,6 +4,8 @@ import numpy as np
 from small_worlds import box, meadow, waypoint
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import reduced_state
+from uas_coverage_baselines.trajectory.retiming import draft, finished
+from uas_coverage_baselines.trajectory.work import done
 
 from uas_coverage_env.mission import MissionBrief, first_sight
 
@@ -36,3 +38,10 @@ def start_of(swarm, uas=0):
 
 def every_waypoint(scenario):
     return np.arange(len(scenario.waypoints))
+
+
+def quickest(fleet, start, route, budget):
+    """The quickest flight of a fleet's first UAS along a route."""
+    program = fleet.programs[0]
+    begun = done(draft(program, fleet.terrain, 0, start, route, budget))
+    return done(finished(program, start, route, begun))

@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
-from small_fleets import TOWER, every_waypoint, field, fleet_of, start_of
+from small_fleets import TOWER, every_waypoint, field, fleet_of, quickest, start_of
 from small_worlds import box, meadow, waypoint
 from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.first_guess import first_flight
 from uas_coverage_baselines.trajectory.fleet import Moment, make_way
 from uas_coverage_baselines.trajectory.retiming import (
-    draft,
-    finished,
     retimed,
     stretches,
     worth,
@@ -18,12 +16,6 @@ from uas_coverage_baselines.trajectory.work import done
 from uas_coverage_env.geometry import segment_clearance
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.vehicle import VX, VZ
-
-
-def quickest(fleet, start, route, budget):
-    program = fleet.programs[0]
-    begun = done(draft(program, fleet.terrain, 0, start, route, budget))
-    return done(finished(program, start, route, begun))
 
 
 @pytest.fixture(scope="module")

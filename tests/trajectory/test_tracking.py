@@ -2,14 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_fleets import every_waypoint, field, fleet_of, start_of
+from small_fleets import every_waypoint, field, fleet_of, quickest, start_of
 from uas_coverage_baselines.trajectory.course import course_of
 from uas_coverage_baselines.trajectory.flight_model import NORMS, excess, flight_model
 from uas_coverage_baselines.trajectory.mission_plan import Planned
-from uas_coverage_baselines.trajectory.retiming import draft, finished
+from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.steering import Failures
-from uas_coverage_baselines.trajectory.tracking import tracked, with_room
-from uas_coverage_baselines.trajectory.work import done
+from uas_coverage_baselines.trajectory.tracking import tracked
 
 from uas_coverage_env.vehicle import VX, VZ
 
@@ -22,10 +21,13 @@ def under_way():
     scenario = field()
     fleet, swarm = fleet_of(scenario)
     route, start = every_waypoint(scenario), start_of(swarm)
-    program = fleet.programs[0]
-    begun = done(draft(program, fleet.terrain, 0, start, route, 60))
-    flight = done(finished(program, start, route, begun))
+    flight = quickest(fleet, start, route, 60)
     return fleet, swarm, Planned(route, flight, course_of(fleet, 0, 0, swarm.x[0], flight))
+
+
+def again_from(fleet, planned, swarm, program_of):
+    movers = Movers.seen(fleet.brief, swarm, np.zeros(1, np.bool_))
+    return tracked(fleet, 0, {0: planned}, swarm, movers, program_of)
 
 
 def most_used(fleet, flight):
@@ -38,7 +40,7 @@ def test_where_the_plant_is_not_the_model_plans_leave_room(under_way):
     fleet, swarm, planned = under_way
     assert most_used(fleet, planned.flight).max() > 0.99
     fleet.leave_room()
-    roomy = with_room(fleet, 0, planned, swarm, {}, ())
+    roomy = again_from(fleet, planned, swarm, fleet.program)
     assert sorted(roomy.route) == sorted(planned.route)
     assert most_used(fleet, roomy.flight).max() < 0.975
     assert planned.flight.steps < roomy.flight.steps < 1.15 * planned.flight.steps
@@ -54,7 +56,7 @@ def test_a_uas_that_was_pushed_makes_its_visits_from_where_it_is(under_way):
     open_now = np.zeros(len(fleet.waypoints_m), np.bool_)
     open_now[planned.route[planned.flight.visits > step]] = True
     pushed = replace(swarm, step=step, x=x, uncovered=open_now)
-    again = tracked(fleet, 0, planned, pushed, {}, ())
+    again = again_from(fleet, planned, pushed, fleet.tracking_program)
     np.testing.assert_array_equal(again.course.x[0], x[0])
     assert set(again.route) == set(np.flatnonzero(open_now))
     places_m = again.course.x[again.flight.visits, :3]

@@ -40,9 +40,12 @@ IntArray = NDArray[np.int64]
 _LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
 _LANDING_S = 4.0
 _SPARE_S = 6.0  # of the battery, left in routes
-_ROOM = 0.03  # share of the limits left to tracking where the plant is not the model
+# where the plant is not the model: what plans keep, and what is left of it to tracking
+_ROOM, _TRACKING_ROOM = 0.03, 0.01  # share of the limits
 _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
-_PACE = 0.91  # of the budgets of routes, there: flights are slower, and come some steps later still
+_TRACKING_ALLOWANCE = Allowance(inside_m=0.25, landing_distance=0.8, landing_speed=0.5)
+_WIDER_M = 0.3  # tracking keeps of obstacles beyond the distance of plans, where it can
+_PACE = 0.91  # of the budgets of routes: flights are slower, and come some steps later still
 _LATER_SHARE = 0.96  # of budgets of flights not planned yet: they differ from routes by 1.6 %
 _LATER_STEPS = 12  # to make way for another
 
@@ -189,7 +192,7 @@ class Fleet:
         uas: int,
         paths_m: Mapping[int, FloatArray],
         movers: Sequence[Body],
-        earliest: IntArray | None,
+        earliest: IntArray | None = None,
     ) -> FlightProgram:
         """The program of a UAS, clear of the paths of others and of what moves."""
         bodies = [
@@ -203,6 +206,19 @@ class Fleet:
             bodies=(*bodies, *movers),
             earliest=earliest,
             solved=0,
+        )
+
+    def tracking_program(
+        self, uas: int, paths_m: Mapping[int, FloatArray], movers: Sequence[Body]
+    ) -> FlightProgram:
+        """The same for a flight that is made anew in every step, which needs less room."""
+        program = self.program(uas, paths_m, movers)
+        return replace(
+            program,
+            model=flight_model(self.arena.vehicles[uas], _TRACKING_ROOM),
+            space=program.space._replace(keep_m=program.space.keep_m + _WIDER_M),
+            reserve=0.0,
+            allowance=_TRACKING_ALLOWANCE,
         )
 
     def drafts(

@@ -25,7 +25,7 @@ from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 from uas_coverage_baselines.trajectory.steering import Failures, Steering
-from uas_coverage_baselines.trajectory.tracking import Tracking, tracked, with_room
+from uas_coverage_baselines.trajectory.tracking import ProgramOf, tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.flight.planner import Decision
@@ -277,16 +277,15 @@ class Trajectory:
                 self._is_disturbed = True
                 self._fleet.leave_room()
                 for k in list(self._planned):
-                    self._plan_like_before(k, with_room, swarm, movers)
+                    self._refit(k, self._fleet.program, swarm, movers)
                 return
-            later = self._plan_like_before(u, tracked, swarm, movers)
+            later = self._refit(u, self._fleet.tracking_program, swarm, movers)
             self._failures.add(float(obeys * later))
 
-    def _plan_like_before(self, uas: int, like: Tracking, swarm: SwarmState, movers: Movers) -> int:
+    def _refit(self, uas: int, program_of: ProgramOf, swarm: SwarmState, movers: Movers) -> int:
         """Plan the same visits from where a UAS is; steps by which its flight ends later."""
+        new = tracked(self._fleet, uas, self._planned, swarm, movers, program_of)
         planned = self._planned.pop(uas)
-        others = {k: p.course.rest(swarm.step).path_m(10**6) for k, p in self._planned.items()}
-        new = like(self._fleet, uas, planned, swarm, others, self._fleet.bodies(movers, uas))
         if new is not None:
             self._planned[uas], self._ends[uas] = new, new.course.end
         return 0 if new is None else new.course.end - planned.course.end

@@ -44,7 +44,7 @@ _LANDING_WEIGHT = 4.0  # of 1 m/s too much at the landing
 _CLEAR_WEIGHT = 2.0  # of 1 m too near
 _AIRSPEED_WEIGHT = 4.0  # of 1 m/s too much
 _SETTLING = np.linspace(1.0, 0.0, 8)[:-1]  # share of an excess that the first steps may have
-_SETTLED = 1.05
+_SETTLED = 1.05  # of the excess: a state on its limit cannot be led back
 _HOPELESS = 3.0  # more violation than this is no matter of faces
 
 
