@@ -1,8 +1,11 @@
 """What each kind of event does to a mission, and that the swarm comes out of it as defined."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from eventful import STARTS_M, WAYPOINTS, after, corners_m, event, field, hovering
+from own_disturbances import push
 from small_worlds import mover
 
 from uas_coverage_env import MissionBrief, World, rollout
@@ -109,6 +112,13 @@ def test_a_damaged_motor_of_a_mission_with_other_events_is_refused():
         ValueError, match="belongs to an event that scenario 'meadow' does not have"
     ):
         World(field(), disturbances=damaged)
+
+
+def test_whatever_else_belongs_to_an_event_is_refused_where_the_scenario_lacks_it():
+    """A kernel of another package reads the event's number from its parameters, too."""
+    icing = replace(push(0.0, 0.0, 3.0), name="events[3] icing", of_event=True)
+    with pytest.raises(ValueError, match=r"'events\[3\] icing' belongs to an event"):
+        World(field(), disturbances=(icing,))
 
 
 def test_a_uas_with_a_damaged_motor_draws_more_and_climbs_less_and_comes_home():

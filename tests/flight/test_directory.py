@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Decision, Flight, rollout, summary
+from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
 from uas_coverage_env.world import Velocity, Wrench
 
 FILES = {
@@ -385,3 +386,10 @@ def test_files_that_ask_for_more_samples_than_they_hold_are_refused_before_room_
     path.write_text(f"{header}\n{first}\n{late}\n")
     with pytest.raises(InputError, match=r"it holds 2 rows, too few for 16 samples"):
         Flight.load(saved)
+
+
+def test_a_row_that_does_not_fit_its_headings_is_not_written(flight, tmp_path, monkeypatch):
+    monkeypatch.setattr("uas_coverage_env.flight.directory.FLIGHT_COLUMNS", FLIGHT_COLUMNS[:-1])
+    with pytest.raises(ValueError, match="a row of 26 values under 25 headings"):
+        flight.save(tmp_path / "flight")
+    assert not (tmp_path / "flight" / "flight.csv").exists()

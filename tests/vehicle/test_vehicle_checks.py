@@ -7,7 +7,7 @@ import pytest
 from flying import NAMES, load, record_of
 from test_vehicle_params import SHIPPED, changed_file
 
-from uas_coverage_env.files.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse
 from uas_coverage_env.vehicle import (
     DOD,
     N_INPUTS,
@@ -16,12 +16,14 @@ from uas_coverage_env.vehicle import (
     VehicleParams,
     battery_segments,
     compile_vehicle,
+    derived,
     fit_thrust_correction,
     load_vehicle,
     lpv_step,
     plant_step,
 )
 from uas_coverage_env.vehicle.checks import TOLERANCE
+from uas_coverage_env.vehicle.parts import computed_fields
 
 CONTRADICTIONS = {
     "mass": ("mass_kg", 3.77, r"power\.hover_W is 193\.816, but .* take 612\.5 W"),
@@ -153,6 +155,25 @@ def test_a_payload_changes_what_follows_from_the_mass():
     assert loaded.battery.voltage_nominal_V < vehicle.battery.voltage_nominal_V
     assert loaded.limits == vehicle.limits
     assert battery_segments(loaded)[0].current_A > battery_segments(vehicle)[0].current_A
+
+
+def test_a_battery_of_more_cells_turns_the_rotors_faster():
+    """Five cells for four: what a file may leave out is that of the changed vehicle."""
+    vehicle = load("s500_v2")
+    cells = {"ocv_V": tuple(1.25 * volts for volts in vehicle.battery.ocv_V), "voltage_min_V": 16.5}
+    changed = vehicle.with_changes(battery=cells)
+    nominal_V = changed.battery.voltage_nominal_V
+    assert nominal_V == pytest.approx(1.25 * vehicle.battery.voltage_nominal_V, rel=0.02)
+    full_radps = derived.full_throttle_radps(changed, nominal_V)
+    assert changed.rotor.speed_max_radps == pytest.approx(full_radps)
+    given = vehicle.with_changes(battery=cells, rotor={"speed_max_radps": 1200.0})
+    assert given.rotor.speed_max_radps == 1200.0
+
+
+def test_every_value_that_may_be_left_out_is_computed_anew():
+    fields = {name for _, part in load("s500_v2") if isinstance(part, StrictModel)
+              for name in computed_fields(type(part))}  # fmt: skip
+    assert fields == set(FOLLOWING)
 
 
 def test_a_copy_with_a_changed_mass_alone_is_refused():

@@ -6,11 +6,9 @@ nothing: whoever makes one keeps the array alive for as long, as the arguments o
 They must not leave compiled code.
 """
 
-import ctypes
 import math
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -41,19 +39,6 @@ def slice_view(array: NDArray, first: int, n: int) -> Any:
     return array.reshape(-1)[first : first + n]
 
 
-def carray(address: int, dtype: np.dtype, shape: tuple[int, ...]) -> Any:
-    """The C-contiguous array that lies at an address, for as long as its owner keeps it.
-
-    Args:
-        address: Of its first element.
-        dtype: Of its elements; a constant.
-        shape: Its shape.
-    """
-    n_bytes = int(math.prod(shape)) * dtype.itemsize
-    memory = memoryview((ctypes.c_char * n_bytes).from_address(int(address)))
-    return np.ndarray(shape, dtype, memory)
-
-
 def view_of(builder, context, view_type, start, shape, itemsize):
     """An array that owns nothing, of the sizes `shape`, at a pointer."""
     strides = [itemsize]
@@ -80,7 +65,7 @@ def _sizes(builder, context, shape, shape_type):
 
 
 @type_callable(rows_view)
-def _type_of_borrowed(context):
+def _type_of_rows_view(context):
     def typer(array, row, shape):
         if not isinstance(array, types.Array) or array.layout != "C":
             return None
@@ -92,7 +77,7 @@ def _type_of_borrowed(context):
 
 
 @lower_builtin(rows_view, types.Array, types.Integer, types.BaseTuple)
-def _borrowed(context, builder, signature, arguments):
+def _lower_rows_view(context, builder, signature, arguments):
     array_type, row_type, shape_type = signature.args
     whole = make_array(array_type)(context, builder, arguments[0])
     row_bytes = cgutils.unpack_tuple(builder, whole.strides)[0]
@@ -104,7 +89,7 @@ def _borrowed(context, builder, signature, arguments):
 
 
 @type_callable(slice_view)
-def _type_of_part(context):
+def _type_of_slice_view(context):
     def typer(array, first, n):
         if not isinstance(array, types.Array) or array.layout != "C":
             return None
@@ -114,29 +99,10 @@ def _type_of_part(context):
 
 
 @lower_builtin(slice_view, types.Array, types.Integer, types.Integer)
-def _parted(context, builder, signature, arguments):
+def _lower_slice_view(context, builder, signature, arguments):
     array_type, first_type, n_type = signature.args
     whole = make_array(array_type)(context, builder, arguments[0])
     first = context.cast(builder, arguments[1], first_type, types.intp)
     size = context.cast(builder, arguments[2], n_type, types.intp)
     start = builder.gep(whole.data, [first])
     return view_of(builder, context, signature.return_type, start, [size], whole.itemsize)
-
-
-@type_callable(carray)
-def _type_of_lent(context):
-    def typer(address, dtype, shape):
-        return types.Array(dtype.dtype, len(shape), "C")
-
-    return typer
-
-
-@lower_builtin(carray, types.Integer, types.DType, types.BaseTuple)
-def _lent(context, builder, signature, arguments):
-    address_type, dtype_type, shape_type = signature.args
-    element = context.get_data_type(dtype_type.dtype)
-    number = context.cast(builder, arguments[0], address_type, types.intp)
-    start = builder.inttoptr(number, element.as_pointer())
-    itemsize = context.get_constant(types.intp, context.get_abi_sizeof(element))
-    sizes = _sizes(builder, context, arguments[2], shape_type)
-    return view_of(builder, context, signature.return_type, start, sizes, itemsize)

@@ -1,7 +1,7 @@
 """Views of declared arrays (`memory.py`) for kernels: at addresses, into a pool, of a lane.
 
-They own nothing, as those of `borrow`: whoever makes one keeps the arrays alive for as long, and a
-view must not leave compiled code.
+They own nothing: the caller keeps the arrays alive for as long, and a view must not leave compiled
+code.
 """
 
 import ctypes

@@ -26,4 +26,5 @@ def degrade(arena, state, outcome, i, parameters, memory, random):
 def motor_degraded(e: int, event: MotorDegraded) -> Disturbance:
     """What event number e of a scenario does."""
     name = f"events[{e}] motor_degraded"
-    return Disturbance(name, degrade, (float(e), event.thrust_share, event.power_factor))
+    parameters = (float(e), event.thrust_share, event.power_factor)
+    return Disturbance(name, degrade, parameters, of_event=True)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from uas_coverage_env.disturbances.gusts import discrete_gusts, random_gusts
-from uas_coverage_env.disturbances.motor import degrade, motor_degraded
+from uas_coverage_env.disturbances.motor import motor_degraded
 from uas_coverage_env.disturbances.turbulence import turbulence
 from uas_coverage_env.disturbances.uncertainty import uncertainty
 from uas_coverage_env.disturbances.wind import mean_wind
@@ -49,7 +49,7 @@ def disturbances_in(
         return disturbances_of(scenario)
     given = checked_disturbances(given)
     for disturbance in given:
-        if disturbance.act is degrade and disturbance not in disturbances_of(scenario):
+        if disturbance.of_event and disturbance not in disturbances_of(scenario):
             raise ValueError(
                 f"disturbance {disturbance.name!r} belongs to an event that scenario "
                 f"{scenario.name!r} does not have; leave it out"

@@ -97,13 +97,11 @@ class Episode:
         self._scratch = SCRATCH.zeros(sizes)
 
     def _see_anew(self) -> None:
-        """Go on in a scene that has changed; waypoints keep their indices."""
-        world, before, outcome = self._world, self._learners, self._scratch
+        """Go on in a scene that has changed: UAS are the same, waypoints keep their indices."""
+        world, before = self._world, (*self._learners, *self._scratch)
         self._lay_out()
-        for name in ("asked", "targets", "candidates", "report", "amounts"):
-            getattr(self._learners, name)[:] = getattr(before, name)
-        for array, old in zip(self._scratch, outcome, strict=True):
-            array[:] = old
+        for array, old in zip((*self._learners, *self._scratch), before, strict=True):
+            array[: len(old)] = old
         self._prepare()
         observe_scene(
             world.arena, world.state, self.tables, self._learners, self._observing,

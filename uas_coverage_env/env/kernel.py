@@ -38,7 +38,7 @@ class Rules(NamedTuple):
     nonlinear: bool
     """Whether the 6-DOF plant is flown."""
     assistants: Any
-    """Which help to fly, see `world.advance`."""
+    """Which help to fly, see `autopilot.assist`."""
     disturbances: Any
     """What pushes back, likewise."""
     paying: Paying

@@ -167,5 +167,8 @@ def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows(rows)
+    for row in rows:
+        if len(row) != len(header):
+            raise ValueError(f"a row of {len(row)} values under {len(header)} headings: {header}")
+        writer.writerow(row)
     return text.getvalue()

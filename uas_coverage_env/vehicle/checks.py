@@ -13,7 +13,14 @@ import numpy as np
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.vehicle import derived
 from uas_coverage_env.vehicle.battery import segments_of
-from uas_coverage_env.vehicle.parts import Battery, Parts, Power, Rotor, ThrustCorrection
+from uas_coverage_env.vehicle.parts import (
+    Battery,
+    Parts,
+    Power,
+    Rotor,
+    ThrustCorrection,
+    is_absent,
+)
 from uas_coverage_env.vehicle.thrust_correction import MOST_BEYOND_TRIM_RAD, fit_thrust_correction
 
 Section = TypeVar("Section", bound=StrictModel)
@@ -54,7 +61,7 @@ def completed_battery(vehicle: Parts) -> Battery:
         "discharge curve and resistances give {:.4g} V on average over a hover",
     )
     linearised = not (
-        _is_absent(battery.polarisation_linearised_V) or _is_absent(battery.ocv_dod_linearised)
+        is_absent(battery.polarisation_linearised_V) or is_absent(battery.ocv_dod_linearised)
     )
     battery = _filled(battery, computed)
     if min(battery.voltages_linearised_V) <= weakest_V:
@@ -226,11 +233,7 @@ def _agree(given: Any, computed: Mapping[str, Any], part: str, name: str, source
         )
 
 
-def _is_absent(value: float | tuple[float, ...]) -> bool:
-    return value == () or value != value
-
-
 def _filled(section: Section, computed: Mapping[str, Any]) -> Section:
     """The section with what was left out."""
-    absent = {name: value for name, value in computed.items() if _is_absent(getattr(section, name))}
+    absent = {name: value for name, value in computed.items() if is_absent(getattr(section, name))}
     return section.model_copy(update=absent) if absent else section

@@ -11,21 +11,9 @@ from pydantic import model_validator
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, read_toml
 from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.vehicle import checks
-from uas_coverage_env.vehicle.parts import Parts
+from uas_coverage_env.vehicle.parts import Parts, computed_fields
 
 _FILES = resources.files("uas_coverage_env.vehicle")
-
-# what `with_changes` computes anew
-_FOLLOWS = {
-    "power": {"hover_W", "slope_W_per_N"},
-    "battery": {"polarisation_linearised_V", "ocv_dod_linearised", "voltage_nominal_V"},
-    "thrust_correction": {
-        "speed_N_per_mps",
-        "climb_N_per_mps",
-        "descent_N_per_mps",
-        "tilt_N_per_rad",
-    },
-}
 
 
 class VehicleParams(Parts):
@@ -54,8 +42,8 @@ class VehicleParams(Parts):
     def with_changes(self, **sections: Mapping[str, Any]) -> Self:
         """A copy with some values changed and what follows from its parts computed anew.
 
-        Hover power and its slope, nominal voltage, linearisation points and thrust correction are
-        those of the changed vehicle; `model_copy` would keep them and refuse the contradiction.
+        What a file may leave out (`parts.computed_fields`) is that of the changed vehicle, unless
+        it is given here; `model_copy` would keep it and refuse the contradiction.
 
         Args:
             sections: New values by field, by section: `airframe={"mass_kg": 2.0}`.
@@ -65,11 +53,10 @@ class VehicleParams(Parts):
         if unknown:
             raise ValueError(f"unknown section {unknown[0]!r}; a vehicle has {', '.join(parts)}")
         changed = {}
-        for name in parts.keys() & (sections.keys() | _FOLLOWS.keys()):
-            kept = {
-                field: value for field, value in parts[name] if field not in _FOLLOWS.get(name, ())
-            }
-            changed[name] = type(parts[name])(**{**kept, **sections.get(name, {})})
+        for name, part in parts.items():
+            follows = computed_fields(type(part))
+            kept = {field: value for field, value in part if field not in follows}
+            changed[name] = type(part)(**{**kept, **sections.get(name, {})})
         return self.model_copy(update=changed)
 
 

@@ -36,6 +36,17 @@ def _computed(low: float, high: float) -> Any:
     return Field(ge=low, le=high, validate_default=False)
 
 
+def computed_fields(section: type[StrictModel]) -> tuple[str, ...]:
+    """The fields of a section that a file may leave out, because they follow from the parts."""
+    fields = section.model_fields.items()
+    return tuple(name for name, field in fields if is_absent(field.default))
+
+
+def is_absent(value: object) -> bool:
+    """Whether a value was left out: ABSENT, or no points of a curve."""
+    return value == () or (isinstance(value, float) and math.isnan(value))
+
+
 class Airframe(StrictModel):
     """Rigid body and rotor arrangement (the paper's Assumption 1: rotors equally spaced).
 

@@ -48,6 +48,8 @@ class Disturbance:
         act: The kernel.
         parameters: Finite numbers that it is handed.
         common: All UAS draw the same random numbers, instead of each its own.
+        of_event: Its parameters hold the number of an event: it acts in scenarios that have it,
+            and is refused in others, where the kernel would read beside its array.
 
     Raises:
         ValueError: A parameter is not finite, or the name is empty.
@@ -57,6 +59,7 @@ class Disturbance:
     act: Any
     parameters: tuple[float, ...] = ()
     common: bool = False
+    of_event: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:

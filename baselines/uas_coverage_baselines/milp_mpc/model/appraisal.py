@@ -6,7 +6,8 @@ one of three ways:
 
 - a block with `cost_along` knows its part of the objective in closed form;
 - the rows of some blocks hold for every flight of the vehicle's model, or are measured against
-  the geometry (`verify`): `_MEASURED`. Coverage is counted for the team, see `construction.teams`;
+  the geometry (`verify`): `_MEASURED`. Coverage is counted for the team, see
+  `search.trajectories.teams`;
 - of any other block the rows are written, the flight is put in, and what columns of its own are
   left are chosen at best: their cost is the block's price of the flight. A row that no choice
   satisfies says that the flight must not be flown.
