@@ -1,10 +1,10 @@
 """How the world pushes back: disturbances as blocks, those of the package and those of others."""
 
 from uas_coverage_env.compiled.random import normal, uniform
+from uas_coverage_env.disturbances.dryden import turbulence
 from uas_coverage_env.disturbances.gusts import discrete_gusts, random_gusts
 from uas_coverage_env.disturbances.of_scenario import disturbances_of
-from uas_coverage_env.disturbances.turbulence import turbulence
-from uas_coverage_env.disturbances.uncertainty import uncertainty
+from uas_coverage_env.disturbances.parameter_errors import uncertainty
 from uas_coverage_env.disturbances.wind import constant_wind, mean_wind, wind_velocity_mps
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY, Disturbance
 

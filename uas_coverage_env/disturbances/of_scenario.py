@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 
+from uas_coverage_env.disturbances.dryden import turbulence
 from uas_coverage_env.disturbances.gusts import discrete_gusts, random_gusts
 from uas_coverage_env.disturbances.motor import motor_degraded
-from uas_coverage_env.disturbances.turbulence import turbulence
-from uas_coverage_env.disturbances.uncertainty import uncertainty
+from uas_coverage_env.disturbances.parameter_errors import uncertainty
 from uas_coverage_env.disturbances.wind import mean_wind
 from uas_coverage_env.scenario import Scenario, Uncertainty, Wind
 from uas_coverage_env.scenario.events import MotorDegraded
