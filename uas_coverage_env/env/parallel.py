@@ -142,10 +142,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._rows_alone = flown.rows_alone
         self._told: tuple[Observations, Infos] = ({}, {})
         # one object per agent: a learner seeds them one by one
-        self._observation_spaces = {
+        self.observation_spaces = {
             agent: observation_space(flown) for agent in self.possible_agents
         }
-        self._action_spaces = {
+        self.action_spaces = {
             agent: self._episode.actions.space() for agent in self.possible_agents
         }
         self.state_space = global_space(self._missions.source.room)
@@ -169,11 +169,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """The space of an agent's observations; always the same object."""
-        return self._observation_spaces[agent]
+        return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """The space of an agent's actions; always the same object."""
-        return self._action_spaces[agent]
+        return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
