@@ -93,16 +93,20 @@ def test_new_arrays_have_the_declared_types_and_shapes():
 @pytest.mark.parametrize("scalar", [np.float64, np.float32, np.int64, np.bool_, np.uint64])
 @pytest.mark.parametrize("form", ALIASES)
 def test_an_array_has_the_declared_type_however_its_alias_is_nested(form, scalar):
-    shed = NamedTuple("shed", [("height_m", Annotated[ALIASES[form](scalar), "B", 2])])
-    (field,) = Memory(shed).fields
+    class Shed(NamedTuple):
+        height_m: Annotated[ALIASES[form](scalar), "B", 2]
+
+    (field,) = Memory(Shed).fields
     assert (field.dtype, field.axes) == (np.dtype(scalar), ("B", 2))
 
 
 @pytest.mark.parametrize("array", [np.ndarray, NDArray[Any], NDArray[np.int64] | NDArray[np.int8]])
 def test_a_declaration_that_does_not_say_one_type_of_elements_is_refused(array):
-    shed = NamedTuple("shed", [("height_m", Annotated[array, "B"])])
-    with pytest.raises(TypeError, match="height_m: .* does not say one type of elements"):
-        Memory(shed)
+    class Shed(NamedTuple):
+        height_m: Annotated[array, "B"]
+
+    with pytest.raises(TypeError, match=r"height_m: .* does not say one type of elements"):
+        Memory(Shed)
 
 
 def test_a_kernel_finds_at_their_addresses_the_arrays_themselves():

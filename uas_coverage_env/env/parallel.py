@@ -116,7 +116,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             `human`: space pauses, right steps, escape closes it and the missions go on).
 
     Version History:
-        v0: First version.
+        v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]

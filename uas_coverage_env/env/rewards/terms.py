@@ -103,8 +103,8 @@ REWARD = (
     RewardTerm(
         "violation",
         10.0,
-        "-1 when it is lost (contact, outside the fence, battery overdrawn, out of control), or its "
-        "wrench leaves a limit of the vehicle by more than the tolerance",
+        "-1 when it is lost (contact, outside the fence, battery overdrawn, out of control), or "
+        "its wrench leaves a limit of the vehicle by more than the tolerance",
         violation,
     ),
     RewardTerm(
