@@ -94,7 +94,7 @@ def test_new_arrays_have_the_declared_types_and_shapes():
 @pytest.mark.parametrize("form", ALIASES)
 def test_an_array_has_the_declared_type_however_its_alias_is_nested(form, scalar):
     class Shed(NamedTuple):
-        height_m: Annotated[ALIASES[form](scalar), "B", 2]
+        height_m: Annotated[ALIASES[form](scalar), "B", 2]  # pyrefly: ignore[invalid-annotation]
 
     (field,) = Memory(Shed).fields
     assert (field.dtype, field.axes) == (np.dtype(scalar), ("B", 2))

@@ -1,10 +1,8 @@
 """The multi-agent environment in turns: one agent acts after the other (PettingZoo AEC)."""
 
-from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import AECEnv
 from pettingzoo.utils import BaseWrapper, OrderEnforcingWrapper
@@ -23,12 +21,12 @@ class InTurns(parallel_to_aec_wrapper[str, NDArray[np.float32], Any]):
     """
 
     @property
-    def observation_spaces(self) -> Mapping[str, spaces.Space[Any]]:
+    def observation_spaces(self) -> dict[str, Any]:
         """See `CoverageParallelEnv.observation_spaces`."""
         return self.env.observation_spaces
 
     @property
-    def action_spaces(self) -> Mapping[str, spaces.Space[Any]]:
+    def action_spaces(self) -> dict[str, Any]:
         """See `CoverageParallelEnv.action_spaces`."""
         return self.env.action_spaces
 
