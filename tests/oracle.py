@@ -77,7 +77,7 @@ class Expected:
     separation_m: float = math.inf
 
 
-def expected_step(scenario, state, wrenches, returning):
+def expected_step(scenario, state, wrenches, returning, judged=()):
     """Everything that should come out of one step.
 
     Args:
@@ -85,6 +85,7 @@ def expected_step(scenario, state, wrenches, returning):
         state: The world's state before the step.
         wrenches: (U, 4) the lift and torques flown.
         returning: (U,) whether each UAS returns.
+        judged: Indices of UAS that are flown by the wrench of a learner.
 
     Returns:
         (list of Expected, (W,) uncovered, (U,) departed) at the new sample.
@@ -99,6 +100,11 @@ def expected_step(scenario, state, wrenches, returning):
         _fly(scenario.vehicles[i], scenario.dt_s, wrenches[i], results[i])
     end = np.array([result.x[:3] for result in results])
     _judge(scenario, step, flying, start, end, results)
+    for i in set(flying) & set(judged):
+        limits, x = scenario.vehicles[i].limits, results[i].x
+        too_fast = math.hypot(x[3], x[4]) > 1.5 * limits.v_xy_max_mps
+        if too_fast or math.hypot(x[6], x[7]) > 1.5 * limits.tilt_max_rad:
+            results[i].contacts.add("limits")
     whole = [i for i in flying if not results[i].contacts]
     _count_breaches(scenario, step, whole, end, results)
     uncovered = state.uncovered.copy()

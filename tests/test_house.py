@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from email import message_from_bytes
 from email.message import Message
 from graphlib import TopologicalSorter
+from importlib.metadata import requires, version
 from pathlib import Path
 
 import grimp
@@ -257,6 +258,16 @@ def test_users_constraints_leave_room_for_learners_libraries():
     assert {"numba", "numpy", "scipy", "highspy"} <= users.keys()
     # RLlib and AgileRL need versions of their own
     assert not users.keys() & {"gymnasium", "pettingzoo", "torch", "pandas", "packaging", "ray"}
+
+
+def test_every_numpy_from_our_bound_on_that_numba_takes_is_ours():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    ours = {each.name: each.specifier for each in map(Requirement, project["dependencies"])}
+    numbas = {each.name: each.specifier for each in map(Requirement, requires("numba") or [])}
+    assert ours["numba"].contains(version("numba"))
+    releases = [f"2.{minor}.0" for minor in range(6)]
+    assert [release in numbas["numpy"] for release in releases] == [True] * 6
+    assert [release in ours["numpy"] for release in releases] == [True] * 6
 
 
 def _canonical(name: str) -> str:

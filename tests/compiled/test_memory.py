@@ -1,15 +1,27 @@
 """Arrays that are declared once: what follows from a declaration, in Python and in a kernel."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.compiled.views import Layout, copy_arrays, lane_view, pool_view
+
+S = TypeVar("S", bound=np.generic)
+NESTED = np.ndarray[tuple[Any, ...], np.dtype[S]]
+NAMED = TypeAliasType("NAMED", NESTED[S], type_params=(S,))
+ALIASES = {
+    "before numpy 2.5": lambda scalar: NESTED[scalar],
+    "since numpy 2.5": lambda scalar: NAMED[scalar],
+    "of this numpy": lambda scalar: NDArray[scalar],
+    "a name for one": lambda scalar: TypeAliasType("Rows", NAMED[scalar]),
+}
+"""How `NDArray[scalar]` may be nested."""
 
 BOX_DTYPE = np.dtype((np.record, np.dtype([("side_m", "f8"), ("n", "i8")], align=True)))
 
@@ -76,6 +88,25 @@ def test_new_arrays_have_the_declared_types_and_shapes():
     assert [array.shape for array in arrays] == [(3,), (3, 2), (3,), (5,)]
     assert [array.dtype for array in arrays] == [BOX_DTYPE, float, np.int64, np.float32]
     assert DEPOT.zeros({"B": 3, "P": 5}, lanes=4).height_m.shape == (4, 3, 2)
+
+
+@pytest.mark.parametrize("scalar", [np.float64, np.float32, np.int64, np.bool_, np.uint64])
+@pytest.mark.parametrize("form", ALIASES)
+def test_an_array_has_the_declared_type_however_its_alias_is_nested(form, scalar):
+    class Shed(NamedTuple):
+        height_m: Annotated[ALIASES[form](scalar), "B", 2]  # pyrefly: ignore[invalid-annotation]
+
+    (field,) = Memory(Shed).fields
+    assert (field.dtype, field.axes) == (np.dtype(scalar), ("B", 2))
+
+
+@pytest.mark.parametrize("array", [np.ndarray, NDArray[Any], NDArray[np.int64] | NDArray[np.int8]])
+def test_a_declaration_that_does_not_say_one_type_of_elements_is_refused(array):
+    class Shed(NamedTuple):
+        height_m: Annotated[array, "B"]
+
+    with pytest.raises(TypeError, match=r"height_m: .* does not say one type of elements"):
+        Memory(Shed)
 
 
 def test_a_kernel_finds_at_their_addresses_the_arrays_themselves():

@@ -20,7 +20,7 @@ import scenes_on_gpu
 from uas_coverage_env.env import cuda
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.memory import LIMITS, REWARD
+from uas_coverage_env.env.memory import CONTACT, LIMITS, REWARD
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.packs import Sorties
@@ -29,26 +29,29 @@ from uas_coverage_env.vehicle import limit_names
 N_LANES, N_STEPS = 2, 13
 
 
-def compare(ground, ask=None):
+def compare(ground, ask=None, **settings):
     """Fly both ways, lanes with different actions, past the end of missions.
 
     Args:
         ground: The mission.
         ask: The actions of a step, by its number; None: any.
+        **settings: Of both.
     """
-    missions = CudaMissions(N_LANES, ground)
-    episodes = [Episode(ground, MissionSettings()) for _ in range(N_LANES)]
+    missions = CudaMissions(N_LANES, ground, **settings)
+    episodes = [Episode(ground, MissionSettings(**settings)) for _ in range(N_LANES)]
+    size = episodes[0].actions.size
     for episode in episodes:
         episode.reset()
     rng = np.random.default_rng(0)
     different, restarts = 0, 0
     ended = [False] * N_LANES
-    statuses = set()
+    statuses, contacts = set(), set()
     for k in range(N_STEPS):
-        asked = rng.uniform(-1, 1, (N_LANES, 2, 3)) if ask is None else ask(k)
+        asked = rng.uniform(-1, 1, (N_LANES, 2, size)) if ask is None else ask(k)
         missions.step(asked)
         seen = missions.missions
         statuses |= set(seen.worlds.status.ravel().tolist())
+        contacts |= set(seen.learners.report[:, :, CONTACT].ravel().tolist())
         for lane, episode in enumerate(episodes):
             if ended[lane]:
                 episode.reset()
@@ -70,6 +73,7 @@ def compare(ground, ask=None):
     return {
         "different": different,
         "statuses": sorted(statuses),
+        "contacts": sorted(contacts),
         "restarts": restarts,
         "refused": missions.missions.refused.tolist(),
         "changed": changed,
@@ -80,11 +84,11 @@ def compare(ground, ask=None):
 
 
 def limits_exceeded():
-    """Names of the limits that the largest pitch torque exceeds, step by step."""
+    """Names of the limits that a constant pitch torque exceeds, step by step."""
     missions = CudaMissions(1, practice_ground(n_uas=1, size_m=2000.0), action="wrench")
     found = []
-    for _ in range(3):
-        missions.step(np.array([[[0.0, 0.0, 1.0, 0.0]]]))
+    for _ in range(6):
+        missions.step(np.array([[[0.0, 0.0, 0.1, 0.0]]]))
         found.append(limit_names(int(missions.missions.learners.report[0, 0, LIMITS])))
     return found
 
@@ -115,6 +119,7 @@ if __name__ == "__main__":
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
     high = with_roles(still.model_copy(update={"min_height_m": 6.0}))
     flown = {"still": compare(still), "windy": compare(windy), "high": compare(high)}
+    flown["wrenches"] = compare(still, action="wrench")
     flown["packs"] = compare(swapping_ground(), out_and_back)
     own = {
         "actions": own_actions_on_gpu.compare(),

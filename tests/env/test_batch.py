@@ -8,7 +8,7 @@ from practice_grounds import practice_ground, with_roles
 
 from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
 from uas_coverage_env.env.batch_kernel import ABSENT, drawn
-from uas_coverage_env.env.memory import ENERGY, FIRST_TERM, LIMITS, STATUS
+from uas_coverage_env.env.memory import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import generate_scenario
@@ -56,6 +56,7 @@ def assert_is(batch, lane, env, observations, rewards=None, infos=None):
             assert info["energy_Wh"] == batch.learners.amounts[lane, i, ENERGY]
             assert info["status"] == report[STATUS]
             assert info["limits_exceeded"] == report[LIMITS]
+            assert info["contact"] == report[CONTACT]
             if batch.chooses:
                 mask = batch.action_masks()[lane, i]
                 np.testing.assert_array_equal(info["action_mask"], mask)

@@ -1,6 +1,7 @@
 from changing_missions import EVENTS, EVERYTHING
 from scenes_on_gpu import EVERY_KIND
 
+from uas_coverage_env import ContactKind
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.world import SWAPPING
 
@@ -17,11 +18,8 @@ def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes(flown_on_
         assert result["changed"] == [False, True]
         assert result["acted"] > 20
     assert flown["windy"]["x"] != flown["still"]["x"]
-    assert flown["still"]["limits_exceeded"] == [
-        [],
-        ["tilt", "tilt_rate"],
-        ["speed", "tilt", "tilt_rate"],
-    ]
+    assert flown["still"]["limits_exceeded"] == [*[[]] * 4, ["tilt"], ["speed", "tilt"]]
+    assert ContactKind.LIMITS in flown["wrenches"]["contacts"]
 
 
 def test_scenes_change_on_a_simulated_gpu_as_in_episodes(flown_on_gpu):

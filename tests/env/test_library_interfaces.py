@@ -1,5 +1,6 @@
 """What learners' libraries need of observations, infos, actions and specs."""
 
+import copy
 import json
 import os
 import pickle
@@ -11,8 +12,10 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.spaces import Box, Dict
+from gymnasium.spaces import Box, Dict, Tuple
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from pettingzoo.utils.conversions import aec_to_parallel
+from pettingzoo.utils.wrappers import BaseParallelWrapper
 from practice_grounds import practice_ground
 
 from uas_coverage_env import ContactKind, UasStatus, load_scenario, uas_coverage_v0
@@ -120,6 +123,44 @@ def test_infos_can_be_flat():
         _, info = env.reset(seed=0)
         assert "reward_terms_home" in info
         assert not any(isinstance(value, dict) for value in info.values())
+
+
+@pytest.mark.parametrize("settings", [{}, WAYPOINT], ids=["velocities", "waypoints"])
+@pytest.mark.parametrize("scenario", [GROUND, fleets], ids=["fixed", "drawn"])
+@pytest.mark.parametrize("form", ["parallel", "turns", "raw turns", "back", "wrapped", "copied"])
+def test_mappings_of_spaces_hold_the_spaces_themselves(form, scenario, settings):
+    parallel = uas_coverage_v0.parallel_env(scenario, **settings)
+    env: Any = {
+        "parallel": lambda: parallel,
+        "turns": lambda: uas_coverage_v0.env(scenario, **settings),
+        "raw turns": lambda: uas_coverage_v0.raw_env(scenario, **settings),
+        "back": lambda: aec_to_parallel(uas_coverage_v0.raw_env(scenario, **settings)),
+        "wrapped": lambda: BaseParallelWrapper(parallel),
+        "copied": lambda: copy.deepcopy(parallel),
+    }[form]()
+    for begun in (False, True):
+        if begun:
+            env.reset(seed=0)
+        for mapping, space in (
+            (env.observation_spaces, env.observation_space),
+            (env.action_spaces, env.action_space),
+        ):
+            assert list(mapping) == env.possible_agents
+            assert all(mapping[agent] is space(agent) for agent in env.possible_agents)
+
+
+def test_a_swarm_whose_spaces_are_joined_by_the_mappings_flies_a_mission():
+    # as EPyMARL joins them, in the order of the agents
+    env = uas_coverage_v0.parallel_env(GROUND, action="waypoint")
+    env.reset(seed=0)
+    observed = Tuple([env.observation_spaces[agent] for agent in env.agents])
+    acted = Tuple([env.action_spaces[agent] for agent in env.agents])
+    acted.seed(0)
+    agents = list(env.agents)
+    while env.agents:
+        seen, *_ = env.step(dict(zip(agents, acted.sample(), strict=True)))
+        if len(seen) == len(agents):
+            assert observed.contains(tuple(seen[agent] for agent in agents))
 
 
 def test_what_an_agent_that_has_ended_is_asked_is_ignored_whatever_it_is():

@@ -20,6 +20,11 @@ def turning(seen):
     return np.array([np.cos(9.0 * seen[0]), np.sin(9.0 * seen[1]), seen[2] - 0.5], np.float32)
 
 
+def tumbling(seen):
+    """Wrenches that soon lead beyond the limits."""
+    return np.append(turning(seen), 0.3).astype(np.float32)
+
+
 def nearest(seen):
     return 0
 
@@ -48,6 +53,8 @@ def paid_by_environment(policy, seed, **settings):
         (turning, {"action": "velocity"}),
         (turning, {"action": "acceleration", "safety_filter": True, "return_mode": True}),
         (nearest, {"action": "waypoint", "return_mode": True}),
+        (tumbling, {"action": "wrench"}),
+        (tumbling, {"action": "wrench", "safety_filter": True, "dynamics": "nonlinear"}),
     ],
 )
 def test_a_policy_is_paid_what_its_environment_pays(policy, settings):

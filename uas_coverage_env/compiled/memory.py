@@ -85,6 +85,18 @@ class Field:
         return types.Array(numpy_support.from_dtype(self.dtype), len(self.axes), "C")
 
 
+def _scalars(annotation: Any) -> set[type[np.generic]]:
+    """The types of elements that an annotation names.
+
+    How an alias such as `NDArray[np.float64]` is nested differs between versions of numpy, and it
+    may hide behind a name (`type Rows = NDArray[...]`).
+    """
+    if isinstance(annotation, type) and issubclass(annotation, np.generic):
+        return {annotation}
+    within = get_args(annotation) or (getattr(annotation, "__value__", None),)
+    return set().union(*(_scalars(each) for each in within if each is not None))
+
+
 def _field(name: str, annotation: Any) -> Field:
     if get_origin(annotation) is not Annotated:
         raise TypeError(f"{name}: declare it as Annotated[NDArray[...], axes...]")
@@ -92,8 +104,10 @@ def _field(name: str, annotation: Any) -> Field:
     if isinstance(said[0], np.dtype):
         dtype = said.pop(0)
     else:
-        (scalar,) = get_args(get_args(array)[1])
-        dtype = np.dtype(scalar)
+        scalars = _scalars(array)
+        if len(scalars) != 1:
+            raise TypeError(f"{name}: {array} does not say one type of elements")
+        dtype = np.dtype(scalars.pop())
     values = said.pop() if isinstance(said[-1], Values) else None
     return Field(name, dtype, tuple(said), values)
 

@@ -5,13 +5,30 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 from pettingzoo import AECEnv
-from pettingzoo.utils import BaseWrapper
-from pettingzoo.utils.conversions import parallel_to_aec
+from pettingzoo.utils import BaseWrapper, OrderEnforcingWrapper
+from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import ScenarioLike
 from uas_coverage_env.world import Command, SwarmState
+
+
+class InTurns(parallel_to_aec_wrapper[str, NDArray[np.float32], Any]):
+    """PettingZoo's form in turns, with the spaces of the environment as they are.
+
+    PettingZoo makes new mappings and warns; libraries read them all the same.
+    """
+
+    @property
+    def observation_spaces(self) -> dict[str, Any]:
+        """See `CoverageParallelEnv.observation_spaces`."""
+        return self.env.observation_spaces
+
+    @property
+    def action_spaces(self) -> dict[str, Any]:
+        """See `CoverageParallelEnv.action_spaces`."""
+        return self.env.action_spaces
 
 
 class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
@@ -61,7 +78,7 @@ def raw_env(
         scenario: See `CoverageParallelEnv`.
         **settings: See `CoverageParallelEnv`.
     """
-    return parallel_to_aec(CoverageParallelEnv(scenario, **settings))
+    return OrderEnforcingWrapper(InTurns(CoverageParallelEnv(scenario, **settings)))
 
 
 def env(scenario: ScenarioLike = "village", **settings: Any) -> ChecksAtOnce:

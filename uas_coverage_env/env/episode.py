@@ -75,6 +75,7 @@ class Episode:
             safety_filter=settings.safety_filter,
             measured_m=0.0,  # only what counts: nothing more is told
             disturbances=settings.disturbances_in(scenario),
+            judges_wrenches=True,
         )
         self.names = self._world.names
         self.max_cycles = scenario.max_steps

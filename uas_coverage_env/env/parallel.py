@@ -47,7 +47,9 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         largest lift (-1) over hover (0) to the smallest (1).
 
         wrench, `Box(-1, 1, (4,))`: lift, from the smallest (-1) over the weight alone (0) to the
-        largest (1); three torques in units of the limits.
+        largest (1); three torques in units of the limits. What no inner loop prevents costs the
+        UAS: in each step that ends beyond a limit of the vehicle by more than the tolerance it pays
+        the term violation, beyond 1.5 times the limit of speed or of tilt it is lost.
 
         waypoint, `Discrete(13)`: which of the 12 nearest open waypoints to fly to, in the order of
         the observation, or home (12). `infos[agent]["action_mask"]` is 1 for choices that exist;
@@ -80,7 +82,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
         - `status` (`UasStatus`): 0 flying, 1 landed, 2 lost, 3 swapping its battery pack
         - `contact` (`ContactKind`): what it was lost to; 0 nothing, 1 obstacle, 2 moving obstacle,
-          3 UAS, 4 geofence, 5 battery
+          3 UAS, 4 geofence, 5 battery, 6 an event of the scenario, 7 limits, out of control
         - `contact_with`: the index of that obstacle or UAS in the scenario, else -1
         - `limits_exceeded`: limits of the vehicle that it exceeds, as a mask: bit k stands for
           `vehicle.LIMIT_NAMES[k]`
@@ -100,7 +102,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     Episode End:
         Terminated: landed (slow and near its start, which it has left before or returns to), or
-        lost (contact with an obstacle or a UAS, outside of the fence, battery overdrawn).
+        lost (contact with an obstacle or a UAS, outside of the fence, battery overdrawn, out of
+        control by its own wrench, an event).
         Truncated: still flying after `max_cycles` steps. An agent that has ended leaves `agents`; a
         UAS that lands to swap its battery pack (`[sorties]`, `together = false`) has not ended.
 
@@ -113,7 +116,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             `human`: space pauses, right steps, escape closes it and the missions go on).
 
     Version History:
-        v0: First version.
+        v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
@@ -142,10 +145,10 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         self._rows_alone = flown.rows_alone
         self._told: tuple[Observations, Infos] = ({}, {})
         # one object per agent: a learner seeds them one by one
-        self._observation_spaces = {
+        self.observation_spaces = {
             agent: observation_space(flown) for agent in self.possible_agents
         }
-        self._action_spaces = {
+        self.action_spaces = {
             agent: self._episode.actions.space() for agent in self.possible_agents
         }
         self.state_space = global_space(self._missions.source.room)
@@ -169,11 +172,11 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """The space of an agent's observations; always the same object."""
-        return self._observation_spaces[agent]
+        return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """The space of an agent's actions; always the same object."""
-        return self._action_spaces[agent]
+        return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

@@ -48,7 +48,7 @@ def scene_arrays(
         before: The tables of the scene before.
     """
     slots = fitted_to(disturbances, settings.disturbances_in(known))
-    arena = build_arena(known, measured_m=MEASURED_M, disturbances=slots)
+    arena = build_arena(known, measured_m=MEASURED_M, disturbances=slots, judges_wrenches=True)
     return arena, tables_of(known, before.ranges)
 
 
@@ -130,7 +130,9 @@ class ScenarioPool:
         else:
             self.disturbances = tuple(disturbances)
             slots = [fitted_to(disturbances, own) for own in acting]
-        worlds = pool_worlds(self.scenarios, measured_m=MEASURED_M, slots=slots)
+        worlds = pool_worlds(
+            self.scenarios, measured_m=MEASURED_M, slots=slots, judges_wrenches=True
+        )
         actions = [actions_of(settings.action, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
         tables = [

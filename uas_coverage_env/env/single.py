@@ -69,7 +69,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         render_mode: None, "rgb_array" or "human", see `CoverageParallelEnv`.
 
     Version History:
-        v0: First version.
+        v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]

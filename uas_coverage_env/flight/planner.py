@@ -55,6 +55,8 @@ class Planner(Protocol):
     - `plans_on_after_swaps`: whether `act` takes in a UAS that flies again with a fresh pack
       (`[sorties]` with `together = false`); otherwise `reset` is called then, as after a change of
       the scene, and both assistants fly along unless the caller says otherwise.
+    - `is_learner`: whether its wrenches are judged as those of learners in environments, see
+      `docs/rules.md`.
     - `options`: the pydantic model it was made with; goes into the record.
     - `fingerprint`: text that changes with the data it flies by (a policy's weights); part of the
       identity of its flights in a comparison.

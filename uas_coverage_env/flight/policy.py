@@ -47,6 +47,8 @@ class PolicyFunction:
         ValueError: See `as_planner`.
     """
 
+    is_learner = True
+
     def __init__(
         self, policy: Policy, settings: MissionSettings, swarm_of: int | None = None
     ) -> None:

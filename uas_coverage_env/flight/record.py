@@ -10,12 +10,16 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, LIMITS, PHI, WX, body_attitude
+from uas_coverage_env.world import CONTACT_NAMES
+from uas_coverage_env.world.codes import ContactKind
 
 MODES = ("covering", "transit", "return", "landed", "lost")
 COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))
 
 LIMIT = "limit"
 """The kind of a violation that is no contact."""
+
+_OUT_OF_CONTROL = CONTACT_NAMES[ContactKind.LIMITS]
 
 _UNITS = {limit.name: limit.unit for limit in LIMITS}
 
@@ -63,6 +67,8 @@ class Violation:
                 f"{self.value:.4g} {unit} of {self.limit:g} {unit} at the worst, "
                 f"samples: {self.samples}"
             )
+        if self.kind == _OUT_OF_CONTROL:
+            return f"{self.uas}, out of control beyond its limits at {self.time_s:g} s"
         partner = f" with {self.partner}" if self.partner else ""
         return f"{self.uas}, {self.kind} contact{partner} at {self.time_s:g} s"
 

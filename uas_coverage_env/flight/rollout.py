@@ -129,6 +129,7 @@ def rollout(
             return_mode=return_mode,
             safety_filter=safety_filter,
             disturbances=disturbances,
+            judges_wrenches=getattr(planner, "is_learner", False),
             seed=seed,
         )
         meter = RewardMeter(world, reward, reward_weights)

@@ -32,6 +32,7 @@ def pool_worlds(
     *,
     measured_m: float = math.inf,
     slots: Sequence[Sequence[Disturbance | None]] | None = None,
+    judges_wrenches: bool = False,
 ) -> WorldPool:
     """Arenas and starts of scenarios with any numbers of UAS, waypoints and obstacles.
 
@@ -39,6 +40,7 @@ def pool_worlds(
         scenarios: At least one.
         measured_m: See `build_arena`.
         slots: The disturbances of each, see `in_slots`; None: for callers that fly in still air.
+        judges_wrenches: See `build_arena`.
 
     Raises:
         ValueError: There is no scenario, or `slots` is None and one has disturbances,
@@ -59,7 +61,12 @@ def pool_worlds(
             )
         slots = [()] * len(scenarios)
     for scenario, disturbances in zip(scenarios, slots, strict=True):
-        arena = build_arena(scenario, measured_m=measured_m, disturbances=disturbances)
+        arena = build_arena(
+            scenario,
+            measured_m=measured_m,
+            disturbances=disturbances,
+            judges_wrenches=judges_wrenches,
+        )
         start = initial_state(scenario, len(disturbances))
         begin_mission(arena, start, np.zeros(len(scenario.uas), dtype=OUTCOME_DTYPE))
         arenas.append(arena)

@@ -31,6 +31,7 @@ from uas_coverage_env.world.contacts import (
     check_limits,
     check_obstacles,
     check_separation,
+    check_wrenches,
     count_breaches,
 )
 from uas_coverage_env.world.coverage import cover, land
@@ -226,6 +227,8 @@ def judge(arena, state, nonlinear, outcome):
     check_obstacles(arena, state, outcome)
     check_separation(arena, state, outcome)
     check_fence_and_battery(arena, state, outcome)
+    if rarely(arena.rules[0].judges_wrenches):
+        check_wrenches(arena, state, outcome)
     count_breaches(arena, state, outcome)
     cover(arena, state, state.step[0] + 1, outcome)
     land(arena, state, outcome)

@@ -114,6 +114,7 @@ class World:
         safety_filter: Whether commands are kept clear of harm.
         measured_m: Up to where distances are measured, see `build_arena`.
         disturbances: What pushes back; None: what the scenario says.
+        judges_wrenches: Whether wrenches are a learner's, see `build_arena`.
         seed: Of all that disturbances draw, until `reset` is given another; from 0 to 2⁶⁴ - 1.
 
     Attributes:
@@ -134,6 +135,7 @@ class World:
         safety_filter: bool = False,
         measured_m: float = math.inf,
         disturbances: Sequence[Disturbance] | None = None,
+        judges_wrenches: bool = False,
         seed: int = 0,
     ) -> None:
         if dynamics not in get_args(Dynamics):
@@ -145,7 +147,7 @@ class World:
         self.safety_filter = bool(safety_filter)
         self.names = tuple(uas.name for uas in scenario.uas)
         self.disturbances = disturbances_in(scenario, disturbances)
-        self._measured_m = measured_m
+        self._measured_m, self._judges_wrenches = measured_m, bool(judges_wrenches)
         self.known, self.revisions = scenario, 0
         self.arena = self._first_arena = self._arena_of(scenario)
         self._start = initial_state(scenario, len(self.disturbances))
@@ -245,7 +247,12 @@ class World:
         return outcome
 
     def _arena_of(self, scenario: Scenario) -> Arena:
-        return build_arena(scenario, measured_m=self._measured_m, disturbances=self.disturbances)
+        return build_arena(
+            scenario,
+            measured_m=self._measured_m,
+            disturbances=self.disturbances,
+            judges_wrenches=self._judges_wrenches,
+        )
 
     def change_scene(self) -> bool:
         """Let happen at this sample what changes the scene: it is another one from now on.

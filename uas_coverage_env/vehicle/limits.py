@@ -65,6 +65,10 @@ loop overshoots the speed by up to 9 % at steps of 1 s and by up to 12 % at 2 s.
 DISTURBED_TOLERANCE = 0.15
 """The same in both models where disturbances act, of which the inner loop knows nothing."""
 
+LOST_BEYOND = 1.5
+"""A learner's wrench that takes a UAS beyond so many times its limit of speed or of tilt loses it:
+the models are not made for such states, which no inner loop leads back from."""
+
 
 def bounds_of(vehicle: VehicleParams) -> NDArray[np.float64]:
     """(N_LIMITS,) the bound of each limit, in its unit."""
@@ -137,6 +141,21 @@ def limits_exceeded(vehicle, x, voltage_V, current_A, nonlinear, disturbed):
     if values[_VOLTAGE] < (1.0 - tolerance) * vehicle.bounds[_VOLTAGE]:
         mask |= 1 << _VOLTAGE
     return mask
+
+
+@kernel
+def is_out_of_control(vehicle, x):
+    """Whether a state is beyond `LOST_BEYOND` times the limit of speed or of tilt.
+
+    Args:
+        vehicle: record of VEHICLE_DTYPE.
+        x: (14,) state.
+    """
+    values = stack_array(N_LIMITS)
+    write_limited(x, 0.0, 0.0, False, values)
+    slow = values[_SPEED] <= LOST_BEYOND * vehicle.bounds[_SPEED]
+    level = values[_TILT] <= LOST_BEYOND * vehicle.bounds[_TILT]
+    return not (slow and level)
 
 
 def limit_names(mask: int) -> tuple[str, ...]:

@@ -103,6 +103,8 @@ RULES_DTYPE = record_dtype(
         ("eventful", "?"),
         # whether any waypoint asks for more than that a UAS comes near
         ("asks", "?"),
+        # whether a wrench that leaves the vehicle's limits is paid for, and may lose the UAS
+        ("judges_wrenches", "?"),
         # of `waypoint_columns`
         ("unit_m", "f8"),
         # the command to stop and hold still
@@ -167,6 +169,7 @@ def build_arena(
     *,
     measured_m: float = math.inf,
     disturbances: Sequence[Disturbance | None] = (),
+    judges_wrenches: bool = False,
 ) -> Arena:
     """The scenario as arrays.
 
@@ -180,6 +183,8 @@ def build_arena(
             only that, which takes a tenth less time.
         disturbances: What acts besides the scenario's own rules. What the scenario says of
             disturbances is left to the caller: planners build arenas, too.
+        judges_wrenches: Whether a wrench that leaves the vehicle's limits is paid for, and may lose
+            the UAS (`docs/rules.md`): for learners.
     """
     uas = _uas(scenario)
     radius_m = max(entry.radius_m for entry in scenario.uas)
@@ -203,6 +208,7 @@ def build_arena(
     rules["overhangs"] = obstacles["overhangs"].any()
     rules["eventful"] = is_eventful(scenario)
     rules["asks"] = waypoints["asks"].any()
+    rules["judges_wrenches"] = judges_wrenches
     corners = route_corners(scenario, obstacles, normals, offsets_m, targets_m)
     moving_path_m, moving_velocity_mps = _moving(scenario)
     return Arena(

@@ -32,6 +32,8 @@ class ContactKind(IntEnum):
     """It was discharged beyond `dod_max`."""
     FAULT = outcome.FAULT
     """An event of the scenario, `uas_lost`: no violation."""
+    LIMITS = outcome.LIMITS
+    """Its wrench took it beyond `vehicle.LOST_BEYOND` times its limit of speed or of tilt."""
 
 
 class CommandKind(IntEnum):

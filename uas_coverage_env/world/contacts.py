@@ -11,7 +11,7 @@ from uas_coverage_env.geometry import (
     segment_clearance,
     signed_distance,
 )
-from uas_coverage_env.vehicle import DOD, X, Y, Z, limits_exceeded
+from uas_coverage_env.vehicle import DOD, X, Y, Z, is_out_of_control, limits_exceeded
 from uas_coverage_env.world.broad_phase import (
     BLOCK,
     EPS_M,
@@ -19,11 +19,13 @@ from uas_coverage_env.world.broad_phase import (
     write_lower_bounds,
     write_meetings,
 )
+from uas_coverage_env.world.commands import WRENCH
 from uas_coverage_env.world.height import is_too_low
 from uas_coverage_env.world.outcome import (
     BATTERY,
     BREACH_TOLERANCE_M,
     FENCE,
+    LIMITS,
     MOVING_OBSTACLE,
     NONE,
     OBSTACLE,
@@ -277,6 +279,24 @@ def check_fence_and_battery(arena, state, outcome):
             _record_contact(outcome[i], FENCE, -1)
         if state.x[i, DOD] > arena.uas[i].dod_max:
             _record_contact(outcome[i], BATTERY, -1)
+
+
+@inlined_kernel
+def flew_judged_wrench(arena, event):
+    """Whether a step was flown by a wrench that has to keep the vehicle within its limits.
+
+    Not so where an assistant or an event flew another command instead.
+    """
+    return arena.rules[0].judges_wrenches and event.applied_command.kind == WRENCH
+
+
+@rare_kernel
+def check_wrenches(arena, state, outcome):
+    """Lose the UAS that their wrenches have taken out of control, see `vehicle.LOST_BEYOND`."""
+    for i in range(state.status.shape[0]):
+        judged = state.status[i] == FLYING and flew_judged_wrench(arena, outcome[i])
+        if judged and is_out_of_control(arena.vehicles[i], state.x[i]):
+            _record_contact(outcome[i], LIMITS, -1)
 
 
 @rare_kernel

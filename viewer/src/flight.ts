@@ -336,6 +336,7 @@ export function words({ uas, kind, with: partner, value, limit }: Violation): st
     const numbers = `${value?.toPrecision(3)} of ${limit?.toPrecision(3)}`;
     return `${uas} beyond its limit of ${partner?.replaceAll("_", " ")}, ${numbers}`;
   }
+  if (kind === "limits") return `${uas}, out of control beyond its limits`;
   const what = kind.replaceAll("_", " ");
   return `${uas}, ${what} contact${partner ? ` with ${partner}` : ""}`;
 }

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { Flight, homeAt, type Point3 } from "../src/flight";
+import { Flight, homeAt, words, type Point3 } from "../src/flight";
 import { someFlight } from "./some_flight";
 
 const near = (found: number[], expected: number[], by = 1e-9) => {
@@ -75,6 +75,13 @@ test("charge to spare is what is left beyond the way home", () => {
   const [first, second] = flight.moment(0.25).vehicles;
   assert.ok(Math.abs(first.spare - (0.995 - 0.225)) < 1e-9);
   assert.ok(Math.abs(second.spare - (0.895 - 0.25)) < 1e-9);
+});
+
+test("a violation says what was hit, what was exceeded, or that a UAS was out of control", () => {
+  const told = (kind: string, more: object) => words({ t_s: 1, uas: "uas_1", kind, with: null, ...more });
+  assert.equal(told("obstacle", { with: "church" }), "uas_1, obstacle contact with church");
+  assert.equal(told("limit", { with: "tilt", value: 0.5, limit: 0.4 }), "uas_1 beyond its limit of tilt, 0.500 of 0.400");
+  assert.equal(told("limits", {}), "uas_1, out of control beyond its limits");
 });
 
 test("a mark is told of while it lasts, a violation at its sample", () => {

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
 from uas_coverage_env.env.rewards.term import RewardTerm
 from uas_coverage_env.world import FLYING, VELOCITY
+from uas_coverage_env.world.contacts import flew_judged_wrench
 from uas_coverage_env.world.outcome import NONE
 
 
@@ -32,8 +33,12 @@ def energy(arena, state, tables, learners, scratch, i, parameters):
 
 @inlined_kernel
 def violation(arena, state, tables, learners, scratch, i, parameters):
-    """-1 when it is lost."""
-    return -1.0 if scratch.outcome[i].contact != NONE else 0.0
+    """-1 when it is lost, and in every step in which its wrench leaves the vehicle's limits."""
+    event = scratch.outcome[i]
+    if event.contact != NONE:
+        return -1.0
+    beyond = event.limits_exceeded != 0 and flew_judged_wrench(arena, event)
+    return -1.0 if beyond else 0.0
 
 
 @inlined_kernel
@@ -98,7 +103,8 @@ REWARD = (
     RewardTerm(
         "violation",
         10.0,
-        "-1 when it is lost: contact, outside the fence, battery overdrawn",
+        "-1 when it is lost (contact, outside the fence, battery overdrawn, out of control), or "
+        "its wrench leaves a limit of the vehicle by more than the tolerance",
         violation,
     ),
     RewardTerm(
