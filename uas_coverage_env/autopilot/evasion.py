@@ -7,7 +7,8 @@ obstacle sweeps at its present velocity. Its first step must leave room to brake
 that stands still and of the others, so that the proof about these goes on.
 
 In the open, full speed for some seconds leads out of the way. Where no such flight has room enough,
-in a corridor or below a ceiling, slower and shorter ones are tried: to one side, or over what comes.
+in a corridor or below a ceiling, slower and shorter ones are tried: to one side, or over what
+comes.
 """
 
 import math
