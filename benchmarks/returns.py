@@ -3,6 +3,7 @@
     python benchmarks/returns.py
     python benchmarks/returns.py --towns 40 --dynamics nonlinear
     python benchmarks/returns.py --level moderate
+    python benchmarks/returns.py --vehicle tests/vehicles/air_taxi.toml
 
 A town of a seed is a generated scenario, its steps 0.5 or 1 s long, with one UAS (even seeds
 s500_v2, odd ones hexacopter). For each of its returns the UAS is put at rest at a drawn place and
@@ -20,6 +21,10 @@ With `--level`, towns have the wind and the wrong vehicles of light or moderate,
 comes home from anywhere, and in place of `Range` and milp-mpc stands what return mode and `Recall`
 estimate in the wind and with the consumption that the UAS has learnt by then.
 
+With `--vehicle`, nothing is estimated: return mode is on, its charge scarce, and what counts is how
+many UAS of that vehicle are lost (`return_states.py`): in both dynamics, in still air and in a
+steady wind, or in those of `--dynamics` and `--wind`. Exits 0 where none was.
+
 Errors are flown less estimated. Exits 0 where fewer than 1 in 200 returns took longer, or more
 charge, than the estimate with its margin, 1 otherwise, 2 where the input is bad.
 """
@@ -30,11 +35,14 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
 from typing import Annotated, cast, get_args
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
+from return_states import flown_states, flown_wind_mps
 from rich.console import Console
 from rich.table import Table
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
@@ -47,7 +55,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import DOD, dod_per_s
+from uas_coverage_env.vehicle import DOD, dod_per_s, load_vehicle
 from uas_coverage_env.world import CONSUMPTION, LANDED
 
 RETURNS_OF_A_TOWN = 5
@@ -59,6 +67,7 @@ _DEEPEST = 0.6
 _ASIDE_STEPS = 15
 _ALLOWED = 1 / 200
 _LEVELS = (None, "light", "moderate")
+WINDS_MPS = (0.0, 8.0)
 
 
 @dataclass(frozen=True)
@@ -180,15 +189,69 @@ def _table(title: str, columns: Sequence[str], errors: NDArray[np.float64], digi
     return table
 
 
+def _states(
+    seeds: Sequence[int], vehicle: str, flown_as: Sequence[Dynamics], winds_mps: Sequence[float]
+) -> int:
+    """Print how many UAS return mode loses; returns the exit code."""
+    parameters = load_vehicle(vehicle)
+    if Path(vehicle).suffix:
+        vehicle = str(Path(vehicle).resolve())
+    table, n_lost = Table(title=f"{parameters.name}: UAS lost with return mode and filter on"), 0
+    for column in ("dynamics", "wind, m/s", "states", "lost", "to what", "least charge left"):
+        table.add_column(column)
+    for wind_mps, dynamics in product(winds_mps, flown_as):
+        flights = [one for seed in seeds for one in flown_states(seed, vehicle, dynamics, wind_mps)]
+        lost = [one.lost_to for one in flights if one.lost_to is not None]
+        left = min((one.left for one in flights if one.lost_to is None), default=0.0)
+        table.add_row(
+            dynamics,
+            f"{flown_wind_mps(parameters, wind_mps):.1f}",
+            str(len(flights)),
+            str(len(lost)),
+            ", ".join(sorted(set(lost))) or "-",
+            f"{left:.1%}",
+        )
+        n_lost += len(lost)
+    console = Console()
+    console.width = max(console.width, 110)
+    console.print(table)
+    most_mps = flown_wind_mps(parameters, math.inf)
+    if max(winds_mps) > most_mps:
+        console.print(
+            f"return mode promises nothing in more wind than {most_mps:.1f} m/s, two thirds of the "
+            "vehicle's highest speed: that is what was flown instead of "
+            f"{max(winds_mps):g} m/s"
+        )
+    return 0 if n_lost == 0 else 1
+
+
 def main(
     towns: Annotated[int, typer.Option(min=1, help="How many towns, five returns each.")] = 200,
     first_seed: Annotated[int, typer.Option(min=0, help="Of the towns.")] = 2000,
-    dynamics: Annotated[str, typer.Option(help="lpv or nonlinear.")] = "lpv",
+    dynamics: Annotated[
+        str | None, typer.Option(help="lpv or nonlinear; None: lpv, with --vehicle both.")
+    ] = None,
     level: Annotated[str | None, typer.Option(help="light or moderate; None: still.")] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Name or file: whether return mode brings it home.")
+    ] = None,
+    wind: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Steady wind, with --vehicle [m/s]; None: 0 and then 8."),
+    ] = None,
 ) -> None:
-    """Fly returns and print by how much estimates of time and charge err."""
-    if dynamics not in get_args(Dynamics):
+    """Fly returns and print by how much estimates of time and charge err, or which are lost."""
+    if dynamics not in (None, *get_args(Dynamics)):
         raise InputError(f"unknown dynamics {dynamics!r}; allowed: {', '.join(get_args(Dynamics))}")
+    if vehicle is None and wind is not None:
+        raise InputError("--wind needs --vehicle; without, give a --level")
+    if vehicle is not None:
+        if level is not None:
+            raise InputError("--vehicle flies in steady wind: give --wind in place of --level")
+        seeds = range(first_seed, first_seed + towns)
+        flown_as = get_args(Dynamics) if dynamics is None else (cast(Dynamics, dynamics),)
+        raise typer.Exit(_states(seeds, vehicle, flown_as, WINDS_MPS if wind is None else (wind,)))
+    dynamics = dynamics or "lpv"
     if level not in _LEVELS:
         raise InputError(f"level is {level!r}; it should be light, moderate or None")
     columns, estimate = (COLUMNS, estimates) if level is None else (IN_WIND, estimates_in_wind)

@@ -5,6 +5,10 @@ nothing about an obstacle that comes at a UAS that hovers. Then the filter looks
 flight: a velocity held for some seconds and braked, that stays out of the space which the moving
 obstacle sweeps at its present velocity. Its first step must leave room to brake clear of everything
 that stands still and of the others, so that the proof about these goes on.
+
+In the open, full speed for some seconds leads out of the way. Where no such flight has room enough,
+in a corridor or below a ceiling, slower and shorter ones are tried: to one side, or over what
+comes.
 """
 
 import math
@@ -21,13 +25,19 @@ from uas_coverage_env.autopilot.lookahead import (
     peer_slack,
     required_from,
 )
-from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, kernel, stack_array
 from uas_coverage_env.geometry import cylinder_clearance
 from uas_coverage_env.world.commands import CLIMB
 
 _TURNS = 12
 _HELD_S = (8.0, 3.0)
+_SHARES = (1.0, 0.35, 0.1)
+"""Of full speed, where full speed for so long has not room enough."""
+
 _ENOUGH_M = 3.0  # more room than this is not looked for
+_HIT_M = -1e6
+"""Less room than any flight has that only comes too near."""
+
 LINGERING = 0.05
 """Weight of the mean shortfall of clearance beside the largest: a UAS inside leaves early."""
 
@@ -37,12 +47,14 @@ def _room_m(arena, step, i, path_m):
     """How well a path keeps clear of moving obstacles that go on as they go now [m].
 
     The least room to spare along the path, at most _ENOUGH_M; where it is negative, less a little
-    for every step with too little room.
+    for every step with too little room. A path that ends in a contact is worth less than any that
+    does not, and the less the sooner: what comes may turn, and a way aside may open.
     """
     dt_s = arena.rules[0].dt_s
     step = min(step, arena.moving_path_m.shape[0] - 1)
     n_steps = path_m.shape[0] - 1
     least_m, shortfall_m = _ENOUGH_M, 0.0
+    hit = n_steps
     for m in range(arena.moving.shape[0]):
         obstacle = arena.moving[m]
         required_m = required_from(arena, step, i, m)
@@ -63,6 +75,10 @@ def _room_m(arena, step, i, path_m):
             room_m = clearance_m - required_m
             least_m = min(least_m, room_m)
             shortfall_m += min(room_m, 0.0)
+            if clearance_m < arena.uas[i].radius_m:
+                hit = min(hit, k)
+    if hit < n_steps:
+        return _HIT_M + hit * dt_s
     return least_m + LINGERING * shortfall_m / n_steps
 
 
@@ -92,6 +108,65 @@ def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
     return slack_m >= 0.0
 
 
+@kernel
+def _write_flight(arena, i, heading_rad, turn, climb, share, command):
+    """Write the velocity of an evasive flight at a share of full speed.
+
+    Nearest to the heading first: turns 0, 1, -1, 2, -2, ...; the last one goes straight up or down.
+    """
+    uas = arena.uas[i]
+    turns = (turn + 1) // 2 * (1 if turn % 2 else -1)
+    heading = heading_rad + turns * 2.0 * math.pi / _TURNS
+    speed_mps = uas.speed_mps if turn < _TURNS else 0.0
+    down_mps = (0.0, -uas.climb_mps, uas.descent_mps)[climb]
+    north_mps, east_mps = speed_mps * math.cos(heading), speed_mps * math.sin(heading)
+    write_command(command, CLIMB, share * north_mps, share * east_mps, share * down_mps)
+
+
+@kernel
+def _keep_better(arena, state, i, command, tail_m, best):
+    """Keep a flight if it has more room than the best so far: (4,) room [m], velocity [m/s]."""
+    room_m = _room_m(arena, state.step[0], i, tail_m)
+    if room_m > best[0]:
+        best[0] = room_m
+        for axis in range(3):
+            best[1 + axis] = command.values[axis]
+
+
+@kernel
+def _look_far(arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best):
+    """Look for the best flight at full speed, held for some seconds."""
+    for turn in range(_TURNS + 1):
+        for climb in range(3):
+            _write_flight(arena, i, heading_rad, turn, climb, 1.0, command)
+            if not _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
+                continue
+            for held_s in _HELD_S:
+                n_held = max(1, round(held_s / arena.rules[0].dt_s))
+                if _is_open(arena, state, i, command, n_held, nonlinear, tail_m, committed_m):
+                    _keep_better(arena, state, i, command, tail_m, best)
+
+
+@kernel
+def _look_near(arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best):
+    """Look for the best flight as far as there is room, slower ones too, by halving."""
+    longest = max(1, round(_HELD_S[0] / arena.rules[0].dt_s))
+    for turn in range(_TURNS + 1):
+        for climb in range(3):
+            for share in _SHARES:
+                _write_flight(arena, i, heading_rad, turn, climb, share, command)
+                if not _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
+                    continue
+                fits, at_most = 0, longest
+                while fits < at_most:
+                    n_held = (fits + at_most + 1) // 2
+                    if _is_open(arena, state, i, command, n_held, nonlinear, tail_m, committed_m):
+                        _keep_better(arena, state, i, command, tail_m, best)
+                        fits = n_held
+                    else:
+                        at_most = n_held - 1
+
+
 @allocating_kernel
 def evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m):
     """Write the command that gets a UAS best out of the way of what moves.
@@ -109,32 +184,20 @@ def evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m)
     Returns:
         Whether braking after the command is clear of all that stands still; if not, nothing is.
     """
-    uas = arena.uas[i]
     write_brake(command)
     if not _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
         return False
-    best_m = _room_m(arena, state.step[0], i, path_m)
-    best_north_mps, best_east_mps, best_down_mps = 0.0, 0.0, 0.0
     tail_m = np.empty(path_m.shape)
-    for turn in range(_TURNS + 1):
-        # nearest first: 0, 1, -1, 2, -2, ...; the last one goes straight up or down
-        turns = (turn + 1) // 2 * (1 if turn % 2 else -1)
-        heading = heading_rad + turns * 2.0 * math.pi / _TURNS
-        speed_mps = uas.speed_mps if turn < _TURNS else 0.0
-        for climb in range(3):
-            down_mps = (0.0, -uas.climb_mps, uas.descent_mps)[climb]
-            north_mps, east_mps = speed_mps * math.cos(heading), speed_mps * math.sin(heading)
-            write_command(command, CLIMB, north_mps, east_mps, down_mps)
-            if not _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
-                continue
-            for held_s in _HELD_S:
-                n_held = max(1, round(held_s / arena.rules[0].dt_s))
-                if _is_open(arena, state, i, command, n_held, nonlinear, tail_m, committed_m):
-                    room_m = _room_m(arena, state.step[0], i, tail_m)
-                    if room_m > best_m:
-                        best_m = room_m
-                        best_north_mps, best_east_mps = north_mps, east_mps
-                        best_down_mps = down_mps
-    write_command(command, CLIMB, best_north_mps, best_east_mps, best_down_mps)
+    best = stack_array(4)
+    best[0] = _room_m(arena, state.step[0], i, path_m)
+    best[1] = best[2] = best[3] = 0.0
+    _look_far(
+        arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best
+    )  # fmt: skip
+    if best[0] < 0.0:
+        _look_near(
+            arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best
+        )  # fmt: skip
+    write_command(command, CLIMB, best[1], best[2], best[3])
     _is_provable(arena, state, i, command, nonlinear, path_m, committed_m)
     return True

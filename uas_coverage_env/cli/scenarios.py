@@ -25,7 +25,7 @@ from uas_coverage_env.scenario import (
 )
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.tube import tube_of
-from uas_coverage_env.world.arena import LOOKAHEAD_S
+from uas_coverage_env.world.arena import lookahead_steps
 from uas_coverage_env.world.tubes import UNKNOWN_M
 
 _PICTURE_PX = 1024
@@ -178,7 +178,7 @@ def _tubes(scenario: Scenario) -> list[str]:
         f"stated: mean wind up to {stated.mean_mps:g} m/s, of which up to "
         f"{stated.unknown_mps:.1f} m/s at a time is not known in flight"
     ]
-    steps, slowly_m = math.ceil(LOOKAHEAD_S / scenario.dt_s), UNKNOWN_M
+    steps, slowly_m = lookahead_steps(scenario), UNKNOWN_M
     for vehicle in dict.fromkeys(scenario.vehicles):
         tube = tube_of(vehicle, scenario.dt_s, steps, learns=True)
         kept_m = np.maximum(UNKNOWN_M, stated.unknown_mps * tube.position)

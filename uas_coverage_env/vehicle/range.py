@@ -124,6 +124,10 @@ def speeds_of(vehicle: VehicleParams) -> Speeds:
 _TURNS = 1.5
 """Of the time that the largest acceleration takes to turn a velocity into one towards home."""
 
+_QUICK_S = 4.5
+"""The shipped vehicles lean over, stop from full speed and level out in less: with more, a flight
+home takes longer by the difference."""
+
 _MARGIN_S, _MARGIN_SHARE = 4.0, 0.1
 _OBSTRUCTED_S = 5.0
 """Beyond the expected time: seconds and a share of it, and seconds where something is in the way,
@@ -148,7 +152,10 @@ def seconds_to_land(vehicle, way_m, towards_mps, height_m, roof_m, before_m, aft
         after_m: Horizontal way after the last roof [m].
     """
     turn_mps = vehicle.v_xy_max_mps - towards_mps
-    turn_s = _TURNS * turn_mps / (vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad))
+    most_mps2 = vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad)
+    turn_s = _TURNS * turn_mps / most_mps2
+    leaning_s = 2.0 * math.sqrt(vehicle.tilt_max_rad / vehicle.alpha_xy_max_radps2)
+    turn_s += max(vehicle.v_xy_max_mps / most_mps2 + leaning_s - _QUICK_S, 0.0)
     speeds = Speeds(vehicle.v_xy_max_mps, vehicle.v_up_max_mps, vehicle.v_down_max_mps)
     up_m, down_m = max(-height_m, 0.0), max(height_m, 0.0)
     seconds = flight_seconds(CALIBRATED, speeds, turn_s, way_m, up_m, down_m)

@@ -11,6 +11,7 @@ from uas_coverage_env.compiled.memory import Memory, record_dtype
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
+from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.world.corners import route_corners
@@ -45,8 +46,11 @@ from uas_coverage_env.world.waypoints import (
     waypoint_records,
 )
 
-LOOKAHEAD_S = 14.0
-"""A braking flight takes less than this from the highest speed [s]."""
+_LOOKAHEAD_S = 14.0
+"""The shipped vehicles brake within this from the highest speed, in strong wind, too [s]."""
+
+_IN_WIND = 1.15
+"""In wind a heavier or faster vehicle is taken to brake so many times as long as in still air."""
 
 SAMPLES_AFTER_END = 64
 """Moving obstacles are known this long after max_steps, for missions flown over time."""
@@ -305,5 +309,11 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
     rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - ROUTE_MARGIN_M
     rules["brake"]["kind"] = CLIMB
-    rules["lookahead_steps"] = np.ceil(LOOKAHEAD_S / scenario.dt_s)
+    rules["lookahead_steps"] = lookahead_steps(scenario)
     return rules
+
+
+def lookahead_steps(scenario: Scenario) -> int:
+    """How far guidance and safety filter look ahead: until the slowest to stop has stopped."""
+    slowest_s = max(stopping_of(v, scenario.dt_s).time_s for v in set(scenario.vehicles))
+    return math.ceil(max(_LOOKAHEAD_S, _IN_WIND * slowest_s) / scenario.dt_s)
