@@ -85,7 +85,9 @@ class PaperOptions(ModeOptions):
         default=False, description="whether a plan's end keeps charge for the way home"
     )
     priority_per_s: float = with_default(ModeOptions, "priority_per_s", 0.0)
-    return_rule: Literal["fence", "vehicle"] = with_default(ModeOptions, "return_rule", "vehicle")
+    return_rule: Literal["waypoints", "vehicle"] = with_default(
+        ModeOptions, "return_rule", "vehicle"
+    )
     return_scale: Literal["horizon", "distance"] = with_default(
         ModeOptions, "return_scale", "distance"
     )
