@@ -1,5 +1,6 @@
 """What planners and learners share: the brief of a mission, and what follows from it."""
 
+from uas_coverage_env.mission.access import Access
 from uas_coverage_env.mission.approach import Approach, carefully, with_free_aims
 from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.blocked import find_blocked
@@ -18,6 +19,7 @@ from uas_coverage_env.mission.ways import Way, Ways
 
 __all__ = [
     "MEAN_HEIGHT_M",
+    "Access",
     "Approach",
     "Attempts",
     "GuidedFlight",
