@@ -18,6 +18,7 @@ BoolArray = NDArray[np.bool_]
 
 _TRIED = 8
 """Obstacles, the nearest to a waypoint, of which each is taken away to see whether it opens."""
+_NAMED = 3
 
 
 class Access:
@@ -46,7 +47,9 @@ class Access:
         """What closes off a waypoint from a UAS, in a few words."""
         kinds = {o.name: o.kind == "no_fly" or isinstance(o, NoFlyZone) for o in self._obstacles}
         names = [f"{'no-fly zone ' * kinds[n]}{n}" for n in self.closed_by(uas, waypoint)]
-        return f"closed off by {' and '.join(names)}"
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        how = "closed off by" if len(names) == 1 else "closed off, behind"
+        return f"{how} {', '.join(names[:_NAMED])}{more}"
 
     def closed_by(self, uas: int, waypoint: int) -> tuple[str, ...]:
         """Names of the obstacles that close off a waypoint from a UAS.

@@ -44,6 +44,7 @@ class ModeProblems:
         self._memories = {uas.name: ModeMemory() for uas in brief.uas}
         detour = options.return_detour if options.return_rule == "waypoints" else None
         self._return_rule = ReturnRule(brief, detour, ways)
+        self._beyond: dict[str, frozenset[int]] = {}
 
     def mode(self, name: str) -> Mode:
         """The operation mode of a UAS."""
@@ -55,6 +56,12 @@ class ModeProblems:
         if memory.mode is ModeOfUas.RETURN:
             return HOME
         return self._planless.get(name) if memory.waypoint is None else memory.waypoint
+
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints for which a UAS had no charge left when it was last looked at, and how much."""
+        beyond = sorted(set().union(*self._beyond.values()))
+        return dict.fromkeys(beyond, f"beyond what is kept back ({self._return_rule})")
 
     def problem(self, swarm: SwarmState, plan: Plan | None) -> PlanningProblem:
         """The decision to make now.
@@ -81,6 +88,8 @@ class ModeProblems:
 
     def _situation(self, swarm: SwarmState, name: str, planned: set[int] | None) -> Situation:
         x, rule = swarm.x[swarm.names.index(name)], self._return_rule
+        beyond = rule.beyond(name, x[0:3], float(x[DOD]), swarm.uncovered)
+        self._beyond[name] = frozenset(beyond)
         return Situation(
             position_m=x[0:3],
             velocity_mps=x[VX : VZ + 1],
@@ -88,7 +97,7 @@ class ModeProblems:
             dod_return=rule.dod_return(name, x[0:3], swarm.uncovered),
             uncovered=swarm.uncovered,
             plans_coverage=planned is None or bool(planned),
-            beyond=frozenset(rule.beyond(name, x[0:3], float(x[DOD]), swarm.uncovered)),
+            beyond=self._beyond[name],
         )
 
     def _targets(

@@ -190,6 +190,11 @@ class MilpMpcPaper:
         """The operation mode."""
         return self._by_modes.mode(name)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._by_modes.given_up
+
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3, then the OCP's data."""
         return self._by_modes.problem(swarm, self.plan)

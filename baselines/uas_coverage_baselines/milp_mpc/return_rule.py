@@ -48,6 +48,12 @@ class ReturnRule:
             for uas, home_s in enumerate(self._home_s):
                 home_s[:] = [self._seconds(uas, HOME, place_m) for place_m in self._waypoints_m]
 
+    def __str__(self) -> str:
+        """What is kept back, in a few words."""
+        if self._detour is None:
+            return "the vehicle file's return_rule"
+        return f"{self._detour:g} times the way to a waypoint and home, and {SETTLING_S:g} s"
+
     def dod_return(self, name: str, position_m: FloatArray, uncovered: BoolArray) -> float:
         """DoD_r of a UAS.
 
