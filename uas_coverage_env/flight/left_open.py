@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord, LeftOpen, Why
 from uas_coverage_env.flight.scene_history import SceneHistory
-from uas_coverage_env.mission import Access, MissionBrief, Range, Ways
+from uas_coverage_env.mission import Access, Errand, Errands, MissionBrief
 from uas_coverage_env.scenario import out_of_reach
-from uas_coverage_env.vehicle import DOD, N_STATES, dod_per_s
+from uas_coverage_env.vehicle import DOD
 
 FloatArray = NDArray[np.float64]
 
@@ -34,35 +33,13 @@ def left_open(flight: FlightRecord, said: Mapping[int, str] | None = None) -> tu
     return tuple(LeftOpen(w, *end.why(w, (said or {}).get(w, ""))) for w in waypoints)
 
 
-@dataclass(frozen=True)
-class _Trip:
-    """To a waypoint and home again.
-
-    Attributes:
-        uas: Which UAS.
-        takes_s: How long it takes.
-        spare_s: What the charge gives beyond that; negative: it does not last.
-    """
-
-    uas: int
-    takes_s: float
-    spare_s: float
-
-    @property
-    def lasts_s(self) -> float:
-        """How long the charge lasts."""
-        return self.takes_s + self.spare_s
-
-
 class _End:
     """How a flight has ended, and what each UAS could still do then."""
 
     def __init__(self, flight: FlightRecord, history: SceneHistory) -> None:
         self._flight, self._scenario = flight, history.scenario
         self._brief = MissionBrief.of(self._scenario)
-        self._ways, self._range, self._access = (
-            make(self._brief) for make in (Ways, Range, Access)
-        )
+        self._errands, self._access = Errands(self._brief), Access(self._brief)
         self._closed_in = set(out_of_reach(self._scenario, 0.0))
         self._lost = flight.mode[-1] == LOST
         self._in_the_air = flight.mode[-1] < LANDED
@@ -79,49 +56,40 @@ class _End:
         able = carriers[self._access.has_way[carriers, w]]
         if not len(able):
             return Why.NO_WAY, self._access.why_closed(int(carriers[0]), w)
-        trips = [self._from_start(u, w) for u in able.tolist()]
-        best = max(trips, key=lambda trip: trip.spare_s)
+        best = max((self._from_start(u, w) for u in able.tolist()), key=_spare_s)
         if best.spare_s < 0.0:
-            return Why.TOO_FAR, _too_long(names[best.uas], best, "")
+            return Why.TOO_FAR, too_long(best)
         left = able[~self._lost[able]].tolist()
         if not left:
             return Why.LOST, f"{', '.join(names[u] for u in able)} could have covered it"
-        trips = [self._from_end(u, w) for u in left]
-        best = max(trips, key=lambda trip: trip.spare_s)
+        errands = {u: self._from_end(u, w) for u in left}
+        best = max(errands.values(), key=_spare_s)
         if best.spare_s < 0.0:
-            return Why.CHARGE, _too_long(names[best.uas], best, " that was left")
-        trips = [trip for trip in trips if trip.spare_s >= 0.0]
-        in_time = [trip for trip in trips if trip.takes_s <= self._clock_s(trip.uas)]
-        if not in_time:
-            best = min(trips, key=lambda trip: trip.takes_s - self._clock_s(trip.uas))
-            left_s = self._clock_s(best.uas)
-            return Why.TIME, f"there and home takes {best.takes_s:.0f} s, {left_s:.0f} s were left"
-        flying = [trip for trip in in_time if self._in_the_air[trip.uas]]
+            return Why.CHARGE, too_long(best, " that was left")
+        lasting = {u: errand for u, errand in errands.items() if errand.spare_s >= 0.0}
+        late_s = {u: errand.takes_s - self._clock_s(u) for u, errand in lasting.items()}
+        u = min(late_s, key=lambda u: late_s[u])
+        if late_s[u] > 0.0:
+            takes_s, left_s = lasting[u].takes_s, self._clock_s(u)
+            return Why.TIME, f"there and home takes {takes_s:.0f} s, {left_s:.0f} s were left"
+        in_time = [u for u in lasting if late_s[u] <= 0.0]
+        flying = [names[u] for u in in_time if self._in_the_air[u]]
         if flying:
-            limit = "by hand" if self._flight.ended == "stopped" else "at its limit of steps"
-            return Why.ENDED, f"{limit}, with {names[flying[0].uas]} in the air"
+            how = "by hand" if self._flight.ended == "stopped" else "at its limit of steps"
+            return Why.ENDED, f"{how}, with {flying[0]} in the air"
         if closed_by := self._blocked_by(w):
             return Why.BLOCKED, f"{closed_by} kept it closed in the end"
-        best = max(in_time, key=lambda trip: trip.spare_s)
-        what = f"{names[best.uas]} landed with charge for {best.lasts_s:.0f} s, there and home"
+        best = max((lasting[u] for u in in_time), key=_spare_s)
+        what = f"{best.name} landed with charge for {best.lasts_s:.0f} s, there and home"
         return Why.PLANNER, f"{what} takes {best.takes_s:.0f} s{f'; {said}' if said else ''}"
 
-    def _from_start(self, uas: int, w: int) -> _Trip:
+    def _from_start(self, uas: int, w: int) -> Errand:
         start = self._flight.scenario.uas[uas]
-        return self._trip(uas, w, np.array(start.start_m, float), 1.0 - start.soc_0)
+        return self._errands.to(uas, w, np.array(start.start_m, float), 1.0 - start.soc_0)
 
-    def _from_end(self, uas: int, w: int) -> _Trip:
+    def _from_end(self, uas: int, w: int) -> Errand:
         x = self._flight.x[-1, uas]
-        return self._trip(uas, w, x[:3], float(x[DOD]))
-
-    def _trip(self, uas: int, w: int, place_m: FloatArray, dod: float) -> _Trip:
-        per_s = dod_per_s(self._brief.vehicles[uas], self._brief.uas[uas].dod_max)
-        there_s = self._ways.seconds(uas, w, place_m)
-        x = np.zeros(N_STATES)
-        x[:3], x[DOD] = self._brief.waypoints[w].position_m, dod + per_s * there_s
-        home = self._range.home(uas, x)
-        takes_s = there_s + home.time_s + home.time_margin_s
-        return _Trip(uas, takes_s, self._range.spare_dod(uas, x) / per_s)
+        return self._errands.to(uas, w, x[:3], float(x[DOD]))
 
     def _clock_s(self, uas: int) -> float:
         """Time of the mission that was left when a UAS had landed, or at the end [s]."""
@@ -142,8 +110,18 @@ class _End:
         return ""
 
 
-def _too_long(name: str, trip: _Trip, which: str) -> str:
+def _spare_s(errand: Errand) -> float:
+    return errand.spare_s
+
+
+def too_long(errand: Errand, which: str = "") -> str:
+    """That the charge of a UAS does not last, in figures.
+
+    Args:
+        errand: That it does not last for.
+        which: Which charge.
+    """
     return (
-        f"there and home takes {name} {trip.takes_s:.0f} s, its charge{which} lasts "
-        f"{max(trip.lasts_s, 0.0):.0f} s"
+        f"there and home takes {errand.name} {errand.takes_s:.0f} s, its charge{which} lasts "
+        f"{errand.lasts_s:.0f} s"
     )

@@ -217,8 +217,8 @@ class FlightRecord:
         reward_terms: (T - 1, U, R) the weighted terms of the reward that an environment pays for
             these steps; None: a record from before they were kept.
         reward_names: (R,) of the terms.
-        left_open: Why waypoints were left open, see `left_open`; empty too where that was not asked:
-            of a flight from a log, or from before it was kept.
+        left_open: Why waypoints were left open; empty, too, of a flight from a log, or from before
+            that was kept.
     """
 
     scenario: Scenario

@@ -5,6 +5,7 @@ from uas_coverage_env.mission.approach import Approach, carefully, with_free_aim
 from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.errands import Errand, Errands
 from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind, in_disturbances
@@ -22,6 +23,8 @@ __all__ = [
     "Access",
     "Approach",
     "Attempts",
+    "Errand",
+    "Errands",
     "GuidedFlight",
     "Handover",
     "LearntWind",
