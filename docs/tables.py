@@ -34,6 +34,7 @@ from uas_coverage_env.env.observation import (
 from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.flight import Why
 from uas_coverage_env.flight.registry import (
     GROUP,
     KINDS,
@@ -356,6 +357,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
     "planners": planners,
+    "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
 }
 
 

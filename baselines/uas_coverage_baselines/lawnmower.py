@@ -52,6 +52,11 @@ class Lawnmower:
             self._by_legs = LegFollower(brief)
             self._by_legs.begin(self._runs)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._targets.given_up
+
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly each run in order; a UAS that has finished helps with the nearest waypoints."""
         if self._by_legs is not None:

@@ -25,6 +25,11 @@ class NearestWaypoint:
         """Forget the targets of the mission before."""
         self._targets = Targets(brief)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._targets.given_up
+
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Keep a target until it is covered or blocked, then take the nearest one."""
         return self._targets.commands(swarm, self._targets.nearest)

@@ -71,6 +71,11 @@ class Targets:
         home: dict[str, Command] = {name: GoTo(None) for name in swarm.active}
         return home | self._guided.commands(swarm, self._target, blocked)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._guided.given_up
+
     def nearest(self, swarm: SwarmState, uas: int, candidates: NDArray[np.bool_]) -> int:
         """The candidate nearest to a UAS."""
         distances_m = np.linalg.norm(self._waypoints_m - swarm.x[uas, :3], axis=1)

@@ -1,5 +1,7 @@
 """Operation modes and transit targets: the paper's Algorithms 2 and 3."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -222,6 +224,37 @@ def test_the_way_home_weighs_much_once_there_is_nothing_left_to_cover():
     searching = target(ModeMemory(RETURN), situation(), seconds_left=full)
     done = target(ModeMemory(RETURN), situation(covered=EVERYTHING), seconds_left=full)
     assert done.weight > 2.0 * searching.weight
+
+
+def test_what_its_charge_does_not_allow_is_nothing_left_to_cover():
+    full, rest = 2000.0, {"covered": [0, 1]}
+    searching = target(ModeMemory(RETURN), situation(**rest), seconds_left=full)
+    some = dataclasses.replace(situation(**rest), beyond=frozenset({3}))
+    assert target(ModeMemory(RETURN), some, seconds_left=full).weight == searching.weight
+    all_of_it = dataclasses.replace(situation(**rest), beyond=frozenset({2, 3}))
+    done = target(ModeMemory(RETURN), situation(covered=EVERYTHING), seconds_left=full)
+    assert target(ModeMemory(RETURN), all_of_it, seconds_left=full).weight == done.weight
+    # and it is urgent still where charge is short
+    late = [target(ModeMemory(RETURN), now, seconds_left=61.0) for now in (all_of_it, situation())]
+    assert late[0].weight == late[1].weight > done.weight
+
+
+def test_a_metre_towards_a_far_target_costs_as_much_as_towards_one_that_is_not_so_far():
+    for memory in (ModeMemory(TRANSIT, 0), ModeMemory(RETURN)):
+        far, farther = (
+            target_of(
+                *(memory, situation((north, 0.0, -10.0), covered=[1, 2, 3])),
+                *(np.array((100.0, 0.0, -1.0)), WAYPOINTS, 600.0, 60.0, 0.0, Weights(), 400.0),
+            )
+            for north in (-900.0, -4000.0)
+        )
+        assert far.weight == farther.weight > 0.0
+
+
+def test_a_uas_in_transit_turns_from_a_target_that_its_charge_no_longer_allows():
+    now = dataclasses.replace(situation(), beyond=frozenset({2}))
+    (memory,) = updated([ModeMemory(TRANSIT, 2)], [now])
+    assert memory == ModeMemory(TRANSIT, 1)
 
 
 def test_the_return_weight_is_normalised_by_the_distance_too():

@@ -14,7 +14,6 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import return_threshold
 from uas_coverage_env.world import LANDED, Velocity
 
 PLACES = [((60.0, 50.0, -6.0), 8.0), ((50.0, 75.0, -6.0), 8.0), ((190.0, 190.0, -20.0), 8.0)]
@@ -124,17 +123,6 @@ def test_the_battery_gives_less_time_and_the_way_home_takes_more_the_farther_out
     assert left[-1] == pytest.approx(0.0)
     away = [around.seconds_home("uas_1", np.array([50.0 + d, 50.0, -1.0])) for d in (0, 50, 100)]
     assert (np.diff(away) > 0.0).all()
-    assert 0.0 < around.dod_return("uas_1", 2.5) < 0.75
-
-
-def test_the_return_rule_is_the_fences_or_that_of_the_vehicles_file(scenario, around):
-    for uas, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
-        corner_m = np.linalg.norm(scenario.fence.vertices_m - np.array(uas.start_m), axis=1).max()
-        way_s = 2.0 * corner_m / vehicle.limits.v_cruise_mps
-        by_fence = return_threshold(vehicle, uas.dod_max, way_s)
-        assert around.dod_return(uas.name, 2.0) == pytest.approx(by_fence)
-        by_file = return_threshold(vehicle, uas.dod_max, vehicle.return_rule.distance_over_speed_s)
-        assert around.dod_return(uas.name, None) == pytest.approx(by_file)
 
 
 BEHIND = [((40.0, 120.0, -6.0), 8.0)]

@@ -1,11 +1,13 @@
 """What a person is told of a flight: whether it is good, and its figures."""
 
+from collections import Counter
 from typing import Any
 
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import (
     MODES,
     Flight,
+    LeftOpen,
     accomplished,
     energy_Wh,
     fallback_reasons,
@@ -36,6 +38,21 @@ def verdict(flight: Flight) -> str:
         _several(len(flight.violations), "violation"),
     ]
     return f"mission not accomplished: {'; '.join(filter(None, lacks))}"
+
+
+def left_open(flight: Flight) -> list[str]:
+    """What a flight has left open and why, a line for each reason: empty where nothing."""
+    by_reason: dict[str, list[LeftOpen]] = {}
+    for one in flight.left_open:
+        by_reason.setdefault(one.why, []).append(one)
+    lines = []
+    for why, those in by_reason.items():
+        named = ", ".join(f"waypoints[{one.waypoint}]" for one in those[:_NAMED])
+        more = f" and {len(those) - _NAMED} more" if len(those) > _NAMED else ""
+        details = list(dict.fromkeys(one.detail for one in those))
+        others = f" (+{len(details) - 1} more)" if len(details) > 1 else ""
+        lines.append(f"left open: {named}{more}: {why}: {details[0]}{others}")
+    return lines
 
 
 def beside_the_best(flight: Flight) -> str:
@@ -69,6 +86,7 @@ def figures(flight: Flight) -> dict[str, str]:
         "ended": ENDED[flight.ended] or "complete",
         "covered": f"{result['coverage']:.0%}",
         "ground seen": ", ".join(f"{name} {share:.1%}" for name, share in seen.items()) or NONE,
+        "left open": ", ".join(f"{n} {why}" for why, n in _reasons(flight).items()) or NONE,
         "all home": "yes" if result["all_home"] else f"not {_not_home(flight)}",
         "steps": str(flight.steps),
         "energy, Wh": f"{result['energy_Wh']:.2f}",
@@ -124,6 +142,10 @@ def _not_home(flight: Flight) -> str:
     out = [name for i, name in enumerate(flight.names) if MODES[flight.mode[-1, i]] != "landed"]
     more = f" and {len(out) - _NAMED} more" if len(out) > _NAMED else ""
     return f"{', '.join(out[:_NAMED])}{more}"
+
+
+def _reasons(flight: Flight) -> Counter[str]:
+    return Counter(str(one.why) for one in flight.left_open)
 
 
 def _several(count: int, thing: str) -> str:

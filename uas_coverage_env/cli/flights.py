@@ -5,7 +5,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from uas_coverage_env.cli.figures_of_flight import ENDED, beside_the_best, by_uas, verdict
+from uas_coverage_env.cli.figures_of_flight import (
+    ENDED,
+    beside_the_best,
+    by_uas,
+    left_open,
+    verdict,
+)
 from uas_coverage_env.flight import (
     Flight,
     accomplished,
@@ -38,6 +44,8 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
     screen.print(table)
     for violation in flight.violations:
         screen.print(f"violation: {violation}", markup=False, style="red")
+    for line in left_open(flight):
+        screen.print(line, markup=False, style="yellow")
     result = summary(flight)
     low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
     steps = ", ".join(filter(None, (f"{flight.steps} steps", ENDED[flight.ended])))

@@ -1,6 +1,8 @@
 """`uas-coverage scenarios`: the missions that are shipped, and a check of one's own."""
 
 import math
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +17,8 @@ from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.draw import legend, picture
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight.left_open import too_long
+from uas_coverage_env.mission import Access, Errands, MissionBrief
 from uas_coverage_env.scenario import (
     SERIES,
     Scenario,
@@ -26,10 +30,11 @@ from uas_coverage_env.scenario import (
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.tube import tube_of
 from uas_coverage_env.world.arena import lookahead_steps
+from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
 from uas_coverage_env.world.tubes import UNKNOWN_M
 
 _PICTURE_PX = 1024
-_NAMED = 8
+_NAMED, _NAMED_IN_WARNINGS = 8, 50
 _SLOWLY_S = 3.0
 """In this time a UAS brakes that creeps up to a waypoint."""
 # what we write into a picture, so that it may be drawn again; other files are left alone
@@ -83,6 +88,8 @@ def check(
     A picture that this command has made is drawn anew.
     """
     scenario = loaded(file)
+    for warning in _not_to_be_covered(scenario):
+        sys.stderr.write(f"warning: {warning}\n")
     path = picture_file or Path(f"{scenario.name}.png")
     if path.exists() and not overwrite and not _drawn_by_us(path):
         raise InputError(f"{path}: exists; give another --picture or add --overwrite")
@@ -104,6 +111,45 @@ def check(
     for line in _lines(scenario):
         out.print(line, markup=False)
     out.print(f"drawn in {path}", markup=False)
+
+
+def _not_to_be_covered(scenario: Scenario) -> Iterator[str]:
+    """Waypoints without a way to them, and those beyond every charge; a line for each of both."""
+    brief = MissionBrief.of(scenario)
+    access, errands = Access(brief), Errands(brief)
+    closed, far = {}, {}
+    for w in sorted(set(range(len(scenario.waypoints))) - set(out_of_reach(scenario, 0.0))):
+        carriers = np.flatnonzero(brief.can_cover[:, w])
+        able = carriers[access.has_way[carriers, w]]
+        if len(carriers) and not len(able):
+            closed[w] = access.why_closed(int(carriers[0]), w)
+        elif len(able):
+            best = max((errands.from_start(u, w) for u in able.tolist()), key=lambda e: e.spare_s)
+            if best.spare_s < 0.0:
+                far[w] = too_long(best)
+    of = f"of {len(scenario.waypoints)} waypoints"
+    if closed:
+        yield (
+            f"{len(closed)} {of} have no way to them: {_named(list(closed))}; "
+            f"{_first(list(closed.values()))}. Routes keep {ROUTE_MARGIN_M:g} m more than the safe "
+            f"distances: widen the gaps, or move or take away what is closed off"
+        )
+    if far:
+        yield (
+            f"{len(far)} {of} are out of reach: {_named(list(far))}; {_first(list(far.values()))}. "
+            f"Move them, charge the UAS, or start nearer"
+        )
+
+
+def _named(waypoints: Sequence[int], most: int = _NAMED_IN_WARNINGS) -> str:
+    """The first waypoints by their index, and how many more there are."""
+    names = ", ".join(f"waypoints[{index}]" for index in waypoints[:most])
+    return names + (f" and {len(waypoints) - most} more" if len(waypoints) > most else "")
+
+
+def _first(reasons: Sequence[str]) -> str:
+    different = len(set(reasons)) - 1
+    return reasons[0] + (f" (the first; +{different} more)" if different else "")
 
 
 def _signs(scenario: Scenario) -> set[str]:
@@ -193,10 +239,9 @@ def _tubes(scenario: Scenario) -> list[str]:
         slowly_m = max(slowly_m, float(kept_m[at[1]]))
     closed = sorted(set(out_of_reach(scenario, slowly_m)) - set(out_of_reach(scenario, 0.0)))
     if closed:
-        names = ", ".join(f"waypoints[{index}]" for index in closed[:_NAMED])
-        more = f" and {len(closed) - _NAMED} more" if len(closed) > _NAMED else ""
         lines.append(
-            f"out of reach in this wind: {names}{more}; there is no room with {slowly_m:.1f} m more"
+            f"out of reach in this wind: {_named(closed, _NAMED)}; there is no room with "
+            f"{slowly_m:.1f} m more"
         )
     return lines
 

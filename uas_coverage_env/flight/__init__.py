@@ -27,7 +27,15 @@ from uas_coverage_env.flight.planner import (
     PlannerOptions,
 )
 from uas_coverage_env.flight.policy import Policy, as_planner
-from uas_coverage_env.flight.record import MODES, DecisionRecord, FlightRecord, Swap, Violation
+from uas_coverage_env.flight.record import (
+    MODES,
+    DecisionRecord,
+    FlightRecord,
+    LeftOpen,
+    Swap,
+    Violation,
+    Why,
+)
 from uas_coverage_env.flight.registry import (
     OptionDescription,
     PlannerDescription,
@@ -59,6 +67,7 @@ __all__ = [
     "Evaluation",
     "Flight",
     "FlightRecord",
+    "LeftOpen",
     "OptionDescription",
     "Planner",
     "PlannerDescription",
@@ -71,6 +80,7 @@ __all__ = [
     "SeenPictures",
     "Swap",
     "Violation",
+    "Why",
     "accomplished",
     "as_planner",
     "check_directory",

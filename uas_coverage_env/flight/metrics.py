@@ -6,7 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.record import LANDED, LIMIT, EventRecord, FlightRecord, Violation
+from uas_coverage_env.flight.record import (
+    LANDED,
+    LIMIT,
+    EventRecord,
+    FlightRecord,
+    LeftOpen,
+    Violation,
+)
 from uas_coverage_env.flight.scene_history import covered_since
 from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.scenario.ground_phases import landing, take_off
@@ -170,6 +177,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "violations": [_entry(violation) for violation in flight.violations],
         # without events the file is as it was before there were any
         **({"events": [_happened(event) for event in flight.events]} if flight.events else {}),
+        # where nothing is left open the file is as it was before reasons were kept
+        **({"left_open": [_open(one) for one in flight.left_open]} if flight.left_open else {}),
         "breaches": flight.breaches,
         # without the rule the file is as it was before there was one
         **({"height_breaches": flight.height_breaches} if flight.scenario.min_height_m else {}),
@@ -191,6 +200,10 @@ def _swaps(flight: FlightRecord) -> list[dict[str, Any]]:
 
 def _happened(event: EventRecord) -> dict[str, Any]:
     return {"t_s": event.time_s, "kind": event.kind, "uas": event.uas}
+
+
+def _open(left: LeftOpen) -> dict[str, Any]:
+    return {"waypoint": left.waypoint, "why": str(left.why), "detail": left.detail}
 
 
 def _entry(violation: Violation) -> dict[str, Any]:

@@ -49,6 +49,8 @@ class Planner(Protocol):
 
     - `warm_up(brief)`: compiles what needs compiling; called once, before `reset`, untimed.
     - `last_decision`: a `Decision` about the last `act`, or None.
+    - `given_up`: waypoint (its index) -> why it is left open, in a few words; asked for at the end
+      of a flight that has left some open (`Flight.left_open`).
     - `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
     - `comes_home_by_legs`: whether, where an autopilot is to fly the mission (`[execution]`), it
       brings UAS home by itself, so that return mode is not needed.

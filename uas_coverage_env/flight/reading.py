@@ -29,8 +29,10 @@ from uas_coverage_env.flight.record import (
     PLAN_DTYPE,
     DecisionRecord,
     EventRecord,
+    LeftOpen,
     Swap,
     Violation,
+    Why,
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
@@ -63,6 +65,14 @@ class _Violation(StrictModel):
         return self
 
 
+class _LeftOpen(StrictModel):
+    model_config = ConfigDict(strict=False)  # reasons are read from their words
+
+    waypoint: Count
+    why: Why
+    detail: str
+
+
 class _Planner(StrictModel):
     name: str
     options: dict[str, JsonValue]
@@ -74,6 +84,7 @@ class _Summary(StrictModel):
     model_config = ConfigDict(extra="ignore")
 
     violations: tuple[_Violation, ...]
+    left_open: tuple[_LeftOpen, ...] = ()
     breaches: Count
     height_breaches: Count = 0
     min_separation_m: float | None
@@ -298,6 +309,7 @@ def _summary_fields(path: Path, scenario: Scenario) -> dict[str, Any]:
     return {
         **dict(summary),
         "violations": tuple(Violation(**dict(violation)) for violation in summary.violations),
+        "left_open": tuple(LeftOpen(**dict(one)) for one in summary.left_open),
         "planner": summary.planner.name,
         "planner_options": dict(summary.planner.options),
     }

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, Self
 
 import numpy as np
@@ -110,6 +111,63 @@ class Swap:
     time_s: float
 
 
+class Why(StrEnum):
+    """Why a waypoint was left open; the first that holds.
+
+    Attributes:
+        meaning: The same in a sentence.
+    """
+
+    meaning: str
+
+    def __new__(cls, words: str, meaning: str) -> Self:
+        """A reason by its words."""
+        member = str.__new__(cls, words)
+        member._value_, member.meaning = words, meaning
+        return member
+
+    NO_SENSOR = "no sensor for it", "no UAS carries the sensor that it asks for"
+    NO_ROOM = "no room in it", "no part of its sphere keeps all safe distances"
+    NO_WAY = (
+        "no way to it",
+        "obstacles or no-fly zones, which are named, close it off from every UAS that could cover "
+        "it; routes keep 1 m more than the safe distances",
+    )
+    TOO_FAR = (
+        "out of reach",
+        "the charge with which the mission begins would not last there and home again",
+    )
+    LOST = "UAS lost", "no UAS that could cover it is left"
+    CHARGE = "charge", "the charge left in the end would not last there and home again"
+    TIME = "time", "the mission would have ended before a UAS was there and home again"
+    ENDED = "flight ended", "the flight was ended while a UAS that could cover it was in the air"
+    BLOCKED = "blocked", "something that moves kept it closed in the end"
+    PLANNER = (
+        "left by the planner",
+        "a UAS landed with it open, though its charge and the time would have sufficed; what the "
+        "planner says about it, where it does",
+    )
+
+
+@dataclass(frozen=True)
+class LeftOpen:
+    """A waypoint that was left open.
+
+    Attributes:
+        waypoint: Its number among the scenario's, those that events added included.
+        why: Why.
+        detail: The same in a line, with names and figures.
+    """
+
+    waypoint: int
+    why: Why
+    detail: str
+
+    def __str__(self) -> str:
+        """As a line for people."""
+        return f"waypoints[{self.waypoint}]: {self.why}: {self.detail}"
+
+
 @dataclass(frozen=True)
 class DecisionRecord:
     """One decision of the planner: how long it took, how it came about, what was left of it.
@@ -165,6 +223,8 @@ class FlightRecord:
         reward_terms: (T - 1, U, R) the weighted terms of the reward that an environment pays for
             these steps; None: a record from before they were kept.
         reward_names: (R,) of the terms.
+        left_open: Why waypoints were left open; empty, too, of a flight from a log, or from before
+            that was kept.
     """
 
     scenario: Scenario
@@ -197,6 +257,7 @@ class FlightRecord:
     open_waypoints: int | None = None
     reward_terms: NDArray[np.float64] | None = None
     reward_names: tuple[str, ...] = ()
+    left_open: tuple[LeftOpen, ...] = ()
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""

@@ -1,6 +1,7 @@
 """Fly one mission: planner and world in turn, sample by sample, until no UAS is flying."""
 
 import contextlib
+import dataclasses
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,7 +21,9 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.users_code import described, place_of
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import interruptions_noted
+from uas_coverage_env.flight.left_open import left_open
 from uas_coverage_env.flight.log import FlightLog
+from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief, Relaunch
@@ -172,7 +175,15 @@ def rollout(
         except PlannerError as error:
             error.flight = flown() if log.steps else None
             raise
-    return flown(ended)
+    return _with_reasons(flown(ended), planner)
+
+
+def _with_reasons(flight: Flight, planner: Planner) -> Flight:
+    """The flight with why it has left waypoints open."""
+    if not open_waypoints(flight):
+        return flight
+    said = getattr(planner, "given_up", {})
+    return dataclasses.replace(flight, left_open=left_open(flight, said))
 
 
 def _is_uncertain(scenario: Scenario, disturbances: Sequence[Disturbance] | None) -> bool:

@@ -1,9 +1,11 @@
 """What planners and learners share: the brief of a mission, and what follows from it."""
 
+from uas_coverage_env.mission.access import Access
 from uas_coverage_env.mission.approach import Approach, carefully, with_free_aims
 from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
+from uas_coverage_env.mission.errands import Errand, Errands
 from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind, in_disturbances
@@ -18,8 +20,11 @@ from uas_coverage_env.mission.ways import Way, Ways
 
 __all__ = [
     "MEAN_HEIGHT_M",
+    "Access",
     "Approach",
     "Attempts",
+    "Errand",
+    "Errands",
     "GuidedFlight",
     "Handover",
     "LearntWind",

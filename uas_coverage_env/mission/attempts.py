@@ -105,6 +105,12 @@ class Attempts:
         now = uncovered & mine & ~self._later
         return now if now.any() else uncovered & mine & (self._failed < _GIVEN_UP_FOR_GOOD)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        why = f"UAS came no nearer to it in {_GIVEN_UP_FOR_GOOD} attempts"
+        return dict.fromkeys(np.flatnonzero(self._failed >= _GIVEN_UP_FOR_GOOD).tolist(), why)
+
     def _fail(self, uas: int, target: int) -> None:
         self._nearest_s[:, target] = math.inf
         self._waited_s[:, target] = 0.0

@@ -45,6 +45,11 @@ class GuidedFlight:
         """
         return self._attempts.wanted_of(uncovered, mine)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._attempts.given_up
+
     def is_hard(self, uas: int, waypoint: int) -> bool:
         """Whether a waypoint is flown to with care."""
         return self._attempts.is_hard(uas, waypoint)

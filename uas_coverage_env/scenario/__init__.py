@@ -1,7 +1,7 @@
 """What a mission is: scenarios from files, from code and from a seed, checked at the door."""
 
 from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
-from uas_coverage_env.scenario.checks import out_of_reach, warnings
+from uas_coverage_env.scenario.checks import free_places_m, out_of_reach, warnings
 from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.execution import Execution
@@ -76,6 +76,7 @@ __all__ = [
     "Wind",
     "conditions_of",
     "flood_village",
+    "free_places_m",
     "generate_scenario",
     "installed_families",
     "load_scenario",

@@ -267,6 +267,12 @@ def out_of_reach(scenario: UncheckedScenario, more_m: float) -> list[int]:
     return [index for index in every if not _free_part(scenario, index, more_m)[1].any()]
 
 
+def free_places_m(scenario: UncheckedScenario, index: int) -> NDArray[np.float64]:
+    """(P, 3) places spread over a waypoint's sphere that keep all safe distances [m]."""
+    points, free = _free_part(scenario, index, 0.0)
+    return points[free]
+
+
 def _free_part(
     scenario: UncheckedScenario, index: int, more_m: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

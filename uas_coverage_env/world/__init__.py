@@ -21,7 +21,7 @@ from uas_coverage_env.world.commands import (
     pack,
 )
 from uas_coverage_env.world.outcome import CONTACT_NAMES, OUTCOME_DTYPE
-from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, crossing, route
+from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, NO_WAY, crossing, route
 from uas_coverage_env.world.state import (
     ABSENT,
     CONSUMPTION,
@@ -52,6 +52,7 @@ __all__ = [
     "KIND_NAMES",
     "LANDED",
     "LOST",
+    "NO_WAY",
     "N_BELIEF",
     "OUTCOME_DTYPE",
     "SINK",

@@ -14,6 +14,7 @@ from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import SPARE_S, build, no_record, route_workspace
 from uas_coverage_env.mission import (
+    Access,
     GuidedFlight,
     Handover,
     MissionBrief,
@@ -60,6 +61,7 @@ class FleetRoutes:
         self._samples, self._changes = samples, changes
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
         self._guided, self._handover = GuidedFlight(brief), Handover(brief)
+        self._has_way: BoolArray = Access(brief).has_way.any(axis=0)
         self.by_guidance = False
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._workspace, self._record = route_workspace(), no_record()
@@ -78,6 +80,11 @@ class FleetRoutes:
         self._blocked = self._renew(swarm)
         flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
         self._onwards = self._guided.commands(swarm, flown_to, self._blocked)
+
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._guided.given_up
 
     def take(self, routes: Sequence[NDArray[np.int64]]) -> None:
         """Fly these routes, one for each UAS, until others have to be built."""
@@ -135,12 +142,12 @@ class FleetRoutes:
     def _renew(self, swarm: SwarmState) -> BoolArray:
         self.view.update(swarm)
         blocked = self.view.blocked()
-        wanted = self._guided.wanted(swarm.uncovered)
+        wanted = self._guided.wanted(swarm.uncovered) & self._has_way
         if swarm.uncovered.any():
             # the rule of return mode, which need not be on
             self._returns = self._recall.update(swarm, self.view)
         works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
-        self._forget_covered(swarm.uncovered, works)
+        self._forget(~wanted, works)
         if self._has_to_build(swarm, wanted, blocked, works):
             self._situation = swarm, wanted, blocked, works
             self._build(*self._situation)
@@ -163,10 +170,11 @@ class FleetRoutes:
         late = left_out.any() and swarm.step - self._built_at >= _AGAIN_STEPS
         return bool(changed.any() or turned.any() or late)
 
-    def _forget_covered(self, uncovered: BoolArray, works: BoolArray) -> None:
+    def _forget(self, unwanted: BoolArray, works: BoolArray) -> None:
+        """Leave out of the routes what is covered, or left for later."""
         for u in range(len(self._lengths)):
             route = self._routes[u, : self._lengths[u]]
-            kept = route[uncovered[route]] if works[u] else route[:0]
+            kept = route[~unwanted[route]] if works[u] else route[:0]
             if len(kept) < len(route):
                 self._routes[u, : len(kept)] = kept
                 self._lengths[u] = len(kept)

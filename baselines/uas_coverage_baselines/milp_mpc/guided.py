@@ -116,6 +116,13 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
         """Waypoints that the order postpones while moving obstacles block them."""
         return self._guide.blocked
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are left out or given up, and why in a few words."""
+        order = self._guide.order
+        left_out = [] if order is None else order.left_out.tolist()
+        return dict.fromkeys(left_out, "its order leaves it out") | super().given_up
+
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """The OCP along the order of each UAS."""
         self._guide.update(swarm)

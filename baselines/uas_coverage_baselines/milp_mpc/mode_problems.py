@@ -18,9 +18,12 @@ from uas_coverage_baselines.milp_mpc.modes import (
 )
 from uas_coverage_baselines.milp_mpc.options import ModeOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.vehicle import DOD, VX, VZ
 from uas_coverage_env.world import HOME, Mode, SwarmState
+
+_FARTHEST = 4.0  # horizons of cruising: with a metre's cost as low as this a UAS still sets off
 
 
 class ModeProblems:
@@ -35,11 +38,13 @@ class ModeProblems:
     def __init__(self, brief: MissionBrief, options: ModeOptions, ways: Ways | None = None) -> None:
         self._options, self._weights = options, options.weights
         self._choice = TargetChoice(among_candidates=options.target_scale == "candidates")
-        self._builder = ProblemBuilder(brief, options, ways)
+        self._builder, self._leads = ProblemBuilder(brief, options, ways), ways is not None
         self.blocked: set[int] = set()
         self._planless: dict[str, int] = {}  # the nearest open waypoint of UAS without any plan
         self._memories = {uas.name: ModeMemory() for uas in brief.uas}
-        self._detour = options.return_detour if options.return_rule == "fence" else None
+        detour = options.return_detour if options.return_rule == "waypoints" else None
+        self._return_rule = ReturnRule(brief, detour, ways)
+        self._beyond: dict[str, frozenset[int]] = {}
 
     def mode(self, name: str) -> Mode:
         """The operation mode of a UAS."""
@@ -51,6 +56,12 @@ class ModeProblems:
         if memory.mode is ModeOfUas.RETURN:
             return HOME
         return self._planless.get(name) if memory.waypoint is None else memory.waypoint
+
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints for which a UAS had no charge left when it was last looked at, and how much."""
+        beyond = sorted(set().union(*self._beyond.values()))
+        return dict.fromkeys(beyond, f"beyond what is kept back ({self._return_rule})")
 
     def problem(self, swarm: SwarmState, plan: Plan | None) -> PlanningProblem:
         """The decision to make now.
@@ -76,14 +87,17 @@ class ModeProblems:
         return self._builder.problem(swarm, targets, self._weights, self._options.priority_per_s)
 
     def _situation(self, swarm: SwarmState, name: str, planned: set[int] | None) -> Situation:
-        x = swarm.x[swarm.names.index(name)]
+        x, rule = swarm.x[swarm.names.index(name)], self._return_rule
+        beyond = rule.beyond(name, x[0:3], float(x[DOD]), swarm.uncovered)
+        self._beyond[name] = frozenset(beyond)
         return Situation(
             position_m=x[0:3],
             velocity_mps=x[VX : VZ + 1],
             dod=float(x[DOD]),
-            dod_return=self._builder.dod_return(name, self._detour),
+            dod_return=rule.dod_return(name, x[0:3], swarm.uncovered),
             uncovered=swarm.uncovered,
             plans_coverage=planned is None or bool(planned),
+            beyond=self._beyond[name],
         )
 
     def _targets(
@@ -105,6 +119,7 @@ class ModeProblems:
                     self._builder.seconds_home(name, now.position_m),
                     self._builder.horizon_m(name) if level else 0.0,
                     self._weights,
+                    _FARTHEST * self._builder.horizon_m(name) if self._leads else np.inf,
                 ),
             )
             for name, now in zip(swarm.active, situations, strict=True)

@@ -18,6 +18,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 
 FloatArray = NDArray[np.float64]
 _NEAR_M = 5.0  # distances below this no longer raise the normalised target cost
+_NOTHING_LEFT = 4.0  # times the plain return weight, where nothing is left to cover
 
 
 class Mode(IntEnum):
@@ -58,6 +59,7 @@ class Situation:
         dod_return: DoD_r.
         uncovered: (K,) over the scenario's waypoints.
         plans_coverage: whether its last plan covers any waypoint.
+        beyond: waypoints from which its charge would not bring it home.
     """
 
     position_m: FloatArray
@@ -66,6 +68,7 @@ class Situation:
     dod_return: float
     uncovered: NDArray[np.bool_]
     plans_coverage: bool
+    beyond: frozenset[int] = frozenset()
 
 
 def next_mode(memory: ModeMemory, now: Situation) -> Mode:
@@ -163,11 +166,11 @@ def update_modes(
     ]
     result = []
     for row, (mode, situation) in enumerate(zip(modes, situations, strict=True)):
-        waypoint = kept[row]
-        if mode is Mode.TRANSIT and (waypoint is None or waypoint in blocked):
+        waypoint, never = kept[row], {*blocked, *situation.beyond}
+        if mode is Mode.TRANSIT and (waypoint is None or waypoint in never):
             taken = {w for other, w in enumerate(kept) if w is not None and other != row}
             waypoint = best_fitting_waypoint(
-                situation, waypoints_m, {*planned, *blocked, *taken}, choice
+                situation, waypoints_m, {*planned, *never, *taken}, choice
             )
             kept[row] = waypoint
         if mode is Mode.TRANSIT and waypoint is None:
@@ -185,6 +188,7 @@ def target_of(
     seconds_home: float,
     alike_m: float,
     weights: Weights,
+    farthest_m: float = np.inf,
 ) -> Target | None:
     """The target distance dynamics of one UAS (eq. (OCP_7)), None in covering mode.
 
@@ -204,16 +208,23 @@ def target_of(
         seconds_home: flight time home.
         alike_m: distances from home up to this one count alike while a UAS covers on its way.
         weights: cost coefficients.
+        farthest_m: distances from this one on no longer lower the cost of a metre: were it less,
+            a UAS would save the energy, and stay.
     """
     if memory.mode is Mode.TRANSIT and memory.waypoint is not None:
         position = waypoints_m[memory.waypoint]
         distance = max(float(np.linalg.norm(position - now.position_m)), _NEAR_M)
-        return Target(position, weights.transit / distance, memory.waypoint)
+        return Target(position, weights.transit / min(distance, farthest_m), memory.waypoint)
     if memory.mode is Mode.RETURN:
         nearest = max(alike_m, _NEAR_M) if now.plans_coverage and now.uncovered.any() else _NEAR_M
         distance = max(float(np.linalg.norm(home_m - now.position_m)), nearest)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
-        growth = urgency / (1.0 - urgency) if now.uncovered.any() else 4.0
-        weight = min(weights.return_home * growth / distance, weights.home_per_m_max)
+        growth = urgency / (1.0 - urgency)
+        if not now.uncovered.any():
+            growth = _NOTHING_LEFT
+        elif now.beyond.issuperset(np.flatnonzero(now.uncovered).tolist()):
+            growth = max(growth, _NOTHING_LEFT)
+        weight = weights.return_home * growth / min(distance, max(farthest_m, nearest))
+        weight = min(weight, weights.home_per_m_max)
         return Target(home_m, weight)
     return None

@@ -76,6 +76,11 @@ class MovingHorizon(ABC, Generic[Chosen]):
         """Waypoints that moving obstacles block now: waiting for them is no standstill."""
         return frozenset()
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._attempts.given_up
+
     def rehearsal(self) -> Self:
         """The same planner with a short horizon, and time enough to compile everything."""
         quick = self.options.model_copy(update={"time_limit_s": 10.0, "horizon": 8})

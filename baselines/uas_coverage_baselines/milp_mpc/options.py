@@ -137,15 +137,15 @@ class ModeOptions(OcpOptions):
         le=10.0,
         description="added to a waypoint's weight per second that covering it saves later",
     )
-    return_rule: Literal["fence", "vehicle"] = Field(
-        default="fence",
-        description="D_r,max: by the distance to the fence, or the vehicle file's return_rule",
+    return_rule: Literal["waypoints", "vehicle"] = Field(
+        default="waypoints",
+        description="D_r,max: the way home by an open waypoint, or the vehicle file's return_rule",
     )
     return_detour: float = Field(
-        default=2.5,
+        default=1.25,
         ge=1.0,
         le=20.0,
-        description="D_r,max over the distance from home to the fence's far corner (rule fence)",
+        description="D_r,max over the quickest way to a waypoint and home (rule waypoints)",
     )
     target_scale: Literal["fixed", "candidates"] = Field(
         default="fixed",

@@ -85,7 +85,9 @@ class PaperOptions(ModeOptions):
         default=False, description="whether a plan's end keeps charge for the way home"
     )
     priority_per_s: float = with_default(ModeOptions, "priority_per_s", 0.0)
-    return_rule: Literal["fence", "vehicle"] = with_default(ModeOptions, "return_rule", "vehicle")
+    return_rule: Literal["waypoints", "vehicle"] = with_default(
+        ModeOptions, "return_rule", "vehicle"
+    )
     return_scale: Literal["horizon", "distance"] = with_default(
         ModeOptions, "return_scale", "distance"
     )
@@ -187,6 +189,11 @@ class MilpMpcPaper:
     def mode(self, name: str) -> Mode:
         """The operation mode."""
         return self._by_modes.mode(name)
+
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._by_modes.given_up
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3, then the OCP's data."""

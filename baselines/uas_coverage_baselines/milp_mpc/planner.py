@@ -51,6 +51,11 @@ class MilpMpc(MovingHorizon[MilpMpcOptions]):
         """Waypoints that are left alone while moving obstacles block them."""
         return self._by_modes.blocked
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are given up, and why in a few words."""
+        return self._by_modes.given_up | super().given_up
+
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3, then the OCP's data."""
         return self._by_modes.problem(swarm, self.plan)

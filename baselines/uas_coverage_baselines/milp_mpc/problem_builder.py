@@ -34,7 +34,6 @@ from uas_coverage_env.vehicle import (
     VehicleParams,
     dod_per_s,
     linear_model,
-    return_threshold,
 )
 from uas_coverage_env.world import HOME, SwarmState
 
@@ -74,20 +73,6 @@ class ProblemBuilder:
     def vehicle(self, name: str) -> VehicleParams:
         """Parameters of a UAS's vehicle."""
         return self._vehicles[name]
-
-    def dod_return(self, name: str, detour: float | None) -> float:
-        """DoD_r (Sec. III-C.6, return mode).
-
-        D_r,max, the overestimated way home, is `detour` times the way to the fence's far corner;
-        that of the vehicle file where None.
-        """
-        vehicle, uas = self._vehicles[name], self._uas[name]
-        if detour is None:
-            return return_threshold(vehicle, uas.dod_max)
-        corners = self.brief.fence.vertices_m - self.home_m[name]
-        farthest_m = float(np.linalg.norm(corners, axis=1).max())
-        way_s = detour * farthest_m / vehicle.limits.v_cruise_mps
-        return return_threshold(vehicle, uas.dod_max, way_s)
 
     def seconds_left(self, name: str, dod: float) -> float:
         """Flight time until DoD_max, at the pace of cruising."""

@@ -167,6 +167,14 @@ class Tour:
         if self._has_order:
             self._find_order(self._view(first_sight(brief)), seed)
 
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are left out or given up, and why in a few words."""
+        if self._by_legs is not None:
+            return {}
+        left_out = self._schedule.order.left_out.tolist()
+        return dict.fromkeys(left_out, "its order leaves it out") | self._guided.given_up
+
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Plan for each flying UAS, in order, and fly the first command of each plan."""
         if self._repeats is not None:

@@ -30,7 +30,7 @@ from uas_coverage_baselines.trajectory.retiming import (
 )
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission import Access, MissionBrief
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import SwarmState
 
@@ -79,6 +79,9 @@ class Fleet:
         margin_m: Planned beyond the distances that count as a breach.
         speed_share: Of the largest horizontal speed, that is flown.
         moving_margin_m: Planned beyond the safe distances from what moves.
+
+    Attributes:
+        closed_off: (U, W) waypoints to which a UAS was found to have no flight: not planned again.
     """
 
     def __init__(
@@ -93,6 +96,8 @@ class Fleet:
         self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
+        self.access = Access(brief)
+        self.closed_off = np.zeros((len(brief.uas), len(brief.waypoints)), np.bool_)
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self.radius_m = np.array([w.radius_m for w in brief.waypoints], float)
         self._weight = np.array([w.weight for w in brief.waypoints], float)
@@ -151,6 +156,9 @@ class Fleet:
             less_s: (U,) taken off the budgets: what routes took more than expected.
         """
         left_s = self.brief.max_steps * self.brief.dt_s - moment.time_s
+        barred = moment.barred
+        if self.closed_off.any():
+            barred = self.closed_off if barred is None else barred | self.closed_off
         budget_s = self._pace * np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
         return RoutingTask.of(
             self.terrain,
@@ -163,7 +171,7 @@ class Fleet:
             not_before_s=self.brief.dt_s * moment.earliest.astype(float),
             stretch=_LEGS / self._speed_share,
             speed_share=self._speed_share,
-            barred=moment.barred,
+            barred=barred,
         )
 
     def fresh_packs(

@@ -17,6 +17,7 @@ from uas_coverage_baselines.routing import (
     empty_routes,
     improve_trips,
 )
+from uas_coverage_baselines.trajectory.closed_off import closed_off
 from uas_coverage_baselines.trajectory.course import (
     Course,
     are_apart,
@@ -44,6 +45,8 @@ _LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small on
 HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _FINISHED = 0.95  # of a draft's steps: no flight of 60 missions was made shorter than 0.952
 _BATTERY = "the battery does not last"
+NO_FLIGHT = "no flight"
+_PLANS_AT_MOST = 4  # others may be sent to what is left, and be stuck there, too
 _BUDGETS = 3
 _SHORTER = 0.04  # of the battery, taken off a budget that did not last
 
@@ -170,6 +173,34 @@ def plan_mission(
     kept: Routes | None = None,
     flown: Mapping[int, tuple[IntArray, Flight]] | None = None,
     fresh: FreshPacks | None = None,
+) -> MissionPlan:
+    """The best plan found, without waypoints that are closed off; arguments as of `_best_plan`.
+
+    Those that keep a UAS from flying its route are noted in the fleet, and left to others.
+    """
+    for _ in range(_PLANS_AT_MOST):
+        plan = _best_plan(fleet, moment, step, movers, effort, seed, kept, flown, fresh)
+        stuck = [u for u, why in plan.troubles.items() if why == NO_FLIGHT]
+        found = False
+        for u in stuck:
+            waypoints = closed_off(fleet, u, moment.x[u], plan.order.routes[u])
+            fleet.closed_off[u, waypoints] = True
+            found |= bool(len(waypoints))
+        if not found:
+            break
+    return plan
+
+
+def _best_plan(
+    fleet: Fleet,
+    moment: Moment,
+    step: int,
+    movers: Mapping[int, Sequence[Body]],
+    effort: Effort,
+    seed: int,
+    kept: Routes | None,
+    flown: Mapping[int, tuple[IntArray, Flight]] | None,
+    fresh: FreshPacks | None,
 ) -> MissionPlan:
     """The best plan found; the same arguments give the same plan.
 
@@ -337,7 +368,7 @@ def _verified(
     troubles: dict[int, str] = {}
     for u in sorted(flights, key=lambda k: (-flights[k].steps, k)):
         clear = flights[u].is_clear
-        why = trouble_alone(fleet, u, moment.x[u], flights[u]) if clear else "no flight"
+        why = trouble_alone(fleet, u, moment.x[u], flights[u]) if clear else NO_FLIGHT
         course = course_of(fleet, u, step, moment.x[u], flights[u])
         if why is None and not all(
             are_apart(fleet, u, k, course, other.course) for k, other in planned.items()

@@ -85,7 +85,7 @@ class Trajectory:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts; one that may be under way, when it goes on."""
         if self._in_wind.takes(brief, order_effort(self.options, len(brief.uas)), seed):
-            self._has_acted = False
+            self._has_acted, self.mission_plan = False, None
             return
         repeats = self._repeats if self._has_acted and seed == self._seed else None
         if repeats is not None and repeats.goes_on(brief):
@@ -141,6 +141,16 @@ class Trajectory:
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)
         self._make_plan(swarm, Movers.seen(self._brief, swarm, self._silent))
+
+    @property
+    def given_up(self) -> dict[int, str]:
+        """Waypoints that are left out, and why in a few words."""
+        if self.mission_plan is None:
+            return {}
+        left_out = self.mission_plan.order.left_out.tolist()
+        closed = np.flatnonzero(self._fleet.closed_off.any(axis=0)).tolist()
+        given_up = dict.fromkeys(left_out, "its order leaves it out")
+        return given_up | dict.fromkeys(closed, "no flight was found that visits it")
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""

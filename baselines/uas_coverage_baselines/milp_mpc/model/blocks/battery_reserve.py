@@ -33,6 +33,9 @@ FloatArray = NDArray[np.float64]
 _BATTERY = [DOD, U_TH]
 _ALLOWANCE_S = 16.0  # braking to a hover where the plan ends, and turning
 
+SETTLING_S = _ALLOWANCE_S + MILP_RESERVE.landing_s
+"""What the reserve holds back beyond the flight home itself [s]."""
+
 
 class BatteryReserve:
     """DoD(N) + what flying home from p(N) takes <= DoD_max, per UAS.
