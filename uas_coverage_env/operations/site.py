@@ -14,7 +14,7 @@ from uas_coverage_env.operations.convex import (
     hull_of,
     without_holes,
 )
-from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, LeftOut, TakeOff
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.local import frame_around, local_place, local_polygon
 from uas_coverage_env.operations.prisms import Standing, prisms
@@ -121,10 +121,14 @@ def make_site(
     ]
     places = take_off_places(things, homes)
     if not places:
+        points = [
+            thing.name for thing in things if isinstance(thing, LeftOut) and thing.what == "point"
+        ]
+        said = f" (no take-off places: {', '.join(map(repr, points[:3]))})" if points else ""
         middle = f"{frame.place.latitude_deg:.5f},{frame.place.longitude_deg:.5f}"
         raise InputError(
             f"no take-off place: draw a point, or give --home LAT,LON near the areas, whose middle "
-            f"is {middle}"
+            f"is {middle}{said}"
         )
     homes_m = tuple(local_place(frame, place) for place in places)
     areas = _apart(
