@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import Polygon
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
@@ -308,6 +309,8 @@ def _rings(source: str, part: Part) -> tuple[NDArray[np.float64], tuple[NDArray[
     """Outer ring and holes of a polygon or closed line."""
     rings = part.positions if part.shape == "polygon" else [part.positions]
     outer, *holes = (_ring(source, ring) for ring in rings)
+    if part.shape == "closed line" and not Polygon(outer).is_valid:
+        outer = _ring(source, part.positions[:-1])  # its end went a little too far
     return outer, tuple(holes)
 
 

@@ -16,6 +16,7 @@ from pyproj.exceptions import ProjError
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.drawing import MOST_CORNERS, content
 from uas_coverage_env.operations.features import Feature, attributes_of
+from uas_coverage_env.operations.tags import KEYS
 
 _LANGUAGES: Mapping[int, str] = {
     **{0x01: "cp437", 0x02: "cp850", 0x03: "cp1252", 0x08: "cp865", 0x0D: "cp437"},
@@ -28,6 +29,8 @@ _LANGUAGES: Mapping[int, str] = {
 """Language byte of a .dbf -> encoding (dBASE's list of code pages, as GDAL and Esri read it)."""
 
 _LANGUAGE_AT = 29
+_LONGEST_NAME = 10
+"""Of a field: longer keys of tags are cut off there."""
 
 
 def read_shapefile(path: Path) -> Iterator[Feature]:
@@ -64,7 +67,8 @@ def _beside(path: Path) -> dict[str, Path]:
     """The files of a layer by their endings, in whatever case; the same case as the .shp first."""
     found = {"shp": path}
     folder = [path.parent / name for name in sorted(_names(path.parent))]
-    for file in sorted(folder, key=lambda file: file.stem != path.stem):
+    upper = path.suffix.isupper()
+    for file in sorted(folder, key=lambda f: (f.stem != path.stem, f.suffix.isupper() != upper)):
         if file.stem.lower() == path.stem.lower():
             found.setdefault(file.suffix[1:].lower(), file)
     return found
@@ -126,7 +130,7 @@ def _feature(
         raise InputError(
             f"{path}: has more than {MOST_CORNERS} corners; simplify it or save the area alone"
         )
-    attributes = attributes_of(fields)
+    attributes = attributes_of(fields, *(_whole_keys(key, fields[key]) for key in fields))
     geometry: Any = None
     if shape.shapeType == shapefile.MULTIPATCH:
         attributes["height"] = "of solid bodies"
@@ -142,6 +146,12 @@ def _feature(
         fallback=f"area_{number + 1}",
         what="MultiPatch" if shape.shapeType == shapefile.MULTIPATCH else "",
     )
+
+
+def _whole_keys(key: str, value: Any) -> dict[str, Any]:
+    """The tags of which a field's name holds the first letters: `building:l`."""
+    cut = key.lower()
+    return {k: value for k in KEYS if len(cut) == _LONGEST_NAME and k[:_LONGEST_NAME] == cut}
 
 
 def _turned(coordinates: Any, to_degrees: pyproj.Transformer) -> Any:
