@@ -137,8 +137,11 @@ def solids(draw, cell, shapes):
     (key, value), guess = draw(st.sampled_from(list(TALL.items())))
     text = draw(
         st.sampled_from(
-            [f"{height}", f"{height} m", f"{height},0", f"ca. {height} m", f"5;{height}"]
-            + [f"{height / 0.3048:.2f} ft", f"{height / 0.3048:.2f}'"]
+            [
+                *(f"{height}", f"{height} m", f"{height},0", f"ca. {height} m", f"5;{height}"),
+                f"{height / 0.3048:.2f} ft",
+                f"{height / 0.3048:.2f}'",
+            ]
         )
     )
     said = {draw(keyed(key)): value, draw(keyed("height")): text}

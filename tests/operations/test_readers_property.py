@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from random_drawings import (
     AREA,
     CELLS,
-    HALF_X,
     HALF_Y,
     HOME,
     depth_m,

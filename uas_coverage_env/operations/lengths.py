@@ -12,7 +12,6 @@ _UNITS_M = {
     "km": 1000.0,
 }
 _NUMBER = re.compile(r"(\d{1,3}(?:,\d{3})+(?!\d)|\d+)(?:[.,](\d+))?\s*([a-z]+|['\"′’″”])?")
-_FEET = ("'", "′", "’")
 
 
 def length_m(given: Any) -> float:
@@ -39,5 +38,5 @@ def length_m(given: Any) -> float:
         value = float(f"{whole.replace(',', '')}.{part or 0}") * _UNITS_M.get(unit, 1.0)
         inches = _UNITS_M.get(unit) == _UNITS_M["in"]
         found.append(value + feet_m if inches else value)
-        feet_m = value if unit in _FEET else 0.0
+        feet_m = value if _UNITS_M.get(unit) == _UNITS_M["ft"] else 0.0
     return max(found, default=math.nan)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import osmium
-from osmium.filter import KeyFilter
 from osmium.geom import GeoJSONFactory
 from osmium.io import FileBuffer
 from osmium.osm import Area, Node, Relation, Way
@@ -17,7 +16,7 @@ from uas_coverage_env.operations.drawing import content
 from uas_coverage_env.operations.features import Feature, attributes_of
 from uas_coverage_env.operations.tags import BUILDING, FOREST, KEYS, standing_of
 
-_KEYS = frozenset(KEYS)
+_KEYS = frozenset((*KEYS, "highway"))
 LACKS_CORNERS = "outline that lacks corners"
 _MOST_OBJECTS = 2_000_000
 """A file of 20 MB may hold more; a town with its surroundings has some ten thousand."""
@@ -83,13 +82,13 @@ def _features(file: str, data: Any) -> Iterator[Feature]:
         word = "way" if isinstance(thing, Area) and thing.from_way() else thing.__class__.__name__
         return Feature(file, f"{word.lower()} {number}", geometry, _tags(thing), what=what)
 
-    for thing in osmium.FileProcessor(data).with_areas(KeyFilter(*KEYS)):
+    for thing in osmium.FileProcessor(data).with_areas():
         if isinstance(thing, Way):
             known = [node.location for node in thing.nodes if node.location.valid()]
             line = [[place.lon, place.lat] for place in known]
             if line:
                 corners[thing.id] = line[0]
-        if not any(tag.k in _KEYS or tag.k == "highway" for tag in thing.tags):
+        if not any(tag.k.strip().lower() in _KEYS for tag in thing.tags):
             continue
         what = standing_of(_tags(thing))
         along = what is not None and what.along

@@ -241,10 +241,11 @@ def _told(feature: Feature, shape: Shape, *, on_map: bool) -> Meaning | None:
     description = str(feature.attributes.get("description", ""))[:200]
     if _ALONE["no_fly"].fullmatch(_plain(description)):
         return _meaning("no_fly", shape, "the description", description)
-    standing = _standing(feature, shape)
-    for each in (standing, *(each for each in told if each.role == "obstacle")):
-        if each is not None:
-            return each
+    standing, words = _standing(feature, shape), [each for each in told if each.role == "obstacle"]
+    if words and (standing is None or standing.solid == OTHER):
+        return words[0]._replace(sure=words[0].sure or standing is not None)
+    if standing is not None:
+        return standing
     if told:  # it is called an area to search, or is the label of one
         return None if shape == "polygon" else Meaning(None, "left out", told[0].said_by)
     folders = [_worded(feature, text, shape, "the folder", only=False) for text in feature.folders]
