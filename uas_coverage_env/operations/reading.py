@@ -28,12 +28,12 @@ def read_drawings(paths: Sequence[Path]) -> list[Drawn]:
     """All that was drawn in some files, in their order, and what is left out of them.
 
     Args:
-        paths: Files, or names of shipped examples (`karhula`).
+        paths: Files, or names of shipped examples (`karhula`, `zones`).
 
     Raises:
         InputError: A file cannot be used, or there is nothing to search in them.
     """
-    found = [thing for path in paths for thing in _read(or_example(path, ".geojson"))]
+    found = [thing for path in paths for thing in _read(or_example(path, ".geojson", ".kml"))]
     polygons = [thing for thing in found if isinstance(thing, DrawnPolygon)]
     if not any(thing.role == "search" for thing in polygons):
         names = ", ".join(map(str, paths))
@@ -51,8 +51,8 @@ def _read(path: Path) -> list[Drawn]:
     return list(limited(str(path), (thing for one in features for thing in drawn_of(one))))
 
 
-def or_example(path: Path, ending: str) -> Path:
+def or_example(path: Path, *endings: str) -> Path:
     """The file of a shipped example where its name is given, otherwise the path itself."""
-    file = _EXAMPLES / f"{path.name}{ending}"
     is_name = len(path.parts) == 1 and not path.suffix and not path.exists()
-    return file if is_name and file.is_file() else path
+    files = [_EXAMPLES / f"{path.name}{ending}" for ending in endings] if is_name else []
+    return next((file for file in files if file.is_file()), path)
