@@ -391,8 +391,9 @@ def town_kinds() -> str:
         )
         for (kind, half_m, height_m, along), tags in found.items()
     ]
-    for value, height_m in sorted(GUESSED_M.items(), key=lambda it: it[1]):
-        rows.append((f"`building={value}`", f"`{BUILDING}`", f"{height_m:g}", "10", ""))
+    for height_m in sorted(set(GUESSED_M.values())):
+        tags = (f"`building={value}`" for value, high in GUESSED_M.items() if high == height_m)
+        rows.append((", ".join(tags), f"`{BUILDING}`", f"{height_m:g}", "10", ""))
     rows.append(
         ("any other `building`, `building:part`", f"`{BUILDING}`", f"{GUESSED_OTHER_M:g}", "10", "")
     )

@@ -36,7 +36,7 @@ TALL = {  # a tag of a kind -> its least height, where no tag says it
     ("aerialway", "pylon"): 60.0,
     ("building", "church"): 35.0,
     ("building:part", "yes"): 10.0,
-    ("man_made", "nobody_lists_this"): None,
+    ("man_made", "not_in_the_table"): None,
 }
 
 

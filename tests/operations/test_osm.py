@@ -215,6 +215,9 @@ def test_a_height_that_cannot_be_read_is_named_and_that_of_the_kind_counts(capsy
 def test_a_role_in_a_town_counts_and_areas_are_refused_there(capsys):
     zone = tags_of(role="no_fly", name="school")
     assert "no_fly" in tops_m(town(with_way(9, SQUARE_OF, zone)))
+    assert "no_fly" in tops_m(town(with_way(9, SQUARE_OF, tags_of(name="No-fly zone clinic"))))
+    assert "no_fly" not in tops_m(town(with_way(9, SQUARE_OF, tags_of(name="Restricted shop"))))
+    town(with_way(9, SQUARE_OF, tags_of(role="outer", building="yes")))
     capsys.readouterr()
     Path("town.osm").write_text(with_way(9, SQUARE_OF, tags_of(role="fence")))
     line = refused(capsys, collection(feature(SQUARE)), *HOME, "--town", "town.osm")

@@ -159,6 +159,17 @@ def test_a_table_with_fewer_rows_than_shapes_is_refused():
     assert "2 shapes, but 1 rows" in refusal(["area.shp"])
 
 
+def test_a_row_that_is_marked_as_deleted_is_left_out():
+    layer("area", shapefile.POLYGON, [*ROWS, ({"name": "more"}, [ZONE])])
+    table = bytearray(Path("area.dbf").read_bytes())
+    header, length = (int.from_bytes(table[n : n + 2], "little") for n in (8, 10))
+    table[header + 2 * length] = ord("*")
+    Path("area.dbf").write_bytes(table)
+    depth, said = kept(["area.shp"])
+    assert depth > 30.0
+    assert "left out: 1 deleted row" in said
+
+
 def test_bodies_of_a_shapefile_are_refused():
     with closing(shapefile.Writer("area", shapeType=shapefile.MULTIPATCH)) as writer:
         writer.field("name", "C", 10)

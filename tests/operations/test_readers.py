@@ -337,3 +337,25 @@ def test_what_is_passed_over_is_counted_and_named():
     said = kept(kml(*marks))[1]
     assert "left out: 1 line 'path', 1 point 'Area 1'" in said
     assert LeftOut("line", "path") in read_drawings([Path(path) for path in kml(*marks)])
+
+
+def test_a_point_within_the_geometry_of_a_polygon_is_its_label():
+    both = f"<MultiGeometry>{line([MIDDLE], 'Point')}{polygon(ZONE)}</MultiGeometry>"
+    depth, said = kept(kml(placemark("no-fly school", both)))
+    assert depth > 30.0
+    assert "left out: 1 label of a polygon 'no-fly school'" in said
+
+
+def test_a_name_that_stands_twice_counts_twice():
+    zone = {**feature(ZONE), "properties": {"name": "polygon 7", "Name": "NFZ"}}
+    assert kept(drawn(zone))[0] > 30.0
+
+
+def test_what_was_drawn_is_said_and_what_lies_outside_the_fence():
+    far = [[x + 0.02, y] for x, y in ZONE]
+    tower = of("Point", [8.003, 50.0005], name="Tower A")
+    features = [feature(ZONE, name="NFZ 1"), feature(far, name="NFZ 2"), tower]
+    said = kept(drawn(*features))[1]
+    assert "drawn: 1 area 'field', 2 no-fly zones 'NFZ …', 1 obstacle 'Tower A'" in said
+    assert "heights guessed from their kind: 1 obstacle of 100 m 'Tower A'" in said
+    assert "outside the fence, where no UAS flies: 1 no-fly zone 'NFZ 2'" in said

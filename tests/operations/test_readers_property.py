@@ -106,7 +106,7 @@ def test_plans_keep_structures_exclusions_and_fences(data):
         elif kind == "landing":
             items.append({"type": "ComplexItem", "complexItemType": "vtolLandingPattern"})
         else:
-            items.append({"type": "SimpleItem", "command": 16, "params": [0, 0, 0, 0, y, x, 30]})
+            items.append({"type": "SimpleItem"})
     firmware = data.draw(st.sampled_from([3, 12, 0]))
     fences = data.draw(st.lists(st.sampled_from([0.0, 5e-4, 1e-3]), max_size=2, unique=True))
     for aside in fences:

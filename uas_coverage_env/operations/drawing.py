@@ -124,7 +124,12 @@ def drawn_of(feature: Feature, *, on_map: bool = False) -> Iterator[Drawn]:
     Raises:
         InputError: It says something that cannot be kept.
     """
-    for part in parts_of(feature):
+    parts = list(parts_of(feature))
+    has_area = any(part.shape == "polygon" for part in parts)
+    for part in parts:
+        if has_area and part.shape == "point":  # where programs write its label
+            yield LeftOut("label of a polygon", feature.name)
+            continue
         meaning = meaning_of(feature, part.shape, on_map=on_map)
         if part.shape == "closed line" and (feature.along or (meaning.solid or OTHER).along):
             part = part._replace(shape="line")

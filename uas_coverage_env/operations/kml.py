@@ -84,19 +84,24 @@ def _features(path: Path, layer: str, text: bytes, numbers: Iterator[int]) -> It
         number, attributes = next(numbers), _attributes(placemark)
         if within.role:
             attributes.setdefault("role", within.role)
-        elements = list(_outermost(placemark, *_GEOMETRIES, *_NOT_READ))
-        for element in elements or [None]:
-            tag = _tag(element) if element is not None else "Placemark without geometry"
-            extruded = _extruded(element) if element is not None else {}
+        shapes = list(_outermost(placemark, *_GEOMETRIES, *_NOT_READ))
+        other = [_tag(shape) for shape in shapes if _tag(shape) in _NOT_READ]
+        geometries = [_geometry(shape) for shape in shapes if _tag(shape) in _GEOMETRIES]
+        heights = [found for found in map(_extruded, shapes) if found]
+        parts: list[tuple[str, Any]] = [(tag, None) for tag in other]
+        if geometries or not other:
+            what = "" if geometries else "placemark without geometry"
+            parts.append((what, {"type": "GeometryCollection", "geometries": geometries}))
+        for what, geometry in parts:
             yield Feature(
                 str(path),
                 f"placemark {number}",
-                _geometry(element) if element is not None and tag in _GEOMETRIES else None,
-                attributes_of(attributes, extruded),
+                geometry,
+                attributes_of(attributes, *heights),
                 within.folders,
                 (layer,),
                 f"area_{number}",
-                "" if tag in _GEOMETRIES else tag,
+                what,
             )
 
 

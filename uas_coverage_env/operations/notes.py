@@ -1,9 +1,10 @@
 """What an import says: what is seen, what stands there, who takes off where, what is left out."""
 
+import re
 from collections.abc import Sequence
 from itertools import takewhile
 
-from uas_coverage_env.operations.drawing import Drawn, LeftOut, Remark, TakeOff
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, LeftOut, Remark, TakeOff
 from uas_coverage_env.operations.looks import Look
 from uas_coverage_env.operations.prisms import Standing
 from uas_coverage_env.operations.site import Area, Site
@@ -16,6 +17,12 @@ _STANDING = {
     POWER_LINE: "power lines",
     MAST: "masts and towers",
     STRUCTURE: "structures",
+}
+_DRAWN = {
+    "search": "area",
+    "no_fly": "no-fly zone",
+    "fence": "fence",
+    "obstacle": "obstacle",
 }
 _MOST_NAMES = 3
 _SHORTEST = 3  # letters that names share, to be said once for all
@@ -30,8 +37,20 @@ def drawn_notes(things: Sequence[Drawn], site: Site, uas: Sequence[str], town: T
         uas: Names of the UAS.
         town: What stands there.
     """
-    notes = [thing.text for thing in things if isinstance(thing, Remark)]
-    notes += [*site.notes, *town.remarks]
+    polygons = [thing for thing in things if isinstance(thing, DrawnPolygon)]
+    notes = [f"drawn: {in_words([LeftOut(_DRAWN[one.role], one.name) for one in polygons])}"]
+    guessed = [
+        LeftOut(f"obstacle of {p.solid.height_m:g} m", p.name)
+        for p in polygons
+        if p.solid and not p.solid.known
+    ]
+    if guessed:
+        notes.append(f"heights guessed from their kind: {in_words(guessed)}")
+    if site.outside:
+        outside = [LeftOut(_DRAWN[one.role], one.name) for one in site.outside]
+        notes.append(f"outside the fence, where no UAS flies: {in_words(outside)}")
+    notes += [*site.notes, *(thing.text for thing in things if isinstance(thing, Remark))]
+    notes += town.remarks
     starts: dict[int, list[str]] = {}
     for n, name in enumerate(uas):
         starts.setdefault(n % len(site.homes), []).append(name)
@@ -48,12 +67,12 @@ def drawn_notes(things: Sequence[Drawn], site: Site, uas: Sequence[str], town: T
     left = [*(thing for thing in things if isinstance(thing, LeftOut)), *town.left_out]
     left += [LeftOut("point", place.name) for place in points]
     if left:
-        notes.append(f"left out: {left_out(left)}")
+        notes.append(f"left out: {in_words(left)}")
     return notes
 
 
-def left_out(left: Sequence[LeftOut]) -> str:
-    """What is left out in words: `3 points 'GCP …', 1 line 'path'`."""
+def in_words(left: Sequence[LeftOut]) -> str:
+    """Things by kind and name: `3 points 'GCP …', 1 line 'path'`."""
     names: dict[str, list[str]] = {}
     for what, name in left:
         names.setdefault(what, []).append(name[:40])
@@ -66,9 +85,9 @@ def left_out(left: Sequence[LeftOut]) -> str:
 def _many(what: str, count: int) -> str:
     if count == 1:
         return what
-    head, _, tail = what.partition(" without ")  # placemarks without geometry
+    head, *rest = re.split(r"( without | of )", what, maxsplit=1)
     plural = f"{head[:-1]}ies" if head.endswith("y") else f"{head}s"
-    return f"{plural} without {tail}" if tail else plural
+    return "".join((plural, *rest))
 
 
 def _called(names: Sequence[str]) -> str:

@@ -14,6 +14,7 @@ from osmium.osm import Area, Node, Relation, Way
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.drawing import content
 from uas_coverage_env.operations.features import Feature, attributes_of
+from uas_coverage_env.operations.roles import speaks_of_flying
 from uas_coverage_env.operations.tags import BUILDING, FOREST, KEYS, standing_of
 
 _KEYS = frozenset((*KEYS, "highway"))
@@ -83,12 +84,13 @@ def _features(file: str, data: Any) -> Iterator[Feature]:
         return Feature(file, f"{word.lower()} {number}", geometry, _tags(thing), what=what)
 
     for thing in osmium.FileProcessor(data).with_areas():
+        line: list[list[float]] = []
         if isinstance(thing, Way):
             known = [node.location for node in thing.nodes if node.location.valid()]
             line = [[place.lon, place.lat] for place in known]
             if line:
                 corners[thing.id] = line[0]
-        if not any(tag.k.strip().lower() in _KEYS for tag in thing.tags):
+        if not any(map(_matters, thing.tags)):
             continue
         what = standing_of(_tags(thing))
         along = what is not None and what.along
@@ -111,6 +113,11 @@ def _features(file: str, data: Any) -> Iterator[Feature]:
             place = [thing.location.lon, thing.location.lat]
             yield feature(thing, {"type": "Point", "coordinates": place})
     yield from outlines.values()
+
+
+def _matters(tag: Any) -> bool:
+    key = tag.k.strip().lower()
+    return key in _KEYS or (key == "name" and speaks_of_flying(tag.v))
 
 
 def _line(places: list[list[float]]) -> dict[str, Any]:

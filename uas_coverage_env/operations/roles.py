@@ -208,7 +208,7 @@ def meaning_of(feature: Feature, shape: Shape, *, on_map: bool = False) -> Meani
         InputError: Its role is unknown, or its name says several that contradict each other.
     """
     given = feature.attributes.get("role")
-    if given is None:
+    if given is None or (on_map and not _known(str(given))):
         told = _told(feature, shape, on_map=on_map)
         return told or Meaning(None, getattr(UNSAID, shape.replace("closed ", "")))
     text = str(given)
@@ -229,7 +229,7 @@ def _told(feature: Feature, shape: Shape, *, on_map: bool) -> Meaning | None:
     """What name, kind, height and folders say; None: nothing."""
     names, kinds = _texts(feature, NAMES), _texts(feature, KINDS)
     if on_map:
-        flying = (text for text in (*names, *kinds) if _FLIGHT.search(_plain(text)))
+        flying = (text for text in (*names, *kinds) if speaks_of_flying(text))
         found = [_meaning("no_fly", shape, "the name", text) for text in flying]
         return found[0] if found else _standing(feature, shape)
     said = [_worded(feature, text, shape, "the name") for text in names]
@@ -307,8 +307,20 @@ def _standing(feature: Feature, shape: Shape) -> Meaning | None:
     return Meaning("obstacle", _becomes("obstacle", shape), said, solid)
 
 
+def speaks_of_flying(text: str) -> bool:
+    """Whether a name on a map is that of a no-fly zone."""
+    return bool(_FLIGHT.search(_plain(text)))
+
+
 def _given(feature: Feature, text: str) -> tuple[Role, Tagged | None]:
     """The role that an attribute gives, and what stands there."""
+    known = _known(text)
+    if known is None:
+        raise InputError(f"{feature.source}: unknown role {text[:40]!r}; take {', '.join(ROLES)}")
+    return known
+
+
+def _known(text: str) -> tuple[Role, Tagged | None] | None:
     plain = _plain(text)
     for role, row in ROLES.items():
         if plain.replace(" ", "_") in (role, *row.spellings):
@@ -317,9 +329,7 @@ def _given(feature: Feature, text: str) -> tuple[Role, Tagged | None]:
     solid = next(_solids(text), None)
     if "no_fly" in found or (len(found) == 1 and solid is None):
         return found[0], None
-    if solid is not None and not found:
-        return "obstacle", solid
-    raise InputError(f"{feature.source}: unknown role {text[:40]!r}; take {', '.join(ROLES)}")
+    return ("obstacle", solid) if solid is not None and not found else None
 
 
 def _texts(feature: Feature, keys: tuple[str, ...]) -> list[str]:

@@ -80,8 +80,8 @@ def _names(folder: Path) -> list[str]:
 
 def _entries(
     parts: Mapping[str, bytes], page: bytes
-) -> list[tuple[shapefile.Shape, dict[str, Any]]]:
-    """Shapes and fields, in the first encoding in which all can be read."""
+) -> list[tuple[shapefile.Shape | None, dict[str, Any] | None]]:
+    """Shapes and fields, in the first encoding in which all can be read; None: a deleted row."""
     encodings = _encodings(parts.get("dbf", b""), page)
     for encoding in encodings:
         files: dict[str, Any] = {ending: io.BytesIO(data) for ending, data in parts.items()}
@@ -90,10 +90,16 @@ def _entries(
             ignored = warnings.catch_warnings(action="ignore")
             with ignored, closing(shapefile.Reader(**files, encoding=encoding)) as reader:
                 shapes = reader.shapes()
-                records = reader.records() if "dbf" in parts else [None] * len(shapes)
-                if len(records) != len(shapes):
-                    raise ValueError(f"{len(shapes)} shapes, but {len(records)} rows")
-                return [(s, r.as_dict() if r else {}) for s, r in zip(shapes, records, strict=True)]
+                if "dbf" not in parts:
+                    return [(shape, {}) for shape in shapes]
+                rows = len(reader) if reader.numRecords is None else reader.numRecords
+                if rows != len(shapes):
+                    raise ValueError(f"{len(shapes)} shapes, but {rows} rows")
+                records = map(reader.record, range(rows))
+                return [
+                    (s, None if r is None else r.as_dict())
+                    for s, r in zip(shapes, records, strict=True)
+                ]
         except (UnicodeError, shapefile.dbfFileException):
             if encoding == encodings[-1]:
                 raise
@@ -122,19 +128,22 @@ def _encodings(table: bytes, page: bytes) -> list[str]:
 def _feature(
     path: Path,
     number: int,
-    shape: shapefile.Shape,
-    fields: Mapping[str, Any],
+    shape: shapefile.Shape | None,
+    fields: Mapping[str, Any] | None,
     to_degrees: pyproj.Transformer,
 ) -> Feature:
-    if len(getattr(shape, "points", ())) > MOST_CORNERS:
+    if fields is None:
+        return Feature(str(path), f"row {number + 1}", None, {}, what="deleted row")
+    kind = shapefile.NULL if shape is None else shape.shapeType
+    if shape is not None and len(getattr(shape, "points", ())) > MOST_CORNERS:
         raise InputError(
             f"{path}: has more than {MOST_CORNERS} corners; simplify it or save the area alone"
         )
     attributes = attributes_of(fields, *(_whole_keys(key, fields[key]) for key in fields))
     geometry: Any = None
-    if shape.shapeType == shapefile.MULTIPATCH:
+    if kind == shapefile.MULTIPATCH:
         attributes["height"] = "of solid bodies"
-    elif shape.shapeType != shapefile.NULL and shape.points:
+    elif shape is not None and kind != shapefile.NULL and shape.points:
         geometry = shape.__geo_interface__
         geometry = {**geometry, "coordinates": _turned(geometry["coordinates"], to_degrees)}
     return Feature(
@@ -144,7 +153,7 @@ def _feature(
         attributes,
         layers=(path.stem,),
         fallback=f"area_{number + 1}",
-        what="MultiPatch" if shape.shapeType == shapefile.MULTIPATCH else "",
+        what="MultiPatch" if kind == shapefile.MULTIPATCH else "",
     )
 
 

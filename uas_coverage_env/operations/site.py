@@ -85,6 +85,7 @@ class Site:
         fence: Convex; what lies in it but outside the drawn fence is walled off.
         no_fly: Walls that reach beyond the ceiling.
         standing: What was drawn as standing there.
+        outside: What was drawn as such or as a no-fly zone outside the fence.
         notes: What is to be said of it.
     """
 
@@ -95,6 +96,7 @@ class Site:
     fence: Polygon
     no_fly: tuple[Wall, ...]
     standing: tuple[Standing, ...] = ()
+    outside: tuple[DrawnPolygon, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -140,8 +142,6 @@ def make_site(
     for thing, area in polygons:
         if thing.role == "search" and area.difference(within).area > 1.0:
             raise InputError(f"{thing.source} reaches beyond the fence; enlarge the fence")
-        if thing.role in ("no_fly", "obstacle") and not area.intersects(fence):
-            notes.append(f"{thing.source} lies outside the fence, where no UAS flies")
     top_m = ceiling_m + _ABOVE_CEILING_M
     walls = [
         wall for t, area in polygons if t.role == "no_fly" for wall in no_fly_walls(area, ceiling_m)
@@ -160,7 +160,12 @@ def make_site(
         if thing.solid is not None
     ]
     met = tuple(wall for wall in walls if wall.footprint.intersects(fence))
-    return Site(frame, areas, places, homes_m, fence, met, tuple(standing), tuple(notes))
+    outside = tuple(
+        thing
+        for thing, area in polygons
+        if thing.role in ("no_fly", "obstacle") and not area.intersects(fence)
+    )
+    return Site(frame, areas, places, homes_m, fence, met, tuple(standing), outside, tuple(notes))
 
 
 def no_fly_walls(zone: Polygon, ceiling_m: float) -> list[Wall]:

@@ -172,11 +172,18 @@ OTHER = Tagged(STRUCTURE, 5.0, math.nan)
 
 
 def plain_tags(tags: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys in small letters, and without the prefix of what is out of use but stands."""
+    """Keys in small letters, and without the prefix of what is out of use but stands.
+
+    Of two that differ by case alone the small one counts; names and roles count both.
+    """
     found: dict[str, Any] = {}
     for key, value in tags.items():
         lower = str(key).strip().lower()
-        if value not in (None, "") and (key == lower or lower not in found):
+        if value in (None, ""):
+            continue
+        if lower in ("name", "role") and found.get(lower, value) != value:
+            value = f"{found[lower]} / {value}"
+        if key == lower or lower not in found or lower in ("name", "role"):
             found[lower] = value
     for key in list(found):
         for prefix in _STANDING_STILL:
