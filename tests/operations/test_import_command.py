@@ -225,14 +225,15 @@ HOSTILE = {
     "NaN": ("a.geojson", '{"type": "Polygon", "coordinates": [[[NaN, 1]]]}', "NaN is no number"),
     "infinity": ("a.geojson", geojson(SQUARE).replace("10.003", "1e999"), "broken coordinate"),
     "text": ("a.geojson", geojson([["a", "b"], ["c", "d"], ["e", "f"]]), "broken coordinate"),
-    "rings of nothing": ("a.geojson", geojson([]), "broken coordinate"),
-    "null for rings": ("a.geojson", '{"type":"Polygon","coordinates":null}', "has no rings"),
+    "a number for rings": ("a.geojson", '{"type":"Polygon","coordinates":7}', "has no rings"),
+    "something else in JSON": ("a.geojson", '{"type":"Topology"}', "is no GeoJSON"),
     "a list": ("a.geojson", "[1, 2]", "holds no JSON object"),
     "a line": ("a.geojson", '{"type":"LineString","coordinates":[[1,2],[3,4]]}', "no area"),
     "a line to keep out of": (
         "a.geojson",
-        '{"type":"Feature","properties":{"role":"no_fly"},"geometry":{"type":"LineString"}}',
-        "has the role 'no_fly' but is a LineString; draw a polygon",
+        '{"type":"Feature","properties":{"role":"no_fly"},"geometry":'
+        '{"type":"LineString","coordinates":[[1,2],[3,4]]}}',
+        "the role 'no_fly' says no_fly, but it is a LineString; draw a polygon",
     ),
     "a bow tie": ("a.geojson", geojson(BOW_TIE), "self-intersection at 50.001000, 10.001500"),
     "two corners": ("a.geojson", geojson([[1, 2], [2, 3], [1, 2]]), "fewer than three corners"),
@@ -337,10 +338,11 @@ def test_circles_and_fences_of_a_plan_are_read(tmp_path):
         "mission": {"items": [], "plannedHomePosition": [50.0002, 10.0002, 431.0]},
     }
     Path("a.plan").write_text(json.dumps(plan))
-    area, circle, home = read_drawings([Path("a.plan")])
+    fence, area, circle, home = read_drawings([Path("a.plan")])
+    assert isinstance(fence, DrawnPolygon)
     assert isinstance(area, DrawnPolygon)
     assert isinstance(circle, DrawnPolygon)
-    assert (area.role, circle.role) == ("search", "no_fly")
+    assert (fence.role, area.role, circle.role) == ("fence", "search", "no_fly")
     assert home == TakeOff("a.plan: 'planned home'", 50.0002, 10.0002, 431.0)
     ring = LocalFrame.around(*circle.outer.T).to_ned(*circle.outer.T)[:, :2]
     middles = 0.5 * (ring + np.roll(ring, 1, axis=0))
@@ -396,7 +398,7 @@ def test_without_the_extra_one_line_names_it(capsys, monkeypatch):
     import sys
 
     for name in list(sys.modules):
-        if name.partition(".")[0] in ("pyproj", "shapely") or "operations" in name:
+        if name.partition(".")[0] == "pyproj" or "operations" in name:
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pyproj", None)
     assert 'pip install "uas-coverage-env[ops]"' in refused(capsys, "karhula")

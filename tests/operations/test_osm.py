@@ -124,6 +124,106 @@ def test_a_building_of_which_the_file_lacks_corners_is_told(capsys):
     assert "2 buildings or woods in the area lack corners in the file" in capsys.readouterr().out
 
 
+SQUARE_OF = "".join(f'<nd ref="{n}"/>' for n in (8, 9, 10, 8))
+KINDS = [
+    *("chimney", "tower", "silo", "water_tower", "mast", "crane", "communications_tower"),
+    *("cooling_tower", "storage_tank", "lighthouse", "antenna", "flagpole", "gasometer"),
+]
+
+
+def tags_of(**tags):
+    return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
+
+
+def with_way(number, refs, tags):
+    return osm().replace("<relation", f'<way id="{number}">{refs}{tags}</way><relation', 1)
+
+
+@pytest.mark.parametrize("height", [None, "110", "33 m"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_tall_is_an_obstacle_as_an_outline_a_point_and_a_multipolygon(kind, height):
+    tags = tags_of(man_made=kind, **({"height": height} if height else {}))
+    wanted = float(height.split()[0]) if height else STANDING["man_made", kind].guessed_m
+    node = f'<node id="20" lat="50.0015" lon="10.0025">{tags}</node>'
+    many = '<member type="way" ref="9" role="outer"/><tag k="type" v="multipolygon"/>'
+    relation = f'<relation id="9">{many}{tags}</relation>'
+    for text in (
+        osm(node),
+        with_way(9, SQUARE_OF, tags),
+        with_way(9, SQUARE_OF, "").replace("</osm>", f"{relation}</osm>"),
+    ):
+        assert tops_m(town(text))["mast"] == [wanted]
+
+
+@pytest.mark.parametrize(
+    ("tags", "kind", "top_m"),
+    [
+        ({"power": "tower"}, "power_line", 60.0),
+        ({"power": "generator", "generator:source": "wind"}, "mast", 250.0),
+        ({"aerialway": "pylon", "height": "55"}, "mast", 55.0),
+        ({"building:part": "yes", "height": "44", "min_height": "20"}, "building", 44.0),
+        ({"disused:man_made": "chimney", "height": "80"}, "mast", 80.0),
+        ({"amenity": "sculpture", "height": "33"}, "structure", 33.0),
+        ({"role": "obstacle", "height": "33"}, "structure", 33.0),
+        ({"Man_Made": "Tower", "Height": "ca. 45 m"}, "mast", 45.0),
+    ],
+)
+def test_whatever_has_a_height_is_an_obstacle(tags, kind, top_m):
+    node = f'<node id="20" lat="50.0015" lon="10.0025">{tags_of(**tags)}</node>'
+    assert top_m in tops_m(town(osm(node)))[kind]
+    scenario = town(with_way(9, SQUARE_OF, tags_of(**tags)))
+    assert top_m in tops_m(scenario)[kind]
+
+
+def test_cables_are_walls_along_their_line_also_where_it_is_closed():
+    scenario = town(with_way(9, SQUARE_OF, tags_of(aerialway="gondola")))
+    lines = [o for o in scenario.obstacles if o.kind == "power_line"]
+    assert len(lines) == 2 + 3  # of the power line, and the three sides of the cable
+    open_one = town(with_way(9, '<nd ref="8"/><nd ref="10"/>', tags_of(aerialway="cable_car")))
+    assert STANDING["aerialway", "cable_car"].guessed_m in tops_m(open_one)["power_line"]
+
+
+def test_tall_kinds_that_are_not_read_are_printed_by_name(capsys):
+    nodes = [
+        '<node id="20" lat="50.0008" lon="10.0006"><tag k="highway" v="street_lamp"/></node>',
+        '<node id="21" lat="50.0008" lon="10.0007"><tag k="highway" v="street_lamp"/></node>',
+        '<node id="22" lat="50.0008" lon="10.0008"><tag k="man_made" v="ski_jump"/></node>',
+        '<node id="23" lat="51.0" lon="10.0"><tag k="man_made" v="far_away"/></node>',
+    ]
+    town(osm("".join(nodes)))
+    out = capsys.readouterr().out
+    assert "may be tall, and not read: 2 highway=street_lamp, 1 man_made=ski_jump;" in out
+
+
+def test_an_outline_of_a_tower_that_is_small_stands():
+    nodes = {30: (10.0020, 50.0005), 31: (10.00201, 50.0005), 32: (10.00201, 50.00051)}
+    text = "".join(f'<node id="{n}" lat="{y}" lon="{x}"/>' for n, (x, y) in nodes.items())
+    refs = "".join(f'<nd ref="{n}"/>' for n in (30, 31, 32, 30))
+    way = f'<way id="9">{refs}{tags_of(man_made="mast", height="40")}</way><relation'
+    assert tops_m(town(osm(text).replace("<relation", way)))["mast"] == [40.0]
+
+
+def test_a_height_that_cannot_be_read_is_named_and_that_of_the_kind_counts(capsys):
+    node = '<node id="20" lat="50.0008" lon="10.0006">{}</node>'
+    scenario = town(osm(node.format(tags_of(man_made="mast", height="tall"))))
+    assert tops_m(scenario)["mast"] == [100.0]
+    assert "cannot be read, such as 'height=tall'" in capsys.readouterr().out
+    town(osm(node.format(tags_of(tourism="artwork", height="tall", name="Big Joe"))))
+    assert "left out: 1 thing of unknown height 'Big Joe'" in capsys.readouterr().out
+
+
+def test_a_role_in_a_town_counts_and_areas_are_refused_there(capsys):
+    zone = tags_of(role="no_fly", name="school")
+    assert "no_fly" in tops_m(town(with_way(9, SQUARE_OF, zone)))
+    assert "no_fly" in tops_m(town(with_way(9, SQUARE_OF, tags_of(name="No-fly zone clinic"))))
+    assert "no_fly" not in tops_m(town(with_way(9, SQUARE_OF, tags_of(name="Restricted shop"))))
+    town(with_way(9, SQUARE_OF, tags_of(role="outer", building="yes")))
+    capsys.readouterr()
+    Path("town.osm").write_text(with_way(9, SQUARE_OF, tags_of(role="fence")))
+    line = refused(capsys, collection(feature(SQUARE)), *HOME, "--town", "town.osm")
+    assert "says fence, which is no matter of --town" in line
+
+
 def test_a_building_without_an_area_does_not_spoil_the_others(capsys):
     dot = '<way id="9"><nd ref="14"/><nd ref="14"/><nd ref="14"/><nd ref="14"/>{}</way><relation'
     dot = dot.format('<tag k="building" v="yes"/>')

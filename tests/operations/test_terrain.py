@@ -234,10 +234,30 @@ def test_the_least_height_is_in_the_scenario_and_under_all_waypoints():
         assert -down_m[0] > tops_m(scenario, north_m, east_m)[0] + 12.0
 
 
-def with_hole():
+def with_hole(value=-9999.0):
     values = heights()
-    values[40, 30] = -9999.0
+    values[40, 30] = value
     return values
+
+
+def picture(bands, colours=None):
+    name = geotiff(heights())
+    with rasterio.open(name) as file:
+        profile = {**file.profile, "count": bands, "dtype": "uint8"}
+    profile |= {"photometric": "RGB"} if bands > 2 else {}
+    with rasterio.open("photo.tif", "w", **profile) as file:
+        for band in range(bands):
+            file.write(np.full((SIZE, SIZE), 100 + band, "uint8"), band + 1)
+        if colours:
+            file.write_colormap(1, {n: (n, n, 0, 255) for n in range(256)})
+    return "photo.tif"
+
+
+def in_unit(unit):
+    name = geotiff(heights())
+    with rasterio.open(name, "r+") as file:
+        file.units = [unit]
+    return name
 
 
 def steep(latitude, longitude):
@@ -267,11 +287,33 @@ MISTAKES = {
     "half of it": (lambda: geotiff(heights(), transform=shifted(0.0035)), "of the fence"),
     "holes": (lambda: geotiff(with_hole(), nodata=-9999.0), "has no height at 49.9997"),
     "unnamed holes": (lambda: geotiff(with_hole()), "a height of -9999 m is on no ground"),
+    "a picture": (lambda: picture(3), "has 3 bands, as a picture does"),
+    "a picture with a mask": (lambda: picture(4), "has 4 bands, as a picture does"),
+    "heights and something else": (lambda: picture(2), "has 2 bands, as a picture does"),
+    "a grey picture": (lambda: picture(1), "holds gray of uint8, as a picture does"),
+    "a map of colours": (lambda: picture(1, "palette"), "holds palette of uint8"),
+    "feet": (lambda: in_unit("ft"), "heights in 'ft'; convert them to metres"),
+    "a datum in feet": (lambda: geotiff(heights(), "EPSG:4326+8228"), "heights in 'foot'"),
+    "coordinates in feet": (lambda: geotiff(heights(), "EPSG:2227"), "so its heights may be"),
+    "a number of no height": (lambda: geotiff(with_hole(-999.0)), "-999 m is on no ground"),
     "metres of what": (lambda: ascii_grid(np.ones((2, 2)), NO_PLACE), "put the .prj"),
     "nowhere": (lambda: geotiff(heights(), None, from_origin(0, 0, 1, 1)), "does not say where"),
     "a slope": (lambda: geotiff(heights(steep)), "take off from places that differ by less than"),
     "a wall at home": (lambda: fine_grid(beside), "take off from where it is level"),
 }
+
+
+def test_the_range_and_the_unit_of_heights_are_said(capsys):
+    hilly()
+    low, high = "heights of the grid, taken as metres: 412 to ", "; ground of 0 to "
+    out = capsys.readouterr().out
+    assert low in out
+    assert high in out
+
+
+@pytest.mark.parametrize("unit", ["m", "metre", "Metres", "METER"])
+def test_metres_are_read_however_they_are_written(unit):
+    assert hilly(terrain=in_unit(unit)).place.height_m == pytest.approx(BASE_M, abs=0.5)
 
 
 @pytest.mark.parametrize("case", MISTAKES)

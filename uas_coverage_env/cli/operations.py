@@ -40,8 +40,8 @@ def import_area(
         list[Path],
         typer.Argument(
             metavar="AREA...",
-            help="What was drawn: .geojson, .kml, .kmz, .shp or a QGroundControl .plan; or the "
-            "shipped example, `karhula`.",
+            help="What was drawn: .geojson, .kml, .kmz, .shp or a QGroundControl .plan; or a "
+            "shipped example, `karhula` or `zones`.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Scenario file to write.")],

@@ -6,7 +6,7 @@ import math
 
 import shapely
 from shapely.affinity import rotate
-from shapely.geometry import Polygon
+from shapely.geometry import GeometryCollection, Polygon
 from shapely.geometry.base import BaseGeometry
 
 _SLIVER_M2 = 1e-6
@@ -14,8 +14,11 @@ _MOST_CORNERS = 8
 
 
 def polygons_of(shape: BaseGeometry) -> list[Polygon]:
-    """The polygons of any geometry."""
-    return [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
+    """The polygons of any geometry, of collections within collections too."""
+    if isinstance(shape, GeometryCollection):
+        return [found for part in shape.geoms for found in polygons_of(part)]
+    parts = shapely.get_parts(shape)
+    return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
 
 
 def without_holes(polygon: Polygon) -> list[Polygon]:

@@ -19,6 +19,7 @@ from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon
 from uas_coverage_env.operations.fleet import SPARE_M, Member, fleet_tables, parse_fleet
 from uas_coverage_env.operations.looks import Look, look_as_wished, look_at, look_of
+from uas_coverage_env.operations.notes import drawn_notes, look_notes, standing_notes
 from uas_coverage_env.operations.prisms import Standing
 from uas_coverage_env.operations.relief import Relief, relief_of
 from uas_coverage_env.operations.site import (
@@ -27,9 +28,9 @@ from uas_coverage_env.operations.site import (
     Site,
     Wall,
     make_site,
+    no_fly_walls,
     town_walls,
 )
-from uas_coverage_env.operations.tags import BUILDING, FOREST, MAST, POWER_LINE
 from uas_coverage_env.operations.town import Town, read_town
 from uas_coverage_env.operations.waypoints import Asked, make_waypoints
 from uas_coverage_env.operations.wishes import NOTHING
@@ -47,12 +48,6 @@ _ABOVE_WAYPOINTS_M = 30.0
 _LOWEST_ROOF_M = 0.5
 """Above the take-off places: in a valley, roofs may be below."""
 
-_STANDING = {
-    BUILDING: "buildings",
-    FOREST: "woods and trees",
-    POWER_LINE: "power lines",
-    MAST: "masts and towers",
-}
 _MOST_STEPS = 100_000
 _OUTLINE_DETAIL_M = 0.5
 
@@ -137,9 +132,10 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         ceiling_m = _ceiling_m(highest_m + rise_m, options)
         site = make_site(things, options.homes, ceiling_m, relief.start_m)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
-    standing = [_raised(thing, relief) for thing in town.standing]
+    standing = [_raised(thing, relief) for thing in (*site.standing, *town.standing)]
     higher = [thing for thing in standing if thing.height_m >= _LOWEST_ROOF_M]
-    walls = [*site.no_fly, *relief.walls, *town_walls(higher, site.fence)]
+    zones = [wall for zone in town.no_fly for wall in no_fly_walls(zone, ceiling_m)]
+    walls = [*site.no_fly, *zones, *relief.walls, *town_walls(higher, site.fence)]
     _check_starts(uas, walls, site)
     seen = [(area, _look(looks, area, options)) for area in site.areas]
     asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
@@ -181,11 +177,12 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     if scenario.asks_again:
         scenario = scenario.model_copy(update={"relaunch": True})
     notes = [
-        *_look_notes(seen, waypoints.above_m, uneven=relief.ground is not None),
+        *look_notes(seen, waypoints.above_m, uneven=relief.ground is not None),
         f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} "
         f"obstacle{'' if len(walls) == 1 else 's'}",
         *([relief.note(site)] if relief.ground else []),
-        *_town_notes(town),
+        *standing_notes([*site.standing, *town.standing], town),
+        *drawn_notes(things, site, [table["name"] for table in uas], town),
     ]
     if scenario.asks_again:
         visits = sum(waypoint.visits for waypoint in scenario.waypoints)
@@ -201,7 +198,9 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
     if waypoints.left_out_m2 >= 0.5:
         out_m2 = waypoints.left_out_m2
         notes.append(f"left out: {out_m2:.0f} m² that are seen from no place a UAS may take")
-    return Imported(scenario, tuple(notes), town.credit if town.standing or town.streets else "")
+    return Imported(
+        scenario, tuple(notes), town.credit if town.standing or town.streets or town.no_fly else ""
+    )
 
 
 def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
@@ -269,24 +268,6 @@ def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: Si
                 )
 
 
-def _look_notes(
-    seen: Sequence[tuple[Area, Look]], above_m: Sequence[Sequence[float]], *, uneven: bool
-) -> list[str]:
-    notes = []
-    looks = list(dict.fromkeys(look for _, look in seen))
-    for look in looks:
-        hectares = sum(area.shape.area for area, by in seen if by == look) / 1e4
-        heights_m = [
-            each_m
-            for (_, by), heights_m in zip(seen, above_m, strict=True)
-            for each_m in heights_m
-            if by == look
-        ]
-        named = f"{look.name}, {look.height_m:g} m: " if len(looks) > 1 else ""
-        notes.append(named + look.note(hectares, heights_m, uneven=uneven))
-    return notes
-
-
 def _check(options: ImportOptions) -> None:
     if options.flown_by is not None:
         check_choice("--flown-by", options.flown_by, FLOWN_BY)
@@ -337,23 +318,3 @@ def _streets(town: Town) -> list[dict[str, Any]]:
 def _decoration(name: str, kind: str, shape: Polygon) -> dict[str, Any]:
     corners = [[round(north, 2), round(east, 2)] for east, north in shape.exterior.coords[:-1]]
     return {"name": name, "kind": kind, "polygon_m": corners}
-
-
-def _town_notes(town: Town) -> list[str]:
-    notes = []
-    for kind, words in _STANDING.items():
-        guessed = [not thing.known for thing in town.standing if thing.kind == kind]
-        if guessed:
-            notes.append(
-                f"{len(guessed)} {words}, the heights of {sum(guessed)} of them guessed from "
-                f"their kind"
-            )
-    if town.incomplete:
-        notes.append(
-            f"{town.incomplete} buildings or woods in the area lack corners in the file and are "
-            "left out: cut out more of the surroundings"
-        )
-    if town.unread:
-        tag, _ = town.unread.most_common(1)[0]
-        notes.append(f"{town.unread.total()} tags of heights cannot be read, such as {tag!r}")
-    return notes

@@ -1,4 +1,4 @@
-"""OpenStreetMap files, XML (.osm) and binary (.osm.pbf), as features of GeoJSON with their tags."""
+"""OpenStreetMap files, XML (.osm) and binary (.osm.pbf), as features with their tags."""
 
 import json
 import tempfile
@@ -7,26 +7,27 @@ from pathlib import Path
 from typing import Any
 
 import osmium
-from osmium.filter import KeyFilter
 from osmium.geom import GeoJSONFactory
 from osmium.io import FileBuffer
 from osmium.osm import Area, Node, Relation, Way
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.drawing import content
+from uas_coverage_env.operations.features import Feature, attributes_of
+from uas_coverage_env.operations.roles import speaks_of_flying
+from uas_coverage_env.operations.tags import BUILDING, FOREST, KEYS, standing_of
 
-_AREAS = ("building", "building:part", "natural", "landuse")
-_LINES = ("power", "highway", "natural")
-_POINTS = ("natural", "man_made", "power")
+_KEYS = frozenset((*KEYS, "highway"))
+LACKS_CORNERS = "outline that lacks corners"
 _MOST_OBJECTS = 2_000_000
 """A file of 20 MB may hold more; a town with its surroundings has some ten thousand."""
 
 
-def read_osm(path: Path) -> list[dict[str, Any]]:
+def read_osm(path: Path) -> list[Feature]:
     """What a town may be made of: outlines, lines and points with tags.
 
     An outline of which the file lacks corners, as at the edge of an extract, comes as the line of
-    those that it has.
+    those that it has, called `LACKS_CORNERS`.
 
     Args:
         path: Of a .osm or .osm.pbf file.
@@ -38,7 +39,7 @@ def read_osm(path: Path) -> list[dict[str, Any]]:
     try:
         if not _in_order(path, FileBuffer(data, kind)):
             data, kind = _sorted(data, kind), "pbf"
-        return list(_features(FileBuffer(data, kind)))
+        return list(_features(str(path), FileBuffer(data, kind)))
     except (RuntimeError, osmium.InvalidLocationError) as error:  # all that libosmium raises
         reason = " ".join(str(error).split())[:80]
         raise InputError(
@@ -72,41 +73,56 @@ def _sorted(data: bytes, kind: str) -> bytes:
         return file.read_bytes()
 
 
-def _features(data: Any) -> Iterator[dict[str, Any]]:
+def _features(file: str, data: Any) -> Iterator[Feature]:
     shapes = GeoJSONFactory()
     corners: dict[int, list[float]] = {}  # of each way one
-    outlines: dict[tuple[bool, int], dict[str, Any]] = {}  # by whether it is a way, and number
-    for thing in osmium.FileProcessor(data).with_areas(KeyFilter(*_AREAS)):
-        tags = thing.tags
-        is_whole = isinstance(thing, Area) and thing.num_rings()[0] > 0
-        if isinstance(thing, Area) and is_whole and _has(tags, _AREAS):
-            outlines.pop((thing.from_way(), thing.orig_id()), None)
-            yield _feature(tags, json.loads(shapes.create_multipolygon(thing)))
-        elif isinstance(thing, Way):
+    outlines: dict[tuple[bool, int], Feature] = {}  # by whether it is a way, and number
+
+    def feature(thing: Any, geometry: dict[str, Any], what: str = "") -> Feature:
+        number = thing.orig_id() if isinstance(thing, Area) else thing.id
+        word = "way" if isinstance(thing, Area) and thing.from_way() else thing.__class__.__name__
+        return Feature(file, f"{word.lower()} {number}", geometry, _tags(thing), what=what)
+
+    for thing in osmium.FileProcessor(data).with_areas():
+        line: list[list[float]] = []
+        if isinstance(thing, Way):
             known = [node.location for node in thing.nodes if node.location.valid()]
             line = [[place.lon, place.lat] for place in known]
             if line:
                 corners[thing.id] = line[0]
-            if _has(tags, _LINES) and not thing.is_closed():
-                yield _line(tags, line)
-            elif _has(tags, _AREAS):
-                outlines[True, thing.id] = _line(tags, line)
-        elif isinstance(thing, Relation) and _has(tags, _AREAS):
+        if not any(map(_matters, thing.tags)):
+            continue
+        what = standing_of(_tags(thing))
+        along = what is not None and what.along
+        if isinstance(thing, Area):
+            if thing.num_rings()[0] > 0 and not (along and thing.from_way()):
+                outlines.pop((thing.from_way(), thing.orig_id()), None)
+                yield feature(thing, json.loads(shapes.create_multipolygon(thing)))
+        elif isinstance(thing, Way):
+            is_outline = thing.is_closed() or (what is not None and what.kind in (BUILDING, FOREST))
+            if is_outline and not along:
+                if what is not None:
+                    outlines[True, thing.id] = feature(thing, _line(line), LACKS_CORNERS)
+            else:
+                yield feature(thing, _line(line))
+        elif isinstance(thing, Relation) and what is not None and not along:
             ways = (corners.get(member.ref) for member in thing.members if member.type == "w")
-            outlines[False, thing.id] = _line(tags, [place for place in ways if place])
-        elif isinstance(thing, Node) and _has(tags, _POINTS) and thing.location.valid():
+            places = [place for place in ways if place]
+            outlines[False, thing.id] = feature(thing, _line(places), LACKS_CORNERS)
+        elif isinstance(thing, Node) and thing.location.valid():
             place = [thing.location.lon, thing.location.lat]
-            yield _feature(tags, {"type": "Point", "coordinates": place})
+            yield feature(thing, {"type": "Point", "coordinates": place})
     yield from outlines.values()
 
 
-def _line(tags: Any, places: list[list[float]]) -> dict[str, Any]:
-    return _feature(tags, {"type": "LineString", "coordinates": places})
+def _matters(tag: Any) -> bool:
+    key = tag.k.strip().lower()
+    return key in _KEYS or (key == "name" and speaks_of_flying(tag.v))
 
 
-def _has(tags: Any, keys: tuple[str, ...]) -> bool:
-    return any(key in tags for key in keys)
+def _line(places: list[list[float]]) -> dict[str, Any]:
+    return {"type": "LineString", "coordinates": places}
 
 
-def _feature(tags: Any, geometry: dict[str, Any]) -> dict[str, Any]:
-    return {"geometry": geometry, "properties": {tag.k: tag.v for tag in tags}}
+def _tags(thing: Any) -> dict[str, Any]:
+    return attributes_of({tag.k: tag.v for tag in thing.tags})

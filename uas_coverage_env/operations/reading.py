@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, limited
+from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, drawn_of, limited
+from uas_coverage_env.operations.features import Feature
 from uas_coverage_env.operations.geojson import read_geojson
 from uas_coverage_env.operations.kml import read_kml, read_kmz
 from uas_coverage_env.operations.qgc_plan import read_plan
@@ -12,7 +13,7 @@ from uas_coverage_env.operations.shapefiles import read_shapefile
 
 _EXAMPLES = Path(__file__).with_name("examples")
 
-READERS: dict[str, Callable[[Path], Iterator[Drawn]]] = {
+READERS: dict[str, Callable[[Path], Iterator[Feature]]] = {
     ".geojson": read_geojson,
     ".json": read_geojson,
     ".kml": read_kml,
@@ -24,18 +25,21 @@ READERS: dict[str, Callable[[Path], Iterator[Drawn]]] = {
 
 
 def read_drawings(paths: Sequence[Path]) -> list[Drawn]:
-    """All polygons and take-off places of some files, in their order.
+    """All that was drawn in some files, in their order, and what is left out of them.
 
     Args:
-        paths: Files, or names of shipped examples (`karhula`).
+        paths: Files, or names of shipped examples (`karhula`, `zones`).
 
     Raises:
         InputError: A file cannot be used, or there is nothing to search in them.
     """
-    found = [thing for path in paths for thing in _read(or_example(path, ".geojson"))]
-    if not any(isinstance(thing, DrawnPolygon) and thing.role == "search" for thing in found):
+    found = [thing for path in paths for thing in _read(or_example(path, ".geojson", ".kml"))]
+    polygons = [thing for thing in found if isinstance(thing, DrawnPolygon)]
+    if not any(thing.role == "search" for thing in polygons):
         names = ", ".join(map(str, paths))
-        raise InputError(f"{names}: no area to search; draw it as a closed polygon")
+        other = "; ".join(f"{one.name!r} is {one.role}" for one in polygons[:3])
+        said = f" ({other}; the role search makes an area of one)" if other else ""
+        raise InputError(f"{names}: no area to search; draw it as a closed polygon{said}")
     return found
 
 
@@ -43,11 +47,12 @@ def _read(path: Path) -> list[Drawn]:
     if path.suffix.lower() not in READERS:
         known = ", ".join(READERS)
         raise InputError(f"{path}: unknown kind of file; save the area as {known}")
-    return list(limited(str(path), READERS[path.suffix.lower()](path)))
+    features = READERS[path.suffix.lower()](path)
+    return list(limited(str(path), (thing for one in features for thing in drawn_of(one))))
 
 
-def or_example(path: Path, ending: str) -> Path:
+def or_example(path: Path, *endings: str) -> Path:
     """The file of a shipped example where its name is given, otherwise the path itself."""
-    file = _EXAMPLES / f"{path.name}{ending}"
     is_name = len(path.parts) == 1 and not path.suffix and not path.exists()
-    return file if is_name and file.is_file() else path
+    files = [_EXAMPLES / f"{path.name}{ending}" for ending in endings] if is_name else []
+    return next((file for file in files if file.is_file()), path)

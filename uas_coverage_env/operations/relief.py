@@ -50,7 +50,10 @@ class Relief:
     def note(self, site: Site) -> str:
         """What the ground is like, for the user."""
         low_m, high_m = self.range_m(*site.fence.bounds)
+        start_m = self.start_m or 0.0
         return (
+            f"heights of the grid, taken as metres: {round(start_m + low_m)} to "
+            f"{round(start_m + high_m)}; "
             f"ground of {round(low_m)} to {round(high_m)} m above the lowest take-off place; what "
             f"is higher than {LOW_M:g} m is in {len(self.walls)} boxes that hold it"
             + ("; seen ground is counted too small over what is lower" if low_m < -LOW_M else "")

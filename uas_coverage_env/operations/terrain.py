@@ -16,6 +16,7 @@ import rasterio
 import shapely
 from numpy.typing import NDArray
 from pyproj.exceptions import ProjError
+from rasterio.enums import ColorInterp
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.windows import Window
 from scipy.ndimage import map_coordinates, maximum_filter
@@ -35,8 +36,11 @@ _DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid"}
 _FINEST_M, _MOST_ACROSS = 2.0, 250
 _MOST_READ = 25_000_000
 _EDGE = 0.5  # cells: a grid's points are the middles of its cells
-_LOWEST_M, _HIGHEST_M = -1_000.0, 10_000.0
-_METRES = (None, "", "m", "metre", "meter", "metres", "meters")
+LOWEST_M, HIGHEST_M = -500.0, 9_000.0
+"""No ground is lower or higher; what is marks missing data that the grid does not name [m]."""
+
+_METRES = ("m", "metre", "meter", "metres", "meters")
+_COLOURS = (ColorInterp.gray, ColorInterp.undefined)
 
 
 def read_ground(
@@ -107,8 +111,43 @@ def _check(path: Path, grid: rasterio.DatasetReader) -> None:
                 f"{path}: its coordinates are no degrees and it does not say which they are; put "
                 f"the .prj of its coordinate system beside it"
             )
-    if grid.units[0] not in _METRES:
-        raise InputError(f"{path}: heights in {grid.units[0]!r}; convert them to metres")
+    _check_bands(path, grid)
+    _check_units(path, grid)
+
+
+def _check_bands(path: Path, grid: rasterio.DatasetReader) -> None:
+    """Refuse pictures: heights are one band, and more than 256 of them."""
+    second = grid.colorinterp[1:]
+    if grid.count > 2 or any(one != ColorInterp.alpha for one in second):
+        raise InputError(
+            f"{path}: has {grid.count} bands, as a picture does; take a grid of heights alone"
+        )
+    kind = grid.dtypes[0]
+    if grid.colorinterp[0] not in _COLOURS or kind in ("uint8", "int8") or "complex" in kind:
+        raise InputError(
+            f"{path}: its band holds {grid.colorinterp[0].name} of {kind}, as a picture does; take "
+            f"a grid of heights, of 16 bits or more"
+        )
+
+
+def _check_units(path: Path, grid: rasterio.DatasetReader) -> None:
+    """Refuse heights that are said, or seem, to be in other units than metres."""
+    unit = (grid.units[0] or "").strip()
+    if unit and unit.lower() not in _METRES:
+        raise InputError(f"{path}: heights in {unit!r}; convert them to metres")
+    try:
+        axes = pyproj.CRS.from_wkt(grid.crs.to_wkt()).axis_info if grid.crs else []
+    except ProjError:
+        return  # it is refused where its coordinates are used
+    upright = [axis for axis in axes if axis.direction in ("up", "down")]
+    level = [axis for axis in axes if axis not in upright]
+    for axis in upright or ([] if unit else level):
+        if "degree" in axis.unit_name or axis.unit_conversion_factor == 1.0:
+            continue
+        raise InputError(
+            f"{path}: its coordinates are in {axis.unit_name!r}, and so its heights may be; "
+            f"convert them to metres, and name the unit of the band"
+        )
 
 
 def _cells(
@@ -184,7 +223,7 @@ def _read(path: Path, grid: rasterio.DatasetReader, window: Window) -> tuple[Flo
         raise InputError(f"{path}: is damaged; take it from its source again") from None
     heights = found.filled(np.nan)
     missing = ~np.isfinite(heights)
-    wrong = heights[~missing & ((heights < _LOWEST_M) | (heights > _HIGHEST_M))]
+    wrong = heights[~missing & ((heights < LOWEST_M) | (heights > HIGHEST_M))]
     if wrong.size:
         raise InputError(
             f"{path}: a height of {wrong[0]:g} m is on no ground; name the value that stands for "
