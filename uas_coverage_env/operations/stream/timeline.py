@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The planned flight of one UAS, no lower than a take-off leads and a landing begins.
+    """The planned flight of one UAS, from where a take-off leads until a landing begins.
 
     Attributes:
         times_s: (T,) of the samples [s].
@@ -49,6 +49,28 @@ class Timeline:
             return np.zeros(3)
         return self._curve(time_s, 1)
 
+    def places_at_m(self, times_s: FloatArray) -> FloatArray:
+        """(N, 3) at N times [m]."""
+        return self._curve(np.clip(times_s, self.first_s, self.last_s))
+
+    def velocities_at_mps(self, times_s: FloatArray) -> FloatArray:
+        """(N, 3) at N times [m/s]."""
+        return self._where_it_flies(times_s, 1)
+
+    def accelerations_at_mps2(self, times_s: FloatArray) -> FloatArray:
+        """(N, 3) at N times [m/s²]."""
+        return self._where_it_flies(times_s, 2)
+
+    def _where_it_flies(self, times_s: FloatArray, derivative: int) -> FloatArray:
+        flies = (times_s >= self.first_s) & (times_s < self.last_s)
+        within = np.clip(times_s, self.first_s, self.last_s)
+        return np.where(flies[:, None], self._curve(within, derivative), 0.0)
+
+    @cached_property
+    def fastest_mps(self) -> float:
+        """Its largest level speed at samples [m/s]."""
+        return float(np.hypot(*self.velocities_mps[:, :2].T).max())
+
     @cached_property
     def _curve(self) -> CubicHermiteSpline:
         return CubicHermiteSpline(self.times_s, self.places_m, self.velocities_mps)
@@ -68,6 +90,9 @@ def timeline_of(flight: Flight, uas: int) -> Timeline | None:
         return None
     places_m, velocities_mps = x[:, :3].copy(), x[:, VX : VZ + 1].copy()
     places_m[low, 2], velocities_mps[low, 2] = -LIFT_M, 0.0
-    velocities_mps[[0, -1]] = 0.0
+    # as long as it is lower than that, it stands there
+    begins, ends = max(int(low.argmin()) - 1, 0), len(x) - max(int(low[::-1].argmin()) - 1, 0)
+    velocities_mps[[begins, ends - 1]] = 0.0
     times_s = flight.scenario.dt_s * np.arange(len(x), dtype=np.float64)
-    return Timeline(times_s, places_m, velocities_mps)
+    kept = slice(begins, ends)
+    return Timeline(times_s[kept], places_m[kept], velocities_mps[kept])
