@@ -31,11 +31,16 @@ FloatArray = NDArray[np.float64]
 
 _DELAY_S = 0.5
 """What is reported may be so old, and what is sent may be followed so much later."""
+_LEAD_S = 0.5
+"""Velocities are sent so far ahead: GUIDED takes no accelerations, and follows so much later."""
 _TRAILS_M = 1.5
 """GUIDED trails an accelerating target by so much."""
-_LOOKS_BACK_S, _LOOKS_EVERY_S = 10.0, 0.1
-_BRAKES_SHARE = 1.0
-_HURRY_PER_S = 0.1
+_SAME_M = 1.0
+_LOOKS_S = np.arange(-100, 21) / 10.0
+_NOW = 100
+"""Where on a path a vehicle may be: times from its place on; row of that."""
+_BRAKES_SHARE = 0.8
+_HURRY_PER_S = 0.3
 _STANDS = 0.02
 _CAME_BACK_M = 2.5
 _TELL_EVERY_S = 10.0
@@ -101,7 +106,7 @@ class Companion:
         self._back: dict[str, WayBack] = {}
         self._failsafes = Failsafes(fleet)
         self.plan_s = min(plan.first_s for plan in plans.values())
-        self.late_s = 0.0
+        self.late_s, self._rate_per_s, self._off_path_m = 0.0, 0.0, 0.0
 
     def fly(self) -> Ended:
         """Take off, stream, land; give up where that cannot be, and on Ctrl-C.
@@ -163,7 +168,8 @@ class Companion:
             passed_s, before_s = now_s - before_s, now_s
             self._see_who_is_away(now_s, rate, passed_s)
             allowed, stops, why = self._allowed_rate(now_s, rate)
-            rate = self._next_rate(rate, allowed, passed_s)
+            before, rate = rate, self._next_rate(rate, allowed, passed_s)
+            self._rate_per_s = (rate - before) / max(passed_s, 1e-3)
             self.plan_s += rate * passed_s
             self.late_s += (1.0 - rate) * passed_s
             if why and why != said:
@@ -256,18 +262,19 @@ class Companion:
 
         `_off_path_m` is then how far it is beside it.
         """
-        first_s = max(self.plan_s - _LOOKS_BACK_S, plan.first_s)
-        times_s = np.arange(first_s, self.plan_s + 0.5 * _LOOKS_EVERY_S, _LOOKS_EVERY_S)
-        path_m = plan.places_at_m(np.append(times_s, self.plan_s))
+        path_m = plan.places_at_m(self.plan_s + _LOOKS_S)
         away_m = np.linalg.norm(path_m - place_m, axis=1)
-        nearest = len(away_m) - 1 - int(away_m[::-1].argmin())
-        self._off_path_m = float(away_m[nearest])
+        self._off_path_m = float(away_m.min())
+        # where a path turns back, a place is on both its legs: the later one is meant
+        nearest = int(np.flatnonzero(away_m <= self._off_path_m + _SAME_M)[-1])
+        path_m = path_m[: _NOW + 1]
         behind_m = np.linalg.norm(np.diff(path_m[nearest:], axis=0), axis=1).sum()
         speed_mps = rate * float(np.linalg.norm(plan.velocity_mps(self.plan_s)))
         return float(behind_m) - _DELAY_S * speed_mps - _TRAILS_M
 
     def _send(self, rate: float) -> bool:
         """Send the targets of now; whether any vehicle still flies by them."""
+        ahead = max(rate + _LEAD_S * self._rate_per_s, 0.0)
         for link, plan in list(self._flown()):
             at_end = self.plan_s >= plan.last_s and link.off_m(plan.place_m(plan.last_s)) < 1.5
             back = self._back.get(link.name)
@@ -278,7 +285,8 @@ class Companion:
                 if link.takes_targets and back.place_m is not None:
                     link.go(back.place_m, back.velocity_mps)
             elif link.takes_targets:
-                link.go(plan.place_m(self.plan_s), rate * plan.velocity_mps(self.plan_s))
+                velocity_mps = ahead * plan.velocity_mps(self.plan_s + rate * _LEAD_S)
+                link.go(plan.place_m(self.plan_s), velocity_mps)
         for name in self._landing:
             link = self._fleet.links[name]
             if link.takes_targets and link.armed:

@@ -22,7 +22,7 @@ from uas_coverage_env.operations.stream.pace import Pace
 from uas_coverage_env.operations.stream.timeline import Timeline, timeline_of
 from uas_coverage_env.scenario import Place, Scenario
 
-MOST_LATE = 0.35
+MOST_LATE = 0.05
 """Share of a plan's time by which streaming it may take longer."""
 
 

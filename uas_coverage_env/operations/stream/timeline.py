@@ -14,6 +14,8 @@ from uas_coverage_env.vehicle import VX, VZ
 
 FloatArray = NDArray[np.float64]
 
+_SAME_M = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
@@ -90,8 +92,10 @@ def timeline_of(flight: Flight, uas: int) -> Timeline | None:
         return None
     places_m, velocities_mps = x[:, :3].copy(), x[:, VX : VZ + 1].copy()
     places_m[low, 2], velocities_mps[low, 2] = -LIFT_M, 0.0
-    # as long as it is lower than that, it stands there
-    begins, ends = max(int(low.argmin()) - 1, 0), len(x) - max(int(low[::-1].argmin()) - 1, 0)
+    # over its places of take-off and landing it would only stand
+    away = [np.hypot(*(places_m - places_m[end])[:, :2].T) > _SAME_M for end in (0, -1)]
+    begins = max(int((~low | away[0]).argmax()) - 1, 0)
+    ends = len(x) - max(int((~low | away[1])[::-1].argmax()) - 1, 0)
     velocities_mps[[begins, ends - 1]] = 0.0
     times_s = flight.scenario.dt_s * np.arange(len(x), dtype=np.float64)
     kept = slice(begins, ends)
