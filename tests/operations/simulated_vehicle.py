@@ -48,6 +48,15 @@ RENAMED = {
     "SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0),
 }
 """By 4.7: name and factor."""
+PX4_PARAMETERS = {
+    "COM_OBL_RC_ACT": 0,
+    "COM_OF_LOSS_T": 1.0,
+    "MPC_XY_VEL_MAX": 12.0,
+    "MPC_Z_VEL_MAX_UP": 3.0,
+    "MPC_Z_VEL_MAX_DN": 1.5,
+    "MPC_ACC_HOR": 3.0,
+    "RTL_RETURN_ALT": 30.0,
+}
 PILOTED = (STABILIZE, LOITER, BRAKE)
 """Modes in which FS_OPTIONS 16 lets nothing happen where the ground station is lost."""
 
@@ -109,7 +118,7 @@ class SimulatedVehicle:
 
     autopilot = mav.MAV_AUTOPILOT_ARDUPILOTMEGA
     manual, guided, land, hold, home = STABILIZE, GUIDED, LAND, BRAKE, SMART_RTL
-    forgets = ()
+    forgets = whole = ()
 
     def __init__(
         self,
@@ -460,8 +469,9 @@ class SimulatedVehicle:
 
     def _tell_parameter(self, name):
         if name in self.parameters:
+            kind = 6 if name in self.whole else 9
             value = self._coded(name, self.parameters[name])
-            self._say(self._link.param_value_encode(name.encode(), value, 9, 1, 0))
+            self._say(self._link.param_value_encode(name.encode(), value, kind, 1, 0))
 
     def _coded(self, name, value):
         return value
@@ -493,10 +503,11 @@ class SimulatedPX4(SimulatedVehicle):
         self.denied = 0
 
     def _defaults(self):
-        return {"COM_OBL_RC_ACT": 0, "COM_OF_LOSS_T": 1.0, "MPC_XY_VEL_MAX": 12.0}
+        return dict(PX4_PARAMETERS)
 
     def _of(self, name):
-        return {"WPNAV_SPEED": 1200.0, "FS_GCS_ENABLE": 0.0}.get(name, PARAMETERS[name])
+        here = {"WPNAV_SPEED": "MPC_XY_VEL_MAX", "WPNAV_ACCEL": "MPC_ACC_HOR"}.get(name)
+        return PARAMETERS[name] if here is None else 100.0 * self.parameters[here]
 
     def step(self, dt_s):
         super().step(dt_s)

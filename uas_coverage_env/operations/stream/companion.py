@@ -42,7 +42,6 @@ _NOW = 100
 _BRAKES_SHARE = 0.8
 _HURRY_PER_S = 0.3
 _STANDS = 0.02
-_CAME_BACK_M = 2.5
 _TELL_EVERY_S = 10.0
 _LANDING_S = 180.0
 
@@ -56,12 +55,14 @@ class StreamOptions:
         patience_s: So long all may stand, and a vehicle may take to be ready [s].
         silent_s: Not heard for so long, a vehicle counts as lost, and all slow down [s].
         reaction: One of `REACTIONS`.
+        late: Share of the plan's time by which streaming may take longer, or it is refused.
     """
 
     lag_m: float = 5.0
     patience_s: float = 60.0
     silent_s: float = 1.5
     reaction: str = "home"
+    late: float = 0.05
 
 
 class Ended(NamedTuple):
@@ -220,7 +221,7 @@ class Companion:
                 self._back[name].go_on(
                     link, place_m, self._around, others_m, passed_s, stands=rate == 0.0
                 )
-                if rate == 0.0 and link.off_m(place_m) < _CAME_BACK_M:
+                if self._back[name].is_there:
                     del self._back[name]
 
     def _allowed_rate(self, now_s: float, rate: float) -> tuple[float, bool, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 
@@ -22,8 +23,8 @@ from uas_coverage_env.operations.stream.pace import Pace
 from uas_coverage_env.operations.stream.timeline import Timeline, timeline_of
 from uas_coverage_env.scenario import Place, Scenario
 
-MOST_LATE = 0.05
-"""Share of a plan's time by which streaming it may take longer."""
+_SETS_OFF_S = 5.0
+"""That many seconds are always allowed: a short flight takes longer by setting off."""
 
 
 def stream_flight(
@@ -77,7 +78,7 @@ def stream_flight(
             Around(flight.scenario, list(plans)),
             options,
             _may_hurry(flight.scenario),
-            lambda pace, limits: _check_pace(plans, pace, limits),
+            lambda pace, limits: _check_pace(plans, pace, limits, options.late),
         )
         ended = companion.fly()
     return ended, _table(fleet, frame)
@@ -106,22 +107,24 @@ def _may_hurry(scenario: Scenario) -> bool:
 
 
 def _check_pace(
-    plans: Mapping[str, Timeline], pace: Pace, limits: Mapping[str, Limits]
+    plans: Mapping[str, Timeline], pace: Pace, limits: Mapping[str, Limits], late: float
 ) -> None:
     """Refuse a plan that the vehicles cannot fly in about its time."""
     planned_s = max(plan.last_s for plan in plans.values()) - pace.first_s
     late_s = pace.late_s()
-    if late_s <= MOST_LATE * planned_s:
+    if late_s <= max(late * planned_s, _SETS_OFF_S):
         return
     slowest = min(limit.speed_mps for limit in limits.values())
     fastest = max(plan.fastest_mps for plan in plans.values())
     speed = f" and {slowest:g} m/s" if fastest > slowest + 0.1 else ""
     weakest = min(limit.acceleration_mps2 for limit in limits.values())
     load = f", or load the .param files of `uas-coverage export`, which allow {fastest:.3g} m/s"
+    share = 100.0 * late_s / planned_s
     raise InputError(
         f"the plan needs more than the vehicles are set to ({weakest:g} m/s²{speed}): it would "
-        f"take {late_s:.0f} s ({late_s / planned_s:.0%}) longer; plan it for them: uas-coverage "
-        f"import ... --flown-by autopilot --speed {slowest:g}{load if speed else ''}"
+        f"take {late_s:.0f} s ({share:.0f} %) longer; plan it for them: uas-coverage import ... "
+        f"--flown-by autopilot --speed {slowest:g}{load if speed else ''}; or allow it: --late "
+        f"{math.ceil(share)}"
     )
 
 
@@ -129,6 +132,7 @@ def _check(options: StreamOptions) -> None:
     for name, value, low, high in (
         ("--lag", options.lag_m, 1.0, 100.0),
         ("--patience", options.patience_s, 1.0, 3_600.0),
+        ("--late", 100.0 * options.late, 0.0, 1_000.0),
     ):
         if not low <= value <= high:
             raise InputError(f"{name} {value:g}: should be between {low:g} and {high:g}")

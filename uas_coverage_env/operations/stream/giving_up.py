@@ -21,7 +21,7 @@ _ANSWERS_S = 6.0
 _TRIES = 2
 _HOME_S = 900.0
 _BRAKES_S = 4.0
-_HEARD_S = 5.0
+_HEARD_S = 2.0
 
 
 class Reaction(NamedTuple):
@@ -158,7 +158,8 @@ class GivingUp:
             return
         ways = self._ways(link)
         tries = self._tries.get(link.name, 0)
-        self._tries[link.name] = tries + 1
+        is_heard = link.heard_s is not None and self._fleet.now_s() < link.heard_s + _HEARD_S
+        self._tries[link.name] = tries + is_heard  # else it may well have taken the first one
         mode = ways[min(tries // _TRIES, len(ways) - 1)]
         number = getattr(link.autopilot, mode)
         link.set_mode(number)

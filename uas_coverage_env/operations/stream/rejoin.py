@@ -14,6 +14,8 @@ from uas_coverage_env.operations.stream.link import VehicleLink
 FloatArray = NDArray[np.float64]
 
 _SPEED_MPS, _MPS2 = 4.0, 1.0
+_SAME_M = 2.0
+_THERE_M = 0.2
 
 
 class WayBack:
@@ -23,12 +25,13 @@ class WayBack:
         place_m: (3,) its target now; None: it has not come back yet [m].
         velocity_mps: (3,) of that [m/s].
         is_blocked: Whether the straight way is not clear: it hovers.
+        is_there: Whether it has come back.
     """
 
     def __init__(self) -> None:
         self.place_m: FloatArray | None = None
         self.velocity_mps = np.zeros(3)
-        self.is_blocked = False
+        self.is_blocked = self.is_there = False
         self._speed_mps = 0.0
         self._sets_off = False
 
@@ -63,9 +66,12 @@ class WayBack:
             self.is_blocked = not around.is_clear(link.name, link.place_m, to_m, others_m)
             if self.is_blocked:
                 return
-            self._sets_off, self.place_m = True, link.place_m
+            self._sets_off = True
+            if link.off_m(self.place_m) > _SAME_M:
+                self.place_m = link.place_m
         way_m = to_m - self.place_m
         left_m = float(np.linalg.norm(way_m))
+        self.is_there = left_m < _THERE_M and link.off_m(to_m) < _SAME_M
         if left_m < 1e-3:
             return
         speed_mps = min(self._speed_mps + _MPS2 * passed_s, _SPEED_MPS)
