@@ -15,8 +15,9 @@ from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
 
-_ENOUGH_M = 1.0
+_ENOUGH_M = 1.5
 """Room beside a path that is as good as any: what GUIDED leaves of a path, and the next gust."""
+_SHARE = 0.8
 _ABOVE_GROUND_M = 0.5
 
 
@@ -60,7 +61,8 @@ class Around:
             end_m: (3,) [m].
             others_m: (3,) where other UAS hover, by name [m].
         """
-        if self.room_m(name, start_m, end_m) <= 0.0:
+        ends = [self.room_m(name, place_m, place_m) for place_m in (start_m, end_m)]
+        if self.room_m(name, start_m, end_m) <= max(_SHARE * min(ends), 0.0):
             return False
         line_m = np.linspace(start_m, end_m, 2 + int(np.linalg.norm(end_m - start_m)))
         return all(

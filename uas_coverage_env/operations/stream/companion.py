@@ -164,18 +164,18 @@ class Companion:
     def _stream(self) -> None:
         """Targets until the last one begins to land."""
         rate, before_s, stood_since_s, told_s = 0.0, self._fleet.now_s(), None, -np.inf
-        said = ""
+        said = ("", "")
         for now_s in self._fleet.ticks():
             passed_s, before_s = now_s - before_s, now_s
             self._see_who_is_away(now_s, rate, passed_s)
-            allowed, stops, why = self._allowed_rate(now_s, rate)
+            allowed, stops, about, why = self._allowed_rate(now_s, rate)
             before, rate = rate, self._next_rate(rate, allowed, passed_s)
             self._rate_per_s = (rate - before) / max(passed_s, 1e-3)
             self.plan_s += rate * passed_s
             self.late_s += (1.0 - rate) * passed_s
-            if why and why != said:
+            if why and about != said:
                 self._fleet.tell(why)
-            said = why
+            said = about
             if stops and rate < _STANDS:
                 stood_since_s = now_s if stood_since_s is None else stood_since_s
                 if now_s > stood_since_s + self._options.patience_s:
@@ -216,25 +216,30 @@ class Companion:
             if self._is_silent(link, now_s) or not link.takes_targets or not link.armed:
                 self._back[name] = WayBack()
             elif name in self._back:
-                place_m = plan.place_m(self.plan_s)
                 others_m = self._fleet.others_m(name)
                 self._back[name].go_on(
-                    link, place_m, self._around, others_m, passed_s, stands=rate == 0.0
+                    *(link, plan, self.plan_s, self._around, others_m, passed_s),
+                    stands=rate == 0.0,
                 )
                 if self._back[name].is_there:
                     del self._back[name]
 
-    def _allowed_rate(self, now_s: float, rate: float) -> tuple[float, bool, str]:
-        """How fast plan time may pass, whether all have to stand, and what the user reads."""
+    def _allowed_rate(
+        self, now_s: float, rate: float
+    ) -> tuple[float, bool, tuple[str, str], str]:
+        """How fast plan time may pass; whether all have to stand; which trouble it is, and whose,
+        and what the user reads."""
         late = _HURRY_PER_S * max(self.late_s, 0.0) if self._may_hurry else 0.0
         allowed, trouble, said = min(1.0 + late, self._pace.at(self.plan_s)), "", ""
+        whose = ""
         for link, plan in self._flown():
             found, share, more = self._trouble(link, plan, now_s, rate)
             if found and (TROUBLES[found].stops or share < allowed):
                 if not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops:
-                    trouble, said = found, TROUBLES[found].says.format(name=link.name, more=more)
+                    trouble, whose = found, link.name
+                    said = TROUBLES[found].says.format(name=whose, more=more)
                 allowed = 0.0 if TROUBLES[found].stops else min(allowed, share)
-        return allowed, allowed == 0.0, said
+        return allowed, allowed == 0.0, (trouble, whose), said
 
     def _trouble(
         self, link: VehicleLink, plan: Timeline, now_s: float, rate: float

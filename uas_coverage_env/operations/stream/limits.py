@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+_REACTS_S = 0.5
+"""Until a target is late, and braking has set in: of ArduCopter's jerk, 5 m/s³, and a message."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -29,4 +32,5 @@ class Limits:
 
     def stops_m(self, speed_mps: float) -> float:
         """How far it flies on from when its link is cut until it stands [m]."""
-        return speed_mps * (self.blind_s + speed_mps / (2.0 * self.acceleration_mps2))
+        braking_s = speed_mps / (2.0 * self.acceleration_mps2)
+        return speed_mps * (self.blind_s + _REACTS_S + braking_s)

@@ -23,8 +23,8 @@ class Trouble(NamedTuple):
 
 _BACK = (
     "Heard again and still in its mode of targets, it hovers until all stand, then flies back to "
-    "its place on the straight line at 4 m/s at most, if that is clear of zones, obstacles, fence "
-    "and other UAS; if not, it waits for a pilot"
+    "its place at 4 m/s at most, on the straight line, or else along its path, if that is clear of "
+    "zones, obstacles, fence and other UAS; if not, it waits for a pilot"
 )
 TROUBLES = {
     "silent": Trouble(
@@ -47,9 +47,9 @@ TROUBLES = {
         "it flies back as said above",
     ),
     "blocked": Trouble(
-        "likewise, and the straight way to its place is not clear",
-        "{name} is {more} from its place and the straight way there is not clear: fly it nearer by "
-        "hand; all hold",
+        "likewise, and neither way to its place is clear",
+        "{name} is {more} from its place and the way there is not clear: fly it nearer by hand; "
+        "all hold",
         True,
         "it hovers in its mode of targets. A pilot may take it, fly it nearer and give it back",
     ),
