@@ -105,6 +105,13 @@ def import_area(
             "file, so that the file takes as long as the flight."
         ),
     ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="With --flown-by: the level speed that the autopilot is set to (WPNAV_SPEED), m/s "
+            "(default: the vehicle's largest)."
+        ),
+    ] = None,
     again: Annotated[
         str | None,
         typer.Option(
@@ -151,6 +158,7 @@ def import_area(
         terrain=terrain,
         min_height_m=min_height,
         flown_by=flown_by,
+        speed_mps=speed,
         again_after_s=() if again is None else minutes_of("--again", again),
     )
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem)[:64] or "area"

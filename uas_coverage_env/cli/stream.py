@@ -24,14 +24,23 @@ def stream(
         ),
     ],
     lag: Annotated[
-        float, typer.Option(help="Behind the plan by so much, m, time stops for all UAS.")
+        float,
+        typer.Option(help="Behind, or off its path, by so much, m, a UAS lets all come to a stand."),
     ] = 5.0,
     patience: Annotated[
-        float, typer.Option(help="Seconds that time may stand still before all is given up.")
+        float, typer.Option(help="Seconds that all may stand before the stream is given up.")
     ] = 60.0,
     on_abort: Annotated[
-        str, typer.Option(help="What UAS do then, and on Ctrl-C: hold, rtl or land.")
-    ] = "hold",
+        str,
+        typer.Option(
+            help="What UAS do then, and on Ctrl-C: home (the way they came), rtl (straight home), "
+            "land or hold; where that is not clear, the next best."
+        ),
+    ] = "home",
+    late: Annotated[
+        float,
+        typer.Option(help="Percent that streaming may take longer than planned, or it is refused."),
+    ] = 5.0,
     track: Annotated[
         Path | None, typer.Option(help="Table of what was flown (.csv), for `import-log`.")
     ] = None,
@@ -46,7 +55,8 @@ def stream(
 ) -> None:
     """Fly a plan in time on ArduPilot or PX4, by MAVLink position targets (extra `ops`).
 
-    Ctrl-C gives all vehicles the mode of --on-abort; a second one ends at once.
+    Ctrl-C gives all vehicles the mode of --on-abort and waits for them to land; a second one ends
+    at once.
     """
     with extra():
         from uas_coverage_env.operations.export import place_of_flight
@@ -63,7 +73,7 @@ def stream(
         flight,
         where,
         connections,
-        StreamOptions(lag_m=lag, patience_s=patience, reaction=on_abort),
+        StreamOptions(lag_m=lag, patience_s=patience, reaction=on_abort, late=0.01 * late),
         RealClock(),
         lambda line: screen.print(line, markup=False),
     )
@@ -71,7 +81,8 @@ def stream(
         write_atomically(track, table.encode())
         screen.print(f"what was flown is in {track}", markup=False)
     if ended.reason:
-        screen.print(f"given up: {ended.reason}; vehicles were told to {on_abort}", markup=False)
+        screen.print(f"given up: {ended.reason}", markup=False)
+        screen.print(ended.done, markup=False)
         raise typer.Exit(FAILED)
     screen.print(f"all have landed, {ended.late_s:.0f} s later than planned")
 

@@ -72,6 +72,7 @@ class ImportOptions:
         terrain: Grid of heights; None: the ground is flat.
         min_height_m: Least height of UAS above ground and roofs, but for take-off and landing [m].
         flown_by: What flies it in the end, `autopilot`; None: the world alone.
+        speed_mps: The level speed that it is set to; None: the vehicle's largest [m/s].
         again_after_s: Times after which waypoints are asked for again, each from the time before,
             where an area does not say [s].
     """
@@ -89,6 +90,7 @@ class ImportOptions:
     terrain: Path | None = None
     min_height_m: float = 0.0
     flown_by: str | None = None
+    speed_mps: float | None = None
     again_after_s: tuple[float, ...] = ()
 
 
@@ -171,7 +173,7 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         ],
         "place": site.frame.place.model_dump(),
         **({"min_height_m": options.min_height_m} if options.min_height_m else {}),
-        **({"execution": {"flown_by": options.flown_by}} if options.flown_by else {}),
+        **({"execution": _execution(options)} if options.flown_by else {}),
     }
     scenario = _finite(parse(tables, Scenario, name))
     if scenario.asks_again:
@@ -268,9 +270,18 @@ def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: Si
                 )
 
 
+def _execution(options: ImportOptions) -> dict[str, Any]:
+    speed = {} if options.speed_mps is None else {"speed_mps": options.speed_mps}
+    return {"flown_by": options.flown_by, **speed}
+
+
 def _check(options: ImportOptions) -> None:
     if options.flown_by is not None:
         check_choice("--flown-by", options.flown_by, FLOWN_BY)
+    if options.speed_mps is not None:
+        if options.flown_by is None:
+            raise InputError("--speed is an autopilot's; add --flown-by autopilot")
+        _within("--speed", options.speed_mps, 0.5, 100.0)
     _within("--height", options.height_m, 1.0, 1_000.0)
     _within("--radius", options.radius_m, 0.5, 1_000.0)
     _within("--min-height", options.min_height_m, 0.0, 100.0)

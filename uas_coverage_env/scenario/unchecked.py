@@ -160,4 +160,6 @@ class UncheckedScenario(StrictModel):
     def vehicles(self) -> tuple[VehicleParams, ...]:
         """The vehicle of each UAS, in their order."""
         loaded = {name: load_vehicle(name) for name in {uas.vehicle for uas in self.uas}}
+        if self.execution is not None:
+            loaded = {name: self.execution.set_to(vehicle) for name, vehicle in loaded.items()}
         return tuple(loaded[uas.vehicle] for uas in self.uas)

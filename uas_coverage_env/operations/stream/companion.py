@@ -1,43 +1,47 @@
-"""The companion: one time for all vehicles, which passes no faster than the slowest can follow.
+"""The companion: one time for all vehicles, which passes as they can follow.
 
-In a plan, time keeps UAS apart. So there is one plan time for all of them: it passes more slowly as
-one falls behind, and stops where one is too far behind, is not heard, or is flown by somebody else;
-then all hold. If that lasts, or on Ctrl-C, the stream is given up in a defined way: every vehicle
-that it still flies brakes and holds, or returns, or lands.
+In a plan, time keeps UAS apart. So there is one plan time for all of them. It passes at the rate
+that all can follow (`pace`), more slowly as one falls behind, and comes to a stand where one is not
+heard, is flown by somebody else, or has to come back to its path: always so slowly that every
+vehicle comes to rest on its path. If that lasts, or on Ctrl-C, the stream is given up in a defined
+way (`giving_up`).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from uas_coverage_env.operations.stream.clock import Clock
+from uas_coverage_env.operations.stream.around import Around
+from uas_coverage_env.operations.stream.fleet import Fleet, GivenUpError
+from uas_coverage_env.operations.stream.giving_up import GivingUp
+from uas_coverage_env.operations.stream.limits import Limits
 from uas_coverage_env.operations.stream.link import VehicleLink
+from uas_coverage_env.operations.stream.pace import Pace
+from uas_coverage_env.operations.stream.ready import Failsafes, meet, read_limits, take_off
+from uas_coverage_env.operations.stream.rejoin import WayBack
 from uas_coverage_env.operations.stream.timeline import Timeline
+from uas_coverage_env.operations.stream.troubles import TROUBLES
 
-REACTIONS = ("hold", "rtl", "land")
-"""What becomes of vehicles where the stream is given up: the mode of `Autopilot` that they get."""
-
-_TICK_S = 0.1
-_STREAM_FIRST_S = 1.5
-"""So long targets are streamed before a mode is entered that needs them."""
-
-_AGAIN_S = 1.0
-"""So often a request is repeated until it is seen to be followed."""
+FloatArray = NDArray[np.float64]
 
 _DELAY_S = 0.5
-"""What is reported may be so old: whoever is where it had to be since then is in time."""
-
-_RATE_PER_S = 0.5
-"""How fast time gathers speed again, so that vehicles can."""
-
-_AT_START_M = 8.0
-_ON_GROUND_M = 2.0
-_UP_WITHIN_M = 0.7
+"""What is reported may be so old, and what is sent may be followed so much later."""
+_LEAD_S = 0.5
+"""Velocities are sent so far ahead: GUIDED takes no accelerations, and follows so much later."""
+_TRAILS_M = 1.5
+"""GUIDED trails an accelerating target by so much."""
+_SAME_M = 1.0
+_LOOKS_S = np.arange(-100, 21) / 10.0
+_NOW = 100
+"""Where on a path a vehicle may be: times from its place on; row of that."""
+_BRAKES_SHARE = 0.8
+_HURRY_PER_S = 0.3
+_STANDS = 0.02
 _TELL_EVERY_S = 10.0
 _LANDING_S = 180.0
 
@@ -47,16 +51,18 @@ class StreamOptions:
     """How a plan is streamed.
 
     Attributes:
-        lag_m: Behind by so much, time stops for all [m].
-        patience_s: So long it may stand still, and a vehicle may take to be ready [s].
-        silent_s: Not heard for so long, a vehicle counts as lost, and time stops [s].
+        lag_m: Behind by so much, or so far off its path, a vehicle lets all stand [m].
+        patience_s: So long all may stand, and a vehicle may take to be ready [s].
+        silent_s: Not heard for so long, a vehicle counts as lost, and all slow down [s].
         reaction: One of `REACTIONS`.
+        late: Share of the plan's time by which streaming may take longer, or it is refused.
     """
 
     lag_m: float = 5.0
     patience_s: float = 60.0
-    silent_s: float = 3.0
-    reaction: str = "hold"
+    silent_s: float = 1.5
+    reaction: str = "home"
+    late: float = 0.05
 
 
 class Ended(NamedTuple):
@@ -64,15 +70,13 @@ class Ended(NamedTuple):
 
     Attributes:
         reason: Why it was given up; empty: all have landed.
-        late_s: How much longer streaming took than planned, for vehicles that were behind [s].
+        late_s: How much longer streaming took than planned [s].
+        done: What vehicles were told then.
     """
 
     reason: str
     late_s: float
-
-
-class _GivenUpError(Exception):
-    """The stream cannot go on."""
+    done: str = ""
 
 
 class Companion:
@@ -80,172 +84,107 @@ class Companion:
 
     Args:
         plans: By name of the UAS.
-        links: Likewise.
+        fleet: Their vehicles.
+        around: What they have to be clear of.
         options: How.
-        clock: What tells the time.
-        tell: Called with lines for the user.
+        may_hurry: Whether plan time may make up for what it is late.
+        check: Called with the pace and what vehicles can do, before any arms; may refuse.
     """
 
     def __init__(
         self,
         plans: Mapping[str, Timeline],
-        links: Mapping[str, VehicleLink],
+        fleet: Fleet,
+        around: Around,
         options: StreamOptions,
-        clock: Clock,
-        tell: Callable[[str], None],
+        may_hurry: bool,
+        check: Callable[[Pace, Mapping[str, Limits]], None],
     ) -> None:
-        self._plans, self._links, self._options = plans, links, options
-        self._clock, self._tell = clock, tell
-        self._beat_s = -math.inf
+        self._plans, self._fleet, self._around = plans, fleet, around
+        self._options, self._may_hurry, self._check = options, may_hurry, check
+        self._limits: dict[str, Limits] = {}
         self._landing: set[str] = set()
-        self._held: list[VehicleLink] = []
-        self._rows: list[tuple[float, str, float, float, float]] = []
+        self._back: dict[str, WayBack] = {}
+        self._failsafes = Failsafes(fleet)
         self.plan_s = min(plan.first_s for plan in plans.values())
-        self.late_s = 0.0
-
-    @property
-    def rows(self) -> list[tuple[float, str, float, float, float]]:
-        """What was heard since the first take-off: time [s], UAS, north, east, down [m]."""
-        return self._rows
+        self.late_s, self._rate_per_s, self._off_path_m = 0.0, 0.0, 0.0
 
     def fly(self) -> Ended:
         """Take off, stream, land; give up where that cannot be, and on Ctrl-C.
 
         Whatever else ends it, vehicles get their mode first.
         """
-        flies = False
         try:
             self._make_ready()
-            flies = True
-            self._take_off()
             self._stream()
             self._wait_for_landings()
-        except _GivenUpError as why:
+        except GivenUpError as why:
             reason = str(why)
         except KeyboardInterrupt:
             reason = "stopped by hand"
         except BaseException:
-            if flies:
-                self._react()
+            self._give_up()
             raise
         else:
+            self._failsafes.put_back()
             return Ended("", self.late_s)
-        if flies:
-            self._react()
-        return Ended(reason, self.late_s)
+        done = self._give_up()
+        self._failsafes.put_back()
+        return Ended(reason, self.late_s, done)
 
-    def _ticks(self) -> Iterator[float]:
-        """Time [s] after each pause, in which all are heard and told that we are here."""
-        while True:
-            now_s = self._clock.now_s()
-            if now_s >= self._beat_s + _AGAIN_S:
-                self._beat_s = now_s
-                for link in self._links.values():
-                    link.beat()
-            self._clock.wait(_TICK_S)
-            now_s = self._clock.now_s()
-            for name, link in self._links.items():
-                link.hear(now_s)
-                if link.armed and link.place_m is not None:
-                    north_m, east_m, down_m = link.place_m.tolist()
-                    self._rows.append((now_s, name, north_m, east_m, down_m))
-            for link in self._held:
-                link.go(self._plans[link.name].place_m(0.0), np.zeros(3))
-            yield now_s
+    def _give_up(self) -> str:
+        homes_m = {name: plan.place_m(plan.last_s) for name, plan in self._plans.items()}
+        giving_up = GivingUp(
+            self._fleet, self._around, self._limits, homes_m, self._options.reaction
+        )
+        return giving_up.react(self._landing)
 
     def _make_ready(self) -> None:
-        """Hear all of them, on the ground at their starts."""
-        self._until(
-            lambda link: link.place_m is not None and link.mode is not None,
-            lambda link: None,
-            self._options.patience_s,
-            "is not heard from",
+        fleet, patience_s = self._fleet, self._options.patience_s
+        starts_m = {name: plan.place_m(plan.first_s) for name, plan in self._plans.items()}
+        meet(fleet, starts_m, patience_s)
+        self._limits = read_limits(fleet)
+        self._pace = Pace(
+            self._plans, self._limits, self._around, self._options.silent_s, self._may_hurry
         )
-        for name, link in self._links.items():
-            assert link.place_m is not None
-            away_m = math.hypot(*(link.place_m - self._plans[name].place_m(0.0))[:2])
-            if away_m > _AT_START_M:
-                raise _GivenUpError(f"{name} is {away_m:.0f} m from its start; put it there")
-            if link.armed or -link.place_m[2] > _ON_GROUND_M:
-                raise _GivenUpError(f"{name} is flying or armed; stream begins on the ground")
+        self._check(self._pace, self._limits)
+        straight = {name: self._goes_straight_home(name) for name in self._plans}
+        self._failsafes.set(straight, patience_s)
+        take_off(fleet, starts_m, patience_s)
 
-    def _take_off(self) -> None:
-        patience_s, links = self._options.patience_s, self._links.values()
-        # these take off by targets, which they have to hear for a while before they fly by them
-        self._held = [link for link in links if link.autopilot.is_streamed_to]
-        if self._held:
-            self._let_pass(_STREAM_FIRST_S)
-        self._until(
-            lambda link: link.takes_targets,
-            lambda link: link.set_mode(link.autopilot.targets),
-            patience_s,
-            "does not enter {targets}",
+    def _goes_straight_home(self, name: str) -> bool:
+        plan = self._plans[name]
+        home_m, return_m = plan.place_m(plan.last_s), self._limits[name].return_m
+        places_m = plan.places_at_m(np.arange(plan.first_s, plan.last_s, 2.0))
+        return all(
+            self._around.goes_straight_home(name, place_m, home_m, return_m)
+            for place_m in places_m
         )
-        self._until(lambda link: link.armed, lambda link: link.arm(), patience_s, "does not arm")
-        heights_m = {name: -float(plan.place_m(0.0)[2]) for name, plan in self._plans.items()}
-        self._until(
-            lambda link: (
-                link.place_m is not None and -link.place_m[2] > heights_m[link.name] - _UP_WITHIN_M
-            ),
-            lambda link: (
-                None if link.autopilot.is_streamed_to else link.take_off(heights_m[link.name])
-            ),
-            patience_s,
-            "does not take off",
-        )
-        self._held = []
-
-    def _let_pass(self, seconds: float) -> None:
-        """Let some time pass."""
-        began_s = self._clock.now_s()
-        for now_s in self._ticks():
-            if now_s >= began_s + seconds:
-                return
-
-    def _until(
-        self,
-        is_so: Callable[[VehicleLink], bool],
-        ask: Callable[[VehicleLink], None],
-        patience_s: float,
-        otherwise: str,
-    ) -> None:
-        """Ask all vehicles until something holds of each."""
-        began_s, asked_s = self._clock.now_s(), -math.inf
-        for now_s in self._ticks():
-            missing = [link for link in self._links.values() if not is_so(link)]
-            if not missing:
-                return
-            if now_s > began_s + patience_s:
-                link = missing[0]
-                what = otherwise.format(targets=link.autopilot.targets_name)
-                raise _GivenUpError(f"{link.name} {what} ({link.address})")
-            if now_s >= asked_s + _AGAIN_S:
-                asked_s = now_s
-                for link in missing:
-                    ask(link)
 
     def _stream(self) -> None:
         """Targets until the last one begins to land."""
-        rate, before_s, stopped_since_s, told_s = 0.0, self._clock.now_s(), None, -math.inf
-        said = ""
-        for now_s in self._ticks():
+        rate, before_s, stood_since_s, told_s = 0.0, self._fleet.now_s(), None, -np.inf
+        said = ("", "")
+        for now_s in self._fleet.ticks():
             passed_s, before_s = now_s - before_s, now_s
-            allowed, why = self._allowed_rate(now_s)
-            rate = min(allowed, rate + _RATE_PER_S * passed_s)
+            self._see_who_is_away(now_s, rate, passed_s)
+            allowed, stops, about, why = self._allowed_rate(now_s, rate)
+            before, rate = rate, self._next_rate(rate, allowed, passed_s)
+            self._rate_per_s = (rate - before) / max(passed_s, 1e-3)
             self.plan_s += rate * passed_s
             self.late_s += (1.0 - rate) * passed_s
-            if why and why != said:
-                self._tell(why)
-            said = why
-            if allowed == 0.0:
-                stopped_since_s = now_s if stopped_since_s is None else stopped_since_s
-                if now_s > stopped_since_s + self._options.patience_s:
-                    raise _GivenUpError(why.removesuffix(": all hold"))
-            else:
-                stopped_since_s = None
+            if why and about != said:
+                self._fleet.tell(why)
+            said = about
+            if stops and rate < _STANDS:
+                stood_since_s = now_s if stood_since_s is None else stood_since_s
+                if now_s > stood_since_s + self._options.patience_s:
+                    raise GivenUpError(why.split(": all")[0].split("; all")[0])
+            elif not stops:
+                stood_since_s = None
             if now_s >= told_s + _TELL_EVERY_S:
                 told_s = now_s
-                self._tell(f"{self.plan_s:.0f} s of {self._last_s:.0f} s of the plan")
+                self._fleet.tell(f"{self.plan_s:.0f} s of {self._last_s:.0f} s of the plan")
             if not self._send(rate):
                 return
 
@@ -255,74 +194,115 @@ class Companion:
 
     def _flown(self) -> Iterator[tuple[VehicleLink, Timeline]]:
         """The vehicles that fly by targets."""
-        for name, link in self._links.items():
-            if name not in self._landing:
-                yield link, self._plans[name]
+        for link in self._fleet:
+            if link.name not in self._landing:
+                yield link, self._plans[link.name]
 
-    def _allowed_rate(self, now_s: float) -> tuple[float, str]:
-        """How fast plan time may pass, 1 for as fast as time, and what keeps it from passing."""
-        rate, why = 1.0, ""
+    def _next_rate(self, rate: float, allowed: float, passed_s: float) -> float:
+        """The rate a moment later: it changes only as fast as all can follow."""
+        fall, _ = self._pace.change(self.plan_s, rate, _BRAKES_SHARE)
+        _, rise = self._pace.change(self.plan_s, rate)
+        most = self._pace.at(self.plan_s)
+        rate = min(max(allowed, rate + fall * passed_s), rate + rise * passed_s, most)
+        return 0.0 if allowed == 0.0 and rate < _STANDS else max(rate, 0.0)
+
+    def _is_silent(self, link: VehicleLink, now_s: float) -> bool:
+        return link.heard_s is None or now_s - link.heard_s > self._options.silent_s
+
+    def _see_who_is_away(self, now_s: float, rate: float, passed_s: float) -> None:
+        """Bring those back to their places that were not there for the stream."""
         for link, plan in self._flown():
-            if link.heard_s is None or now_s - link.heard_s > self._options.silent_s:
-                return 0.0, f"{link.name} is not heard from: all hold"
-            if not link.takes_targets or not link.armed:
-                mode = link.autopilot.told(link.mode)
-                return 0.0, f"{link.name} does not take targets ({mode}): all hold"
-            steps = (0.0, 0.25 * _DELAY_S, 0.5 * _DELAY_S, 0.75 * _DELAY_S, _DELAY_S)
-            behind_m = min(link.off_m(plan.place_m(self.plan_s - early)) for early in steps)
-            share = min(max(2.0 - 2.0 * behind_m / self._options.lag_m, 0.0), 1.0)
-            if share < rate:
-                rate, why = share, f"{link.name} is behind: time passes more slowly for all"
-                if share == 0.0:
-                    why = f"{link.name} is more than {self._options.lag_m:g} m off: all hold"
-        return rate, why
+            name = link.name
+            if self._is_silent(link, now_s) or not link.takes_targets or not link.armed:
+                self._back[name] = WayBack()
+            elif name in self._back:
+                others_m = self._fleet.others_m(name)
+                self._back[name].go_on(
+                    *(link, plan, self.plan_s, self._around, others_m, passed_s),
+                    stands=rate == 0.0,
+                )
+                if self._back[name].is_there:
+                    del self._back[name]
+
+    def _allowed_rate(
+        self, now_s: float, rate: float
+    ) -> tuple[float, bool, tuple[str, str], str]:
+        """How fast plan time may pass; whether all have to stand; which trouble it is, and whose,
+        and what the user reads."""
+        late = _HURRY_PER_S * max(self.late_s, 0.0) if self._may_hurry else 0.0
+        allowed, trouble, said = min(1.0 + late, self._pace.at(self.plan_s)), "", ""
+        whose = ""
+        for link, plan in self._flown():
+            found, share, more = self._trouble(link, plan, now_s, rate)
+            if found and (TROUBLES[found].stops or share < allowed):
+                if not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops:
+                    trouble, whose = found, link.name
+                    said = TROUBLES[found].says.format(name=whose, more=more)
+                allowed = 0.0 if TROUBLES[found].stops else min(allowed, share)
+        return allowed, allowed == 0.0, (trouble, whose), said
+
+    def _trouble(
+        self, link: VehicleLink, plan: Timeline, now_s: float, rate: float
+    ) -> tuple[str, float, str]:
+        """What is wrong with a vehicle, key of `TROUBLES`; how fast time may pass; more words."""
+        if self._is_silent(link, now_s):
+            return "silent", 0.0, ""
+        if not link.takes_targets or not link.armed:
+            return "left", 0.0, link.autopilot.told(link.mode)
+        assert link.place_m is not None
+        if link.name in self._back:
+            off_m = link.off_m(plan.place_m(self.plan_s))
+            is_blocked = self._back[link.name].is_blocked
+            return "blocked" if is_blocked else "away", 0.0, f"{off_m:.0f} m"
+        limits = self._limits[link.name]
+        if rate > 0.0 and (
+            self._around.stops_in_m(link.name, link.place_m, link.velocity_mps, limits) <= 0.0
+        ):
+            return "unclear", 0.0, ""
+        over_m = max(self._behind_m(link.place_m, plan, rate), self._off_path_m)
+        share = min(max(2.0 - 2.0 * over_m / self._options.lag_m, 0.0), 1.0)
+        return ("behind" if share < 1.0 else ""), share, ""
+
+    def _behind_m(self, place_m: FloatArray, plan: Timeline, rate: float) -> float:
+        """How far a vehicle is behind along its path, beyond what is to be expected [m].
+
+        `_off_path_m` is then how far it is beside it.
+        """
+        path_m = plan.places_at_m(self.plan_s + _LOOKS_S)
+        away_m = np.linalg.norm(path_m - place_m, axis=1)
+        self._off_path_m = float(away_m.min())
+        # where a path turns back, a place is on both its legs: the later one is meant
+        nearest = int(np.flatnonzero(away_m <= self._off_path_m + _SAME_M)[-1])
+        path_m = path_m[: _NOW + 1]
+        behind_m = np.linalg.norm(np.diff(path_m[nearest:], axis=0), axis=1).sum()
+        speed_mps = rate * float(np.linalg.norm(plan.velocity_mps(self.plan_s)))
+        return float(behind_m) - _DELAY_S * speed_mps - _TRAILS_M
 
     def _send(self, rate: float) -> bool:
         """Send the targets of now; whether any vehicle still flies by them."""
+        ahead = max(rate + _LEAD_S * self._rate_per_s, 0.0)
         for link, plan in list(self._flown()):
             at_end = self.plan_s >= plan.last_s and link.off_m(plan.place_m(plan.last_s)) < 1.5
-            if at_end:
+            back = self._back.get(link.name)
+            if at_end and back is None:
                 self._landing.add(link.name)
                 link.set_mode(link.autopilot.land)
-            elif link.takes_targets:  # one that a pilot has taken over is left alone
-                link.go(plan.place_m(self.plan_s), rate * plan.velocity_mps(self.plan_s))
+            elif back is not None:
+                if link.takes_targets and back.place_m is not None:
+                    link.go(back.place_m, back.velocity_mps)
+            elif link.takes_targets:
+                velocity_mps = ahead * plan.velocity_mps(self.plan_s + rate * _LEAD_S)
+                link.go(plan.place_m(self.plan_s), velocity_mps)
         for name in self._landing:
-            link = self._links[name]
+            link = self._fleet.links[name]
             if link.takes_targets and link.armed:
                 link.set_mode(link.autopilot.land)
-        return len(self._landing) < len(self._links)
+        return len(self._landing) < len(self._plans)
 
     def _wait_for_landings(self) -> None:
-        self._until(
+        self._fleet.until(
             lambda link: not link.armed,
             lambda link: link.set_mode(link.autopilot.land) if link.takes_targets else None,
             _LANDING_S,
             "does not land",
         )
-
-    def _react(self) -> None:
-        """Give every vehicle that flies by targets its mode, until it says that it has it."""
-        self._held = []
-
-        def is_let_go(link: VehicleLink) -> bool:
-            in_stream = link.takes_targets or link.mode is None
-            return link.name in self._landing or not link.armed or not in_stream
-
-        def tell_mode(link: VehicleLink) -> None:
-            link.set_mode(getattr(link.autopilot, self._options.reaction))
-
-        # before they are heard again, which may be what has failed
-        for link in self._links.values():
-            if not is_let_go(link):
-                tell_mode(link)
-        try:
-            self._until(
-                is_let_go,
-                tell_mode,
-                self._options.silent_s + 2.0 * _AGAIN_S,
-                "does not answer",
-            )
-        except _GivenUpError as why:
-            self._tell(f"{why}: it was told to {self._options.reaction}")
-        except KeyboardInterrupt:
-            self._tell("stopped at once: vehicles fly on as they were told last")

@@ -12,16 +12,24 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.stream.autopilots import ARDUPILOT, AUTOPILOTS
+from uas_coverage_env.operations.stream.autopilots import ARDUPILOT, AUTOPILOTS, Name
+from uas_coverage_env.operations.stream.failsafes import STATION
 
 FloatArray = NDArray[np.float64]
 
 KINDS = ("udp", "udpin", "udpout", "tcp")
 """Of connections: `udp` (or `udpin`) listens on a port, the others connect to one."""
 
-_SET_MODE, _ARM, _TAKE_OFF, _INTERVAL = 176, 400, 22, 511
+_SET_MODE, _ARM, _TAKE_OFF, _INTERVAL, _CHECK_ARMING = 176, 400, 22, 511, 401
 _ARMED, _CUSTOM_MODE = 128, 1
-_POSITION_MESSAGE, _POSITION_HZ = 33, 10
+_RATES_HZ = {33: 10, 1: 2}
+"""Of messages: GLOBAL_POSITION_INT, SYS_STATUS."""
+_READY = 0x1000_0000
+"""Of SYS_STATUS: the checks before arming."""
+_REAL, _WHOLE = 9, 6
+_WARNING = 4
+_ACCEPTED = (0, 5)
+"""Answers to a command: accepted, in progress."""
 _RELATIVE_FRAME = 6
 _TYPE_MASK = 0b1001_1100_0000
 """Of SET_POSITION_TARGET_GLOBAL_INT: position, velocity and heading count."""
@@ -37,6 +45,10 @@ class VehicleLink:
         autopilot: What it is, once it has said.
         mode: Its mode; None before it has said, and after a heartbeat that is not of its autopilot.
         armed: Whether it is armed.
+        velocity_mps: (3,) as it says [m/s].
+        is_ready: Whether its checks before arming pass; None: it has not said.
+        parameters: What it has said of its parameters, by name.
+        texts: Warnings that it has said and nobody has taken yet.
 
     Args:
         name: The UAS that it flies.
@@ -54,6 +66,10 @@ class VehicleLink:
         self.autopilot = ARDUPILOT
         self.mode: int | None = None
         self.armed = False
+        self.velocity_mps = np.zeros(3)
+        self.is_ready: bool | None = None
+        self.parameters: dict[str, float] = {}
+        self.texts: list[str] = []
         self._system: int | None = None
         self._link = _connected(name, address)
 
@@ -86,7 +102,24 @@ class VehicleLink:
                 degrees = 1e-7 * message.lat, 1e-7 * message.lon
                 if abs(degrees[0]) <= 90.0 and abs(degrees[1]) <= 180.0:
                     self.place_m = self._frame.to_ned(*degrees, 1e-3 * message.relative_alt)
+                    self.velocity_mps = 0.01 * np.array([message.vx, message.vy, message.vz], float)
                     self.heard_s = now_s
+            else:
+                self._keep(message, kind)
+
+    def _keep(self, message: Any, kind: str) -> None:
+        if kind == "SYS_STATUS" and message.onboard_control_sensors_present & _READY:
+            self.is_ready = bool(message.onboard_control_sensors_health & _READY)
+        elif kind == "PARAM_VALUE":
+            value = message.param_value
+            if self.autopilot.is_bytewise and message.param_type == _WHOLE:
+                value = float(np.float32(value).view(np.int32))
+            self.parameters[message.param_id] = value
+        elif kind == "STATUSTEXT" and message.severity <= _WARNING:
+            self.texts.append(message.text)
+        elif kind == "COMMAND_ACK" and message.result not in _ACCEPTED:
+            if message.command == _ARM:
+                self.texts.append(f"refuses to arm (MAV_RESULT {message.result})")
 
     def _meet(self, heartbeat: Any) -> None:
         if heartbeat.autopilot not in AUTOPILOTS:
@@ -111,7 +144,24 @@ class VehicleLink:
     def beat(self) -> None:
         """Say that a ground station is here, and ask for positions often enough."""
         self._link.mav.heartbeat_send(6, 8, 0, 0, 4)
-        self._command(_INTERVAL, _POSITION_MESSAGE, 1e6 / _POSITION_HZ)
+        for message, rate_hz in _RATES_HZ.items():
+            self._command(_INTERVAL, message, 1e6 / rate_hz)
+
+    def ask_for(self, parameter: Name) -> None:
+        """Ask what a parameter is."""
+        name = parameter.name.encode()
+        self._link.mav.param_request_read_send(self._addressee, 1, name, -1)
+
+    def set(self, parameter: Name, value: float) -> None:
+        """Set a parameter, in its own unit."""
+        kind = _REAL
+        if parameter.is_whole:
+            kind, value = _WHOLE, float(np.int32(value).view(np.float32))
+        self._link.mav.param_set_send(self._addressee, 1, parameter.name.encode(), value, kind)
+
+    def check_arming(self) -> None:
+        """Ask it to say why it would not arm."""
+        self._command(_CHECK_ARMING)
 
     def set_mode(self, mode: int) -> None:
         """Ask for a mode."""
@@ -120,6 +170,10 @@ class VehicleLink:
     def arm(self) -> None:
         """Ask it to arm."""
         self._command(_ARM, 1)
+
+    def disarm(self) -> None:
+        """Ask it to disarm, which it does on the ground only."""
+        self._command(_ARM, 0)
 
     def take_off(self, height_m: float) -> None:
         """Ask it to climb to a height above home [m]."""
@@ -183,7 +237,7 @@ def _connected(name: str, address: str) -> Any:
 
     check_address(name, address)
     try:
-        return mavutil.mavlink_connection(address, source_system=255, robust_parsing=True)
+        return mavutil.mavlink_connection(address, source_system=STATION, robust_parsing=True)
     except OSError as error:
         raise InputError(
             f"--connect {name}={address[:60]}: cannot be used ({error.strerror or error})"

@@ -14,10 +14,12 @@ from uas_coverage_env.vehicle import VX, VZ
 
 FloatArray = NDArray[np.float64]
 
+_SAME_M = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The planned flight of one UAS, no lower than a take-off leads and a landing begins.
+    """The planned flight of one UAS, from where a take-off leads until a landing begins.
 
     Attributes:
         times_s: (T,) of the samples [s].
@@ -49,6 +51,28 @@ class Timeline:
             return np.zeros(3)
         return self._curve(time_s, 1)
 
+    def places_at_m(self, times_s: FloatArray) -> FloatArray:
+        """(N, 3) at N times [m]."""
+        return self._curve(np.clip(times_s, self.first_s, self.last_s))
+
+    def velocities_at_mps(self, times_s: FloatArray) -> FloatArray:
+        """(N, 3) at N times [m/s]."""
+        return self._where_it_flies(times_s, 1)
+
+    def accelerations_at_mps2(self, times_s: FloatArray) -> FloatArray:
+        """(N, 3) at N times [m/s²]."""
+        return self._where_it_flies(times_s, 2)
+
+    def _where_it_flies(self, times_s: FloatArray, derivative: int) -> FloatArray:
+        flies = (times_s >= self.first_s) & (times_s < self.last_s)
+        within = np.clip(times_s, self.first_s, self.last_s)
+        return np.where(flies[:, None], self._curve(within, derivative), 0.0)
+
+    @cached_property
+    def fastest_mps(self) -> float:
+        """Its largest level speed at samples [m/s]."""
+        return float(np.hypot(*self.velocities_mps[:, :2].T).max())
+
     @cached_property
     def _curve(self) -> CubicHermiteSpline:
         return CubicHermiteSpline(self.times_s, self.places_m, self.velocities_mps)
@@ -68,6 +92,11 @@ def timeline_of(flight: Flight, uas: int) -> Timeline | None:
         return None
     places_m, velocities_mps = x[:, :3].copy(), x[:, VX : VZ + 1].copy()
     places_m[low, 2], velocities_mps[low, 2] = -LIFT_M, 0.0
-    velocities_mps[[0, -1]] = 0.0
+    # over its places of take-off and landing it would only stand
+    away = [np.hypot(*(places_m - places_m[end])[:, :2].T) > _SAME_M for end in (0, -1)]
+    begins = max(int((~low | away[0]).argmax()) - 1, 0)
+    ends = len(x) - max(int((~low | away[1])[::-1].argmax()) - 1, 0)
+    velocities_mps[[begins, ends - 1]] = 0.0
     times_s = flight.scenario.dt_s * np.arange(len(x), dtype=np.float64)
-    return Timeline(times_s, places_m, velocities_mps)
+    kept = slice(begins, ends)
+    return Timeline(times_s[kept], places_m[kept], velocities_mps[kept])
