@@ -127,19 +127,20 @@ def test_an_export_puts_in_what_its_report_says(flight):
         waited += wait_s > 0
         text = made.files[f"{uas['name']}.plan"]
         assert problems(text) == []
-        first, second = json.loads(text)["mission"]["items"][:2]
-        delayed = (first["command"], first["params"][0]) == (93, wait_s)
+        first, *others = json.loads(text)["mission"]["items"]
+        assert first["command"] == 22
+        stays = next(item for item in others if item["command"] == 16)
+        delayed = stays["params"][0] == wait_s > 0
         assert delayed == (wait_s > 0)
-        assert (second if delayed else first)["command"] == 22
-        assert ("DISARM_DELAY,0" in made.files[f"{uas['name']}.param"]) == delayed
+        assert (stays["params"][4:] == first["params"][4:]) == delayed
         assert uas["duration_s"] == pytest.approx(before["duration_s"] + wait_s, abs=0.11)
-        # idling takes a tenth of what flying takes, and what is spare on the way is less by it
+        # hovering is counted as flying, and what is spare on the way is less by it
         per_s = (uas["legs"][0]["soc"] - uas["soc_landed"]) / (
             uas["duration_s"] - uas["legs"][0]["time_s"]
         )
         less = before["soc_landed"] - uas["soc_landed"]
-        assert less == pytest.approx(0.1 * per_s * wait_s, rel=0.1, abs=2e-4)
-        said = [note for note in made.notes if "after the start of its mission" in note]
+        assert less == pytest.approx(per_s * wait_s, rel=0.1, abs=2e-4)
+        said = [note for note in made.notes if "where its take-off ends" in note]
         assert any(note.startswith(uas["name"]) for note in said) == delayed
     assert waited == 1
     assert "To keep apart," in made.files["report.html"]
@@ -149,10 +150,13 @@ def test_an_export_puts_in_what_its_report_says(flight):
 def test_files_that_need_no_waits_hold_none(flight):
     made = export_of(flight, min_slack_s=0.0)
     assert all(uas["waits"] == [] for uas in made.data["uas"])
-    assert "DISARM_DELAY" not in "".join(made.files.values())
+    for name, text in made.files.items():
+        if name.endswith(".plan"):
+            stops = [i for i in json.loads(text)["mission"]["items"] if i["command"] == 16]
+            assert {item["params"][0] for item in stops} <= {0, 1}
 
 
 def test_an_export_that_no_wait_helps_is_refused_with_pair_and_place(flight, monkeypatch):
-    monkeypatch.setattr("uas_coverage_env.operations.apart.separate", lambda *_: None)
-    with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer .* no wait on the ground"):
+    monkeypatch.setattr("uas_coverage_env.operations.apart.separate", lambda *_, **__: None)
+    with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer .* no wait after take-off"):
         export_of(flight, min_slack_s=SLACK_S)
