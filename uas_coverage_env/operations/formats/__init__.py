@@ -68,7 +68,36 @@ FORMATS: Mapping[str, Writer] = {
 AUTOPILOTS = ("qgc", "ardupilot")
 """Formats that a vehicle flies, with parameters; the others are for maps and tables."""
 
-ENDINGS = frozenset(
-    {".plan", ".waypoints", ".fence", ".param", ".params", ".kml", ".geojson", ".csv"}
-)
-"""Of the files of all formats."""
+ENDINGS: Mapping[str, tuple[str, str, str]] = {
+    ".plan": (
+        "qgc",
+        "QGroundControl",
+        "take-off, waits, waypoints, speeds, heading, camera triggers, landing; the fence and "
+        "no-fly zones; a rally point where it lands",
+    ),
+    ".params": (
+        "qgc",
+        "QGroundControl of any version, for ArduPilot and for PX4",
+        "the parameters below, in QGroundControl's own form, for the vehicle of that system id: "
+        "`uas_1` is 1, `uas_2` is 2",
+    ),
+    ".param": (
+        "qgc, ardupilot",
+        "Mission Planner, MAVProxy; QGroundControl since June 2026; none for PX4",
+        "the same parameters, a line `NAME,VALUE` for each",
+    ),
+    ".waypoints": (
+        "ardupilot",
+        "Mission Planner, MAVProxy",
+        "the commands of `.plan` (QGC WPL 110), without fence and rally point",
+    ),
+    ".fence": ("ardupilot", "MAVProxy", "the fence and no-fly zones (QGC WPL 110)"),
+    ".kml": ("kml", "Google Earth and other maps", "the flown track and the legs of each sortie"),
+    ".geojson": ("geojson", "maps", "the same"),
+    ".csv": (
+        "csv",
+        "tables, `import-log`",
+        "the flown samples in degrees, of which sortie they are, charge, voltage and current",
+    ),
+}
+"""Of the files of all formats -> the formats that write them, for whom, and what they hold."""
