@@ -382,9 +382,6 @@ def autopilot_failures() -> str:
 
 
 PARTS: dict[str, Callable[[], str]] = {
-    "exported_files": exported_files,
-    "autopilot_parameters": autopilot_parameters,
-    "autopilot_failures": autopilot_failures,
     "environments": environments,
     "environment_summary": environment_summary,
     "observation_groups": observation_groups,
@@ -402,6 +399,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
     "planners": planners,
+    "exported_files": exported_files,
+    "autopilot_parameters": autopilot_parameters,
+    "autopilot_failures": autopilot_failures,
 }
 
 
