@@ -222,11 +222,23 @@ def test_a_way_home_that_the_plan_cannot_afford_is_said_first(tmp_path):
     assert copter.values["BATT_CAPACITY"] == 1800
 
 
-def test_two_that_would_meet_on_an_early_way_home_are_named(crossing):
-    made = make_export(crossing, ExportOptions("ardupilot", min_slack_s=0.0))
-    heights = [uas["return_height_m"] for uas in made.data["uas"]]
-    said = [note for note in made.notes if "if it comes home early" in note]
-    assert len(set(heights)) == 2 or said
+def test_an_early_way_home_is_close_to_another_uas_only_when_the_report_says_so(crossing, tmp_path):
+    found, made = copters(crossing, tmp_path, min_slack_s=0.0)
+    (pair,), seen = made.data["pairs"], 0
+    for uas, other in itertools.permutations(made.data["uas"], 2):
+        spans = uas["low_charge"]["close_to"]
+        note = f"{uas['name']} comes too close to {other['name']} if it comes home early"
+        assert any(note in said for said in made.notes) == bool(spans)
+        one, two = found[uas["name"]], found[other["name"]].planned().places_m
+        places = list(one.planned().places_m)
+        for k in range(80, len(places) - 100, 20):
+            way = np.array(one.way_home(RTL, places[: k + 1]))
+            there = two[np.minimum(k + np.arange(len(way)), len(two) - 1)]
+            least = np.maximum(np.hypot(*(way - there)[:, :2].T), np.abs((way - there)[:, 2])).min()
+            if least < pair["kept_m"] - 1.5:
+                seen += 1
+                assert any(s["from_s"] - 2.0 <= 0.1 * k <= s["to_s"] + 2.0 for s in spans)
+    assert seen > 0 or all(uas["return_height_m"] > 25.0 for uas in made.data["uas"][1:])
 
 
 @pytest.mark.parametrize("seed", range(4))

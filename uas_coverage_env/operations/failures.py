@@ -85,7 +85,13 @@ def low_charge(one: Exported) -> dict[str, Any]:
         "critical_soc": round(levels.critical_soc, 4),
         "critical_voltage_V": round(levels.critical_V, 2),
         "suffices": levels.suffices,
+        "stops_close": [_span(span) for span in one.home.braking],
+        "close_to": [{"name": span.of, **_span(span)} for span in one.home.near],
     }
+
+
+def _span(span: Span) -> dict[str, float]:
+    return {"from_s": round(span.from_s, 1), "to_s": round(span.to_s, 1)}
 
 
 def not_safe(one: Exported) -> Iterator[str]:

@@ -281,19 +281,24 @@ def _sampled(ends_s: FloatArray, turns_m: FloatArray) -> FloatArray:
 
 def _near(way: Way, paths: _Paths, others: Sequence[Other], begins_s: float) -> tuple[Span, ...]:
     """When ways home would come too close to another UAS."""
+    if not others:
+        return ()
+    ways = [way(k) for k in range(len(paths.times_s))]
+    mine_m = np.concatenate(ways)
+    starts = np.cumsum([0, *map(len, ways)])[:-1]
+    begun_s = np.concatenate(
+        [t + _STEP_S * np.arange(len(w)) for t, w in zip(paths.times_s, ways, strict=True)]
+    )
     found: list[Span] = []
-    ways = [way(k) for k in range(len(paths.times_s))] if others else []
     for other in others:
-        places_m, last = other.followed.places_m, len(other.followed.places_m) - 1
-        close = []
-        for begun_s, mine_m in zip(paths.times_s, ways, strict=True):
-            clock_s = begins_s + begun_s + _STEP_S * np.arange(len(mine_m)) - other.begins_s
-            at = np.clip(np.rint(clock_s / DT_S).astype(np.intp), 0, last)
-            away = mine_m - places_m[at]
-            apart_m = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
-            flying = (-mine_m[:, 2] > _FLYING_M) | (-places_m[at, 2] > _FLYING_M)
-            close.append(bool((flying & (apart_m < other.kept_m)).any()))
-        found += [span._replace(of=other.name) for span in _spans(paths.times_s, np.array(close))]
+        places_m = other.followed.places_m
+        clock_s = begins_s + begun_s - other.begins_s
+        at = np.clip(np.rint(clock_s / DT_S).astype(np.intp), 0, len(places_m) - 1)
+        away = mine_m - places_m[at]
+        apart_m = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
+        flying = (-mine_m[:, 2] > _FLYING_M) | (-places_m[at, 2] > _FLYING_M)
+        close = np.logical_or.reduceat(flying & (apart_m < other.kept_m), starts)
+        found += [span._replace(of=other.name) for span in _spans(paths.times_s, close)]
     return tuple(found)
 
 
