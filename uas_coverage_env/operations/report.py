@@ -9,7 +9,7 @@ from uas_coverage_env.mission.lateness import Pair
 from uas_coverage_env.operations.apart import Part, Settled
 from uas_coverage_env.operations.charge import Charged
 from uas_coverage_env.operations.exported import Exported, waiting, waypoint_margins
-from uas_coverage_env.operations.failures import failures_of, low_charge
+from uas_coverage_env.operations.failures import failures_of, low_charge, not_safe
 from uas_coverage_env.operations.formats.fence import ZONES
 from uas_coverage_env.operations.frame import LocalFrame
 
@@ -101,6 +101,7 @@ def _file(part: Part, one: Exported, settled: Settled) -> dict[str, Any]:
         "waypoint_margin_m": round(min(margins), 3) if margins else None,
         "return_height_m": one.home.height_m,
         "low_charge": low_charge(one),
+        "not_safe": list(not_safe(one)),
         "failures": dict(failures_of(one, px4=settled.px4)),
         **_charge(one, one.still),
         "in_wind": None if one.in_wind is None else _in_wind(one, one.in_wind),

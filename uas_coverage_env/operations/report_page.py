@@ -75,7 +75,9 @@ def _summary(data: dict[str, Any], notes: Sequence[str]) -> str:
     flying = len({uas["uas"] for uas in fleet})
     first = fleet[0]["legs"][-1]
     passed, all_of_them = data["waypoints_passed"], data["waypoints"]
-    lines = [_marked(f"{escape(note)}.", True) for note in notes]
+    waits = [f"{uas['name']} {line}" for uas in fleet for line in uas["waits"]]
+    unsafe = [f"{uas['name']} {line}" for uas in fleet for line in uas["not_safe"]]
+    lines = [_marked(f"{escape(line)}.", True) for line in unsafe]
     lines += [
         f"{_count(flying, 'UAS', 'UAS')} with {_count(len(fleet), 'file', 'files')}, "
         f"{_clock(data['duration_s'])} min from the first start to the last landing, near "
@@ -97,8 +99,8 @@ def _summary(data: dict[str, Any], notes: Sequence[str]) -> str:
             f"Of {_count(len(pairs), 'pair', 'pairs')}, {timed} {'is' if timed == 1 else 'are'} "
             f"kept apart by timing (see Delays), the others whatever the delay."
         )
-    waits = [f"{uas['name']} {line}" for uas in fleet for line in uas["waits"]]
     lines += [f"To keep apart, {escape(line)}." for line in waits]
+    lines += [f"Note: {escape(note)}." for note in notes if note not in (*waits, *unsafe)]
     return f"<ul>{''.join(f'<li>{line}</li>' for line in lines)}</ul>"
 
 
