@@ -203,7 +203,8 @@ def test_the_fence_file_holds_the_polygons_of_the_plan_as_mavproxy_loads_them(tm
         assert (item.command, item.param1) == (command, corners)
         assert (item.x, item.y) == pytest.approx((latitude, longitude), abs=2e-7)
     assert {command for command, *_ in wanted} == {5001, 5002}
-    north_m, east_m = LocalFrame(HERE).to_ned(*wanted[-1][2:], 0.0)[:2]
+    _, _, latitude, longitude = wanted[-1]
+    north_m, east_m = LocalFrame(HERE).to_ned(latitude, longitude, 0.0)[:2]
     assert (round(north_m), round(east_m)) in {(n, e) for n in (90, 110) for e in (70, 130)}
 
 
