@@ -101,7 +101,7 @@ def not_safe(one: Exported) -> Iterator[str]:
         yield (
             f"has no safe way home for low charge: it may take {levels.low_soc:.0%}, and a flight "
             f"as planned has {max(last.soc, 0.0):.0%} left before it lands, so that the failsafe "
-            f"ends it; plan for less, or with a larger pack"
+            f"ends it; plan for less, or with a larger pack{_or_a_higher_ceiling(one)}"
         )
     if one.home.braking:
         yield (
@@ -111,6 +111,12 @@ def not_safe(one: Exported) -> Iterator[str]:
     for name in dict.fromkeys(span.of for span in one.home.near):
         spans = [span for span in one.home.near if span.of == name]
         yield f"comes too close to {name} if it comes home early, {_when(spans)} s after its start"
+
+
+def _or_a_higher_ceiling(one: Exported) -> str:
+    if one.home.action == RETURN:
+        return ""
+    return ", or with a fence so high that it can return straight instead of the way that it came"
 
 
 def _when(spans: Sequence[Span]) -> str:
