@@ -12,7 +12,7 @@ import json
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -41,6 +41,10 @@ from uas_coverage_env.flight.registry import (
     PlannerDescription,
     describe_planners,
 )
+from uas_coverage_env.operations import ENDINGS, FIRMWARES
+from uas_coverage_env.operations.failures import FAILURES
+from uas_coverage_env.operations.formats.parameters import PARAMETERS, Named
+from uas_coverage_env.operations.homeward import RETRACE, RETURN
 from uas_coverage_env.operations.qgc_plan import ITEMS
 from uas_coverage_env.operations.roles import ROLES, SOLID_WORDS, UNSAID
 from uas_coverage_env.operations.tags import (
@@ -421,6 +425,45 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
+def exported_files() -> str:
+    """What an export writes, and for whom."""
+    rows = [
+        (f"`{ending}`", ", ".join(f"`{kind}`" for kind in formats.split(", ")), whom, holds)
+        for ending, (formats, whom, holds) in ENDINGS.items()
+    ]
+    return table(("file", "`--format`", "for", "holds"), rows)
+
+
+def autopilot_parameters() -> str:
+    """Every parameter that exports set, by its name in each firmware."""
+
+    def cell(named: Named | None) -> str:
+        unit = f" ({named.unit})" if named and named.unit else ""
+        return f"`{named.name}`{unit}" if named else ""
+
+    rows = [
+        (parameter.purpose, *(cell(parameter.names.get(key)) for key in FIRMWARES))
+        for parameter in PARAMETERS
+    ]
+    return table(("what", *(f"`{key}`" for key in FIRMWARES)), rows)
+
+
+def autopilot_failures() -> str:
+    """What vehicles do when something fails."""
+
+    def cell(says: Mapping[str, str]) -> str:
+        texts = [says[a].replace("{height:g} m", "its height") for a in (RETURN, RETRACE)]
+        if texts[0] == texts[1]:
+            return texts[0]
+        return f"{texts[0]}; where no such way is clear: {texts[1]}"
+
+    rows = [
+        (failure.event, cell(failure.copter), cell(failure.px4), failure.checked)
+        for failure in FAILURES
+    ]
+    return table(("if", "ArduCopter", "PX4", "checked"), rows)
+
+
 PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
@@ -445,6 +488,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "plan_items": plan_items,
     "town_kinds": town_kinds,
     "town_not_read": town_not_read,
+    "exported_files": exported_files,
+    "autopilot_parameters": autopilot_parameters,
+    "autopilot_failures": autopilot_failures,
 }
 
 

@@ -24,7 +24,6 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
 from uas_coverage_env.operations.corners import cut_path, distances_m
-from uas_coverage_env.operations.exported import return_height_m
 from uas_coverage_env.operations.formats import ENDINGS, FORMATS
 from uas_coverage_env.operations.tracks import make_tracks
 from uas_coverage_env.scenario import Place, load_scenario
@@ -109,11 +108,9 @@ def test_every_corner_of_a_waypoint_file_is_where_it_was_planned(flight, place, 
         assert loader.wp(0).z == pytest.approx(place.height_m, abs=1e-3)
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(
-    flight, place, autopilot
-):
-    made = exported(flight, place, "qgc", autopilot=autopilot)
+@pytest.mark.parametrize("firmware", [None, "px4"])
+def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(flight, place, firmware):
+    made = exported(flight, place, "qgc", firmware=firmware)
     for name, track in tracks_of(flight).items():
         text = made.files[f"{name}.plan"]
         assert problems(text) == []
@@ -129,7 +126,7 @@ def test_a_plan_passes_the_checks_of_its_loader_and_holds_the_same_corners(
             fence_m = flight.scenario.fence.vertices_m[:, :2]
             away = np.linalg.norm(fence_m - metres(corner[0], corner[1], 0.0, place)[:2], axis=1)
             assert away.min() < MOST_OFF_M
-        assert plan["mission"]["firmwareType"] == {"ardupilot": 3, "px4": 12}[autopilot]
+        assert plan["mission"]["firmwareType"] == {None: 3, "px4": 12}[firmware]
         assert len(plan["rallyPoints"]["points"]) == 1
 
 
@@ -237,19 +234,6 @@ def test_the_charge_of_a_file_is_estimated_with_care(flight, place):
         assert 0.95 * planned < per_s < 1.3 * planned
 
 
-def test_flying_home_at_the_return_height_is_clear_from_everywhere(flight):
-    scenario = flight.scenario
-    for track in tracks_of(flight).values():
-        height_m = return_height_m(scenario, track)
-        if height_m is None:
-            continue
-        for place_m in track.flown_m[-track.flown_m[:, 2] >= 3.0][::5]:
-            top = min(place_m[2], -height_m)
-            turns = [place_m, [*place_m[:2], top], [*track.home_m[:2], top]]
-            way = np.concatenate([np.linspace(a, b, 60) for a, b in pairwise(np.array(turns))])
-            assert all(hull.signed_distance(way).min() > 0.0 for hull in scenario.hulls)
-
-
 def north_and_back(**changes):
     scenario = meadow(waypoints=[waypoint((190.0, 100.0, -20.0))]).model_copy(update=changes)
     return rollout(scenario, load_planner("nearest-waypoint"), 0)
@@ -337,7 +321,11 @@ def test_the_command_writes_one_file_per_uas_and_the_report(directory, tmp_path,
 MISTAKES = {
     "an unknown format": (("--format", "pdf", *HERE), "take qgc, ardupilot, kml, geojson, csv"),
     "a misspelt format": (("--format", "qgcc", *HERE), "--format 'qgcc': did you mean qgc?"),
-    "an unknown autopilot": (("--format", "qgc", "--autopilot", "cat", *HERE), "ardupilot, px4"),
+    "an unknown firmware": (("--format", "qgc", "--firmware", "cat", *HERE), "copter-4.7, px4"),
+    "a format of another firmware": (
+        ("--format", "ardupilot", "--firmware", "px4", *HERE),
+        "--format ardupilot is of ArduPilot; take qgc",
+    ),
     "no place": (("--format", "qgc"), "has no [place] on the Earth; give --place"),
     "no tolerance": (("--format", "qgc", "--tolerance", "0", *HERE), "--tolerance 0"),
     "no corner": (("--format", "qgc", "--corner", "nan", *HERE), "--corner nan"),

@@ -40,9 +40,9 @@ def place_of(item):
     return LocalFrame(HERE).to_ned(item["params"][4], item["params"][5], 0.0)[:2]
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_a_plan_takes_off_at_the_start_and_lands_where_its_closed_home_sends_it(closed, autopilot):
-    made = make_export(closed, ExportOptions("qgc", autopilot=autopilot))
+@pytest.mark.parametrize("firmware", [None, "px4"])
+def test_a_plan_takes_off_at_the_start_and_lands_where_its_closed_home_sends_it(closed, firmware):
+    made = make_export(closed, ExportOptions("qgc", firmware=firmware))
     assert problems(made.files["uas_1.plan"]) == []
     plan = json.loads(made.files["uas_1.plan"])
     (take_off,), (land,) = (
@@ -55,7 +55,7 @@ def test_a_plan_takes_off_at_the_start_and_lands_where_its_closed_home_sends_it(
     home, rally = plan["mission"]["plannedHomePosition"], plan["rallyPoints"]["points"][0]
     assert math.dist(frame.to_ned(home[0], home[1], 0.0)[:2], START_M[:2]) < 0.01
     assert math.dist(frame.to_ned(rally[0], rally[1], 0.0)[:2], OTHER_M[:2]) < 0.01
-    if autopilot == "ardupilot":
+    if firmware is None:
         assert "RALLY_INCL_HOME,0\n" in made.files["uas_1.param"]
     assert any("uas_1 lands 110 m from where it takes off" in note for note in made.notes)
 

@@ -22,8 +22,8 @@ SLACK_S = 20.0
 HERE = Place(latitude_deg=47.0, longitude_deg=8.0)
 
 
-def file_of(home, corners):
-    """How a file is flown, with waits in it."""
+def file_of(home, corners, in_hover=False):
+    """How a file is flown, with waits in it: on the ground or where its take-off ends."""
     points = [(*home, -10.0), *corners, (*home, -10.0)]
     n = len(points) - 1
 
@@ -31,6 +31,8 @@ def file_of(home, corners):
         holds_s = [0.0] * n
         if waits.leg is not None:
             holds_s[waits.leg] = 1.0 + waits.hold_s
+        if in_hover:
+            return follow(points, [8.0] * n, holds_s, Autopilot(), hover_s=waits.start_s)
         return follow(points, [8.0] * n, holds_s, Autopilot(), waits.start_s)
 
     return fly
@@ -41,11 +43,12 @@ def apart(one, other, slack_s):
     return min(least_m(one, other, late_s) for late_s in delays) >= KEPT_M
 
 
+@pytest.mark.parametrize("in_hover", [False, True])
 @settings(max_examples=15, deadline=None, derandomize=True)
-@given(PLACES, PLACES)
-def test_with_the_waits_every_uas_may_be_late_by_what_is_asked(one, other):
-    files = file_of(HOMES[0], one), file_of(HOMES[1], other)
-    waits = separate(FIELD, [(0, files[0]), (1, files[1])], SLACK_S)
+@given(one=PLACES, other=PLACES)
+def test_with_the_waits_every_uas_may_be_late_by_what_is_asked(one, other, in_hover):
+    files = file_of(HOMES[0], one, in_hover), file_of(HOMES[1], other, in_hover)
+    waits = separate(FIELD, [(0, files[0]), (1, files[1])], SLACK_S, in_hover=in_hover)
     if waits is None:
         return
     a, b = (fly(w) for fly, w in zip(files, waits, strict=True))
@@ -63,6 +66,21 @@ def test_one_of_two_that_cross_takes_off_later_and_no_later_than_needed():
     late = 0 if waits[0].start_s else 1
     sooner = [CROSSING[k](Waits(w.start_s - (k == late))) for k, w in enumerate(waits)]
     assert pair_of(*sooner).slack_s < SLACK_S
+
+
+def test_one_that_waits_in_hover_is_as_late_where_it_flies_on_and_stands_above_its_start():
+    one, other = (
+        file_of(home, [(100.0, y, -10.0)], True) for home, y in zip(HOMES, (40.0, 0.0), strict=True)
+    )
+    waits = separate(FIELD, [(0, one), (1, other)], SLACK_S, in_hover=True)
+    assert sorted(w.start_s > 0 for w in waits) == [False, True]
+    late = 0 if waits[0].start_s else 1
+    flown, base = (one, other)[late](waits[late]), (one, other)[late](Waits())
+    assert flown.duration_s == pytest.approx(base.duration_s + waits[late].start_s)
+    assert flown.corner_s[0] == pytest.approx(base.corner_s[0] + waits[late].start_s)
+    stands = flown.places_m[round(base.corner_s[0] / DT_S) : round(flown.corner_s[0] / DT_S)]
+    assert np.ptp(stands, axis=0).max() == 0.0
+    assert stands[0, 2] == -10.0
 
 
 def test_uas_that_are_apart_do_not_wait():
@@ -127,19 +145,20 @@ def test_an_export_puts_in_what_its_report_says(flight):
         waited += wait_s > 0
         text = made.files[f"{uas['name']}.plan"]
         assert problems(text) == []
-        first, second = json.loads(text)["mission"]["items"][:2]
-        delayed = (first["command"], first["params"][0]) == (93, wait_s)
+        first, *others = json.loads(text)["mission"]["items"]
+        assert first["command"] == 22
+        stays = next(item for item in others if item["command"] == 16)
+        delayed = stays["params"][0] == wait_s > 0
         assert delayed == (wait_s > 0)
-        assert (second if delayed else first)["command"] == 22
-        assert ("DISARM_DELAY,0" in made.files[f"{uas['name']}.param"]) == delayed
+        assert (stays["params"][4:] == first["params"][4:]) == delayed
         assert uas["duration_s"] == pytest.approx(before["duration_s"] + wait_s, abs=0.11)
-        # idling takes a tenth of what flying takes, and what is spare on the way is less by it
+        # hovering is counted as flying, and what is spare on the way is less by it
         per_s = (uas["legs"][0]["soc"] - uas["soc_landed"]) / (
             uas["duration_s"] - uas["legs"][0]["time_s"]
         )
         less = before["soc_landed"] - uas["soc_landed"]
-        assert less == pytest.approx(0.1 * per_s * wait_s, rel=0.1, abs=2e-4)
-        said = [note for note in made.notes if "after the start of its mission" in note]
+        assert less == pytest.approx(per_s * wait_s, rel=0.1, abs=2e-4)
+        said = [note for note in made.notes if "where its take-off ends" in note]
         assert any(note.startswith(uas["name"]) for note in said) == delayed
     assert waited == 1
     assert "To keep apart," in made.files["report.html"]
@@ -149,10 +168,13 @@ def test_an_export_puts_in_what_its_report_says(flight):
 def test_files_that_need_no_waits_hold_none(flight):
     made = export_of(flight, min_slack_s=0.0)
     assert all(uas["waits"] == [] for uas in made.data["uas"])
-    assert "DISARM_DELAY" not in "".join(made.files.values())
+    for name, text in made.files.items():
+        if name.endswith(".plan"):
+            stops = [i for i in json.loads(text)["mission"]["items"] if i["command"] == 16]
+            assert {item["params"][0] for item in stops} <= {0, 1}
 
 
 def test_an_export_that_no_wait_helps_is_refused_with_pair_and_place(flight, monkeypatch):
-    monkeypatch.setattr("uas_coverage_env.operations.apart.separate", lambda *_: None)
-    with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer .* no wait on the ground"):
+    monkeypatch.setattr("uas_coverage_env.operations.apart.separate", lambda *_, **__: None)
+    with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer .* no wait after take-off"):
         export_of(flight, min_slack_s=SLACK_S)

@@ -205,9 +205,14 @@ def export(
             show_default=False,
         ),
     ] = None,
-    autopilot: Annotated[
-        str, typer.Option(help="Whose plans `qgc` writes: ardupilot or px4.")
-    ] = "ardupilot",
+    firmware: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the vehicles: copter-4.6 (and before), copter-4.7 (and after) or px4; "
+            "default: ArduCopter of any version, with the parameters of both.",
+            show_default=False,
+        ),
+    ] = None,
     place: Annotated[
         str | None,
         typer.Option(
@@ -237,7 +242,7 @@ def export(
         min_slack_s=min_slack,
         path_m=tolerance,
         corner_m=corner,
-        autopilot=autopilot,
+        firmware=firmware,
         place=asked_place(place),
         wind_mps=wind,
     )

@@ -24,8 +24,8 @@ from uas_coverage_env.vehicle import VehicleParams
 FloatArray = NDArray[np.float64]
 
 DT_S = 0.1
-_LAND_BELOW_M = 10.0
-_LAND_MPS = 0.5
+LAND_BELOW_M = 10.0
+LAND_MPS = 0.5
 """Height below which ArduCopter lands slowly (LAND_ALT_LOW), and how fast (LAND_SPEED)."""
 
 _SPOOL_UP_S, _DISARM_S = 3.5, 1.5
@@ -149,7 +149,7 @@ class Followed:
     Attributes:
         times_s: (T,) every `DT_S` [s].
         places_m: (T, 3) north, east, down [m].
-        corner_s: (C,) when each corner is passed or reached [s].
+        corner_s: (C,) when each corner is passed or reached, and the first one left [s].
     """
 
     times_s: FloatArray
@@ -170,6 +170,7 @@ def follow(
     wait_s: float = 0.0,
     *,
     takes_off: bool = True,
+    hover_s: float = 0.0,
 ) -> Followed:
     """Take off to the first corner, fly the others one after the other, land under the last one.
 
@@ -180,6 +181,7 @@ def follow(
         by: The autopilot.
         wait_s: How long it waits on the ground before it takes off [s].
         takes_off: Whether it does; if not, it is at rest at the first corner.
+        hover_s: How long it stays at the first corner before it flies on [s].
     """
     corners = np.asarray(corners_m, np.float64)
     places = [corners[0]]
@@ -187,6 +189,7 @@ def follow(
         ground = corners[0] * (1.0, 1.0, 0.0)
         places = [ground] * round((wait_s + _SPOOL_UP_S) / DT_S)
         _fly(_legs([ground, corners[0]], [by.up_mps], by), by, places)
+    places += [places[-1]] * round(hover_s / DT_S)
     corner_s = [(len(places) - 1) * DT_S]
     first = 0
     for last in range(len(corners) - 1):
@@ -260,9 +263,29 @@ def _may_turn(leg: _Leg, after: _Leg, t: float, by: Autopilot) -> bool:
     )
 
 
+def leg_s(start_m: ArrayLike, end_m: ArrayLike, by: Autopilot) -> float:
+    """How long one leg takes from rest to rest, as fast as the autopilot is set to [s].
+
+    Args:
+        start_m: (3,) north, east, down [m].
+        end_m: (3,) likewise.
+        by: The autopilot.
+    """
+    start, end = np.asarray(start_m, np.float64), np.asarray(end_m, np.float64)
+    if np.linalg.norm(end - start) <= _SHORTEST_M:
+        return 0.0
+    return _Leg(start, end, by.speed_mps, by).total_s
+
+
+def landing_s(height_m: float, by: Autopilot) -> float:
+    """How long landing takes from a height until it has disarmed [s]."""
+    slow_m = min(height_m, LAND_BELOW_M)
+    return (height_m - slow_m) / by.down_mps + slow_m / LAND_MPS + _DISARM_S
+
+
 def _land(above: FloatArray, by: Autopilot, places: list[FloatArray]) -> None:
     height_m = -float(above[2])
     while height_m > 0.0:
-        height_m -= DT_S * (by.down_mps if height_m > _LAND_BELOW_M else _LAND_MPS)
+        height_m -= DT_S * (by.down_mps if height_m > LAND_BELOW_M else LAND_MPS)
         places.append(np.array([above[0], above[1], min(-height_m, 0.0)]))
     places += [places[-1]] * round(_DISARM_S / DT_S)

@@ -1,4 +1,4 @@
-"""Waits that keep UAS apart: a later start of some of them, else a longer stop at a corner.
+"""Waits that keep UAS apart: some set out later than others, else stop longer at a corner.
 
 Files of legs carry no time, but they can wait. A UAS after the other gets the shortest wait with
 which any of those placed before it may be late by what is asked; of several orders the one counts
@@ -36,8 +36,8 @@ class Waits:
     """Where a UAS waits for others.
 
     Attributes:
-        start_s: On the ground, before it takes off; where it has flown before, beyond the time that
-            it is there anyhow [s].
+        start_s: Before it sets out: on the ground or, in files, above where it takes off; where it
+            has flown before, on the ground beyond the time that it is there anyhow [s].
         leg: Index of the leg at whose end it waits in the air; None: it does not.
         hold_s: How long it waits there, a stop that it makes anyhow not counted [s].
     """
@@ -96,6 +96,8 @@ def separate(
     fleet: Sequence[tuple[int, Fly]],
     slack_s: float,
     pauses_s: Sequence[float] = (),
+    *,
+    in_hover: bool = False,
 ) -> list[Waits] | None:
     """Waits with which every UAS may be late by as much as is asked.
 
@@ -106,11 +108,13 @@ def separate(
         slack_s: How late any of them has to be able to be [s].
         pauses_s: How long each is on the ground before, where it has flown before; without it,
             every UAS flies once [s].
+        in_hover: Whether a UAS that sets out later waits where its take-off ends; else it does on
+            the ground. What flies after it has landed waits on the ground in either case.
 
     Returns:
         One entry for each of the fleet; None where no waits are found.
     """
-    search = _Search(scenario, fleet, slack_s, pauses_s)
+    search = _Search(scenario, fleet, slack_s, pauses_s, in_hover=in_hover)
     found = [placed for order in _orders(search) if (placed := search.place(order, False))]
     if not found:
         found = [p for o in _few_orders(search) if (p := search.place(o, True))]
@@ -147,9 +151,11 @@ class _Search:
         fleet: Sequence[tuple[int, Fly]],
         slack_s: float,
         pauses_s: Sequence[float],
+        *,
+        in_hover: bool,
     ) -> None:
         self._scenario, self._fleet, self._slack_s = scenario, fleet, slack_s
-        self._pauses_s = pauses_s
+        self._pauses_s, self._in_hover = pauses_s, in_hover
         self.base = [fly(Waits()) for _, fly in fleet]
         self.files: dict[int, list[int]] = {}
         for k, (uas, _) in enumerate(fleet):
@@ -167,7 +173,7 @@ class _Search:
         while left:
             uas = min(left, key=lambda u: slots[u].ready_s)
             k = left[uas].pop(0)
-            one = self._on_the_ground(k, slots[uas], placed)
+            one = self._at_the_start(k, slots[uas], placed)
             if one is None and in_the_air:
                 one = self._in_the_air(k, slots[uas], placed)
             if one is None:
@@ -180,12 +186,14 @@ class _Search:
                 del left[uas]
         return placed
 
-    def _on_the_ground(self, k: int, slot: _Slot, placed: Sequence[_Placed]) -> _Placed | None:
+    def _at_the_start(self, k: int, slot: _Slot, placed: Sequence[_Placed]) -> _Placed | None:
         followed = self.base[k]
-        start_s = self._shortest(k, followed, 0, slot, placed)
+        hovers = self._in_hover and math.isinf(slot.since_s)
+        sample = round(float(followed.corner_s[0]) / DT_S) if hovers else 0
+        start_s = self._shortest(k, followed, sample, slot, placed)
         if start_s is None:
             return None
-        return _placed(k, self._fleet[k][0], Waits(start_s), followed, 0, start_s, slot)
+        return _placed(k, self._fleet[k][0], Waits(start_s), followed, sample, start_s, slot)
 
     def _in_the_air(self, k: int, slot: _Slot, placed: Sequence[_Placed]) -> _Placed | None:
         uas, fly = self._fleet[k]

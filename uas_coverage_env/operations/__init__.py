@@ -8,7 +8,7 @@ from uas_coverage_env.operations.drawing import Drawn, DrawnPolygon, TakeOff
 from uas_coverage_env.operations.export import Export, ExportOptions, make_export
 from uas_coverage_env.operations.flown import Flown, flown_flight
 from uas_coverage_env.operations.formats import ENDINGS, FORMATS
-from uas_coverage_env.operations.formats.qgc import FIRMWARE
+from uas_coverage_env.operations.formats.parameters import FIRMWARES
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged, read_log
 from uas_coverage_env.operations.make import Imported, ImportOptions, make_scenario
@@ -18,7 +18,7 @@ from uas_coverage_env.operations.wishes import minutes_of
 
 __all__ = [
     "ENDINGS",
-    "FIRMWARE",
+    "FIRMWARES",
     "FORMATS",
     "Camera",
     "Drawn",

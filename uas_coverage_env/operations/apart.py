@@ -15,11 +15,12 @@ import numpy as np
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.mission.lateness import Pair, Timed, pairs_of
+from uas_coverage_env.mission.lateness import Pair, Timed, kept_m, pairs_of
 from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.mission.separation import Waits, ready_s, separate
 from uas_coverage_env.operations.exported import Exported, Start, exported, followed
 from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.homeward import Other
 from uas_coverage_env.operations.layers import Apart, in_layers
 from uas_coverage_env.operations.tracks import LIFT_M, Tolerances, Track
 
@@ -57,11 +58,13 @@ class Settled(NamedTuple):
         tolerances: How far an autopilot may be from the flight.
         min_slack_s: How late any UAS has to be able to be [s].
         wind_mps: The worst wind that charges are counted in; None: that of the scenario [m/s].
+        px4: Whether PX4 flies the files; else, ArduPilot.
     """
 
     tolerances: Tolerances
     min_slack_s: float
     wind_mps: float | None = None
+    px4: bool = False
 
 
 class Begins(NamedTuple):
@@ -154,7 +157,7 @@ def _starts(
 def _flown(
     flight: Flight, tracks: Sequence[Track], tolerances: Tolerances, waits: Sequence[Waits]
 ) -> list[Followed]:
-    """How the files are flown; a UAS waits on the ground in its first one only."""
+    """How the files are flown; a UAS waits in its first one, later ones are started later."""
     seen: set[int] = set()
     result = []
     for track, wait in zip(tracks, waits, strict=True):
@@ -185,15 +188,21 @@ def _exports(
             used = float(on_ground[0] - on_ground[-1])
             soc = before.still.soc_landed - used
             soc_in_wind = (before.in_wind or before.still).soc_landed - used
-        start = Start(at_s, float(wait.start_s - inside.start_s), soc, soc_in_wind)
-        one = exported(flight, track, frame, tolerances, inside, start, settled.wind_mps)
+        others = tuple(
+            Other(o.name, f, o_at_s, kept_m(flight.scenario, track.uas, o.uas))
+            for o, f, (o_at_s, _) in zip(tracks, flown, starts, strict=True)
+            if o.uas != track.uas
+        )
+        start = Start(at_s, float(wait.start_s - inside.start_s), soc, soc_in_wind, others)
+        told = tolerances, inside, start, settled.wind_mps
+        one = exported(flight, track, frame, *told, px4=settled.px4)
         last[track.uas] = one
         result.append(one)
     return result
 
 
 def _flown_wait(flight: Flight, one: Exported) -> Waits:
-    """How long a UAS waited in the flight before it took off."""
+    """How long a UAS waited in the flight before it set out."""
     first = int(np.flatnonzero(-one.track.flown_m[:, 2] >= LIFT_M)[0])
     began_s = float(one.followed.corner_s[0])
     return Waits(max(math.floor(first * flight.scenario.dt_s - began_s), 0))
@@ -210,7 +219,7 @@ def _apart(flight: Flight, settled: Settled, begins_s: float, tracks: Sequence[T
         for track in tracks
     ]
     pauses_s = [track.sortie.rest_s for track in tracks]
-    waits = separate(scenario, fleet, settled.min_slack_s, pauses_s)
+    waits = separate(scenario, fleet, settled.min_slack_s, pauses_s, in_hover=True)
     home_s = math.inf
     if waits is not None:
         flown = _flown(flight, tracks, settled.tolerances, waits)
@@ -252,7 +261,7 @@ def check_slack(pairs: Sequence[Pair], frame: LocalFrame, min_slack_s: float) ->
     raise InputError(
         f"{worst.names[0]} and {worst.names[1]} come closer than {worst.kept_m:.1f} m at "
         f"{latitude:.6f}, {longitude:.6f}, {height:.0f} m high, if one is {worst.slack_s:.1f} s "
-        f"late, less than --min-slack {min_slack_s:g}{more}, and no wait on the ground or at a "
+        f"late, less than --min-slack {min_slack_s:g}{more}, and no wait after take-off or at a "
         f"corner, and no height layer, changes that; plan them further apart, or accept it with a "
         f"smaller --min-slack"
     )

@@ -1,19 +1,20 @@
-"""What flying a file takes of the battery, in still air and against a wind."""
+"""What flying a file takes of the battery, and at what charge its UAS has to come home."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from uas_coverage_env.disturbances.wind import mean_wind_mps
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.mission.leg_model import Followed
+from uas_coverage_env.operations.homeward import Homeward
 from uas_coverage_env.operations.tracks import Track
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.vehicle.range import dod_per_s
-
-_IDLE_SHARE = 0.1
-"""Of what level flight takes, what motors take that idle while a UAS waits to take off."""
+from uas_coverage_env.vehicle import VehicleParams
+from uas_coverage_env.vehicle.derived import steady_current_A
+from uas_coverage_env.vehicle.range import dod_per_s, level_power_W
 
 _LEAST_HEADWAY_MPS = 0.1
 """Over the ground: a UAS that cannot fly against a wind comes home in it by no battery."""
@@ -28,7 +29,8 @@ class LegCharge:
         planned_s: The same in the sortie that was planned [s].
         soc: State of charge [-].
         planned_soc: The same in the planned flight [-].
-        home: What flying home from there and landing takes, with margin (`mission.Range`) [-].
+        home: What coming home from there takes by the way that is flown when the charge is low,
+            with margin (`Homeward`) [-].
         spare: What is left beyond that and the reserve that `dod_max` leaves [-].
         spare_s: How long it can fly on before it has to turn home [s].
     """
@@ -49,11 +51,13 @@ class Charged(NamedTuple):
         legs: One entry per leg.
         soc_landed: State of charge after landing [-].
         headwind_mps: That was counted with [m/s].
+        most_home: The most that the way home takes, from wherever it begins [-].
     """
 
     legs: tuple[LegCharge, ...]
     soc_landed: float
     headwind_mps: float
+    most_home: float
 
     @property
     def point_of_no_return(self) -> int | None:
@@ -82,13 +86,13 @@ def charged(
     track: Track,
     followed: Followed,
     speeds_mps: tuple[float, ...],
-    idle_s: float,
+    home: Homeward,
     soc_0: float,
     headwind_mps: float = 0.0,
 ) -> Charged:
     """Charge after each leg, of level flight at full speed all the time: a careful estimate.
 
-    A wind is counted as a headwind on every leg and all the way home: over the ground, no UAS is
+    A wind comes from ahead on every leg and all the way home: over the ground, no UAS is
     faster than its top speed less the wind.
 
     Args:
@@ -96,7 +100,7 @@ def charged(
         track: A sortie of it.
         followed: How an autopilot flies it.
         speeds_mps: (legs,) as the file sets them [m/s].
-        idle_s: How long it waits on the ground, its motors idling [s].
+        home: Its way home.
         soc_0: State of charge at the start [-].
         headwind_mps: The wind [m/s].
     """
@@ -104,21 +108,17 @@ def charged(
     uas, vehicle = scenario.uas[i], scenario.vehicles[i]
     top_mps = vehicle.limits.v_xy_max_mps
     over_ground_mps = max(top_mps - headwind_mps, _LEAST_HEADWAY_MPS)
-    ways_home = Range(MissionBrief.of(scenario))
+    against = top_mps / over_ground_mps
     ends = followed.corner_s
-    began_s = ends[0] - (1.0 - _IDLE_SHARE) * idle_s
     dod, legs, later_s = 1.0 - soc_0, [], 0.0
-    dod += dod_per_s(vehicle, min(dod, 1.0)) * began_s
+    dod += dod_per_s(vehicle, min(dod, 1.0)) * ends[0]
     for leg, speed_mps, start_s, end_s in zip(track.legs, speeds_mps, ends, ends[1:], strict=False):
         # a hold at the end of a leg is counted with the next one
         takes_s = (end_s - start_s) * max(1.0, speed_mps / over_ground_mps)
         later_s += takes_s - (end_s - start_s)
         dod += dod_per_s(vehicle, min(dod, 1.0)) * takes_s
-        x = flight.x[leg.sample, i].copy()
-        x[:] = 0.0
-        x[:3], x[DOD] = leg.end_m, min(dod, 1.0)
-        home = ways_home.home(i, x)
-        needed = (home.dod + home.dod_margin) * (top_mps / over_ground_mps)
+        per_s = dod_per_s(vehicle, min(dod, 1.0))
+        needed = per_s * home.needs_at(float(end_s)) * against
         spare = uas.dod_max - dod - needed
         legs.append(
             LegCharge(
@@ -128,9 +128,104 @@ def charged(
                 planned_soc=float(flight.soc[leg.sample, i]),
                 home=needed,
                 spare=spare,
-                spare_s=spare / dod_per_s(vehicle, min(dod, 1.0)),
+                spare_s=spare / per_s,
             )
         )
     landing_s = followed.duration_s - float(ends[-1])
     soc_landed = 1.0 - dod - dod_per_s(vehicle, min(dod, 1.0)) * landing_s
-    return Charged(tuple(legs), soc_landed, headwind_mps)
+    most_home = dod_per_s(vehicle, uas.dod_max) * float(home.needs_s.max()) * against
+    return Charged(tuple(legs), soc_landed, headwind_mps, most_home)
+
+
+class Levels(NamedTuple):
+    """At what charge a vehicle acts on its own.
+
+    Attributes:
+        low_soc: It comes home [-].
+        low_V: The same as a voltage in level flight [V]; reached earlier by a pack that holds less
+            than it should.
+        critical_soc: It lands where it is [-].
+        critical_V: Likewise [V].
+        capacity_mAh: Of the pack from how full it was put in until it is empty [mAh].
+        rest_V: At which it is no longer as full as it is said to be at the start, at rest [V].
+        suffices: Whether that brings it home from everywhere without ending a flight that goes
+            as planned.
+    """
+
+    low_soc: float
+    low_V: float
+    critical_soc: float
+    critical_V: float
+    capacity_mAh: int
+    rest_V: float
+    suffices: bool
+
+    def mAh(self, soc: float, vehicle: VehicleParams) -> int:
+        """A charge as an autopilot counts it, rounded up [mAh]."""
+        return math.ceil(1000.0 * vehicle.battery.capacity_Ah * soc)
+
+
+_UNEVEN = 0.02
+"""How far below its lowest charge before the landing a flight as planned may come unnoticed [-]."""
+
+_EARLIER = 1.0 / 3.0
+"""Of what a flight as planned has left above the low level, what the voltage comes before it: a
+worn pack's voltage falls although the ampere-hours that are counted do not tell."""
+
+_NOT_FULL = 0.2
+_STEP_V = 0.1
+
+
+def levels(
+    vehicle: VehicleParams,
+    charge: Charged,
+    landing_s: float,
+    *,
+    dod_max: float,
+    soc_start: float,
+    soc_fresh: float,
+) -> Levels:
+    """At what charge a UAS has to come home, and at what it has to land.
+
+    Low is what the way home takes at the worst point of the flight, and the reserve. Where a flight
+    as planned has less left before its landing, less of the reserve; never less than what is
+    critical: the battery's own limit, or what landing takes.
+
+    Args:
+        vehicle: Its vehicle.
+        charge: What the file takes.
+        landing_s: How long landing takes from its greatest height, with margin [s].
+        dod_max: Depth of discharge to be kept [-].
+        soc_start: State of charge at the start [-].
+        soc_fresh: The same when the pack was put in [-].
+    """
+    battery = vehicle.battery
+    critical = max(1.0 - battery.dod_cutoff, dod_per_s(vehicle, battery.dod_cutoff) * landing_s)
+    least = charge.most_home + critical
+    most = max(charge.most_home + 1.0 - dod_max, least)
+    last = charge.legs[-1].soc
+    low = min(max(last - _UNEVEN, least), most)
+    critical_V = max(_loaded_V(vehicle, critical), battery.voltage_min_V)
+    low_V = _loaded_V(vehicle, low + _EARLIER * max(last - low, 0.0))
+    return Levels(
+        low_soc=low,
+        low_V=max(low_V, critical_V + _STEP_V),
+        critical_soc=critical,
+        critical_V=critical_V,
+        capacity_mAh=round(1000.0 * battery.capacity_Ah * soc_fresh),
+        rest_V=_rest_V(vehicle, soc_start - _NOT_FULL),
+        suffices=bool(low <= last),
+    )
+
+
+def _rest_V(vehicle: VehicleParams, soc: float) -> float:
+    battery = vehicle.battery
+    return float(np.interp(1.0 - soc, battery.ocv_dod, battery.ocv_V))
+
+
+def _loaded_V(vehicle: VehicleParams, soc: float) -> float:
+    """Voltage in level flight at full speed [V]."""
+    battery = vehicle.battery
+    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
+    current_A = steady_current_A(battery, 1.0 - soc, level_power_W(vehicle))
+    return _rest_V(vehicle, soc) - resistance_ohm * current_A

@@ -19,8 +19,9 @@ from uas_coverage_env.mission.separation import Waits, ready_s
 from uas_coverage_env.operations.apart import Begins, Part, Settled, kept_apart
 from uas_coverage_env.operations.asked import stopping
 from uas_coverage_env.operations.exported import Exported, followed, waiting
-from uas_coverage_env.operations.formats import FORMATS
-from uas_coverage_env.operations.formats.qgc import FIRMWARE
+from uas_coverage_env.operations.failures import not_safe
+from uas_coverage_env.operations.formats import AUTOPILOTS, FORMATS
+from uas_coverage_env.operations.formats.parameters import FIRMWARES, PX4
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.report import report
 from uas_coverage_env.operations.report_page import report_page
@@ -45,7 +46,8 @@ class ExportOptions:
             the scenario's `[execution]` says, else 20 [s].
         path_m: How far legs may be from the flight; None: likewise, else 2 [m].
         corner_m: How far from a corner an autopilot may pass; None: likewise, else 2 [m].
-        autopilot: Whose plans `qgc` writes, key of `FIRMWARE`.
+        firmware: Whose files `qgc` and `ardupilot` write, key of `FIRMWARES`; None: ArduPilot's of
+            any version.
         place: Where on the Earth it is, for a scenario that does not say.
         wind_mps: The worst wind that the report counts charges in; None: that of the scenario.
     """
@@ -54,7 +56,7 @@ class ExportOptions:
     min_slack_s: float | None = None
     path_m: float | None = None
     corner_m: float | None = None
-    autopilot: str = "ardupilot"
+    firmware: str | None = None
     place: Place | None = None
     wind_mps: float | None = None
 
@@ -107,12 +109,13 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
             at_s = ready_s(parts[-1].lands_s, flown["swap_s"]) if parts else 0.0
             begins = Begins(at_s, entry["begins_s"])
             parts.append(kept_apart(flight, tracks, frame, settled, begins))
-    data = report(parts, frame, settled.tolerances)
+    data = report(parts, frame, settled)
     files = _files(parts, options, settled.tolerances)
     files["report.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
     flying = {uas["uas"] for uas in data["uas"]}
     grounded = tuple(name for name in flights[0].names if name not in flying)
-    notes = tuple(dict.fromkeys(note for part in parts for note in _notes(part)))
+    flies = options.kind in AUTOPILOTS
+    notes = tuple(dict.fromkeys(note for part in parts for note in _notes(part, flies=flies)))
     files["report.html"] = report_page(parts, data, notes)
     return Export(files, data, grounded, notes)
 
@@ -167,7 +170,7 @@ def _files(parts: Sequence[Part], options: ExportOptions, tolerances: Tolerances
     for name in parts[0].flight.names:
         flown = [(part, one) for part in parts for one in part.of(name)]
         if flown:
-            files |= FORMATS[options.kind](name, flown, tolerances, options.autopilot)
+            files |= FORMATS[options.kind](name, flown, tolerances, options.firmware)
     return files
 
 
@@ -180,15 +183,16 @@ def _settled(flight: Flight, options: ExportOptions) -> Settled:
     path_m, corner_m, slack_s = (
         value if one is None else one for one, value in zip(given, usual, strict=True)
     )
-    return Settled(Tolerances(path_m, corner_m), slack_s, options.wind_mps)
+    tolerances = Tolerances(path_m, corner_m)
+    return Settled(tolerances, slack_s, options.wind_mps, options.firmware == PX4)
 
 
 def _check(options: ExportOptions, settled: Settled) -> None:
-    for name, value, known in (
-        ("--format", options.kind, FORMATS),
-        ("--autopilot", options.autopilot, FIRMWARE),
-    ):
-        check_choice(name, value, known)
+    check_choice("--format", options.kind, FORMATS)
+    if options.firmware is not None:
+        check_choice("--firmware", options.firmware, FIRMWARES)
+        if options.firmware == PX4 and options.kind == "ardupilot":
+            raise InputError("--firmware px4: --format ardupilot is of ArduPilot; take qgc")
     for name, value in (
         ("--tolerance", settled.tolerances.path_m),
         ("--corner", settled.tolerances.corner_m),
@@ -264,10 +268,11 @@ def _unkept(flight: Flight, one: Exported) -> list[str]:
     return [f"{one.track.name}: the file takes {file_s:.0f} s, the flight {planned_s:.0f}; {why}"]
 
 
-def _notes(part: Part) -> list[str]:
+def _notes(part: Part, *, flies: bool) -> list[str]:
+    """What cannot be promised, first of all where something fails."""
     flight, exports = part.flight, part.exports
     scenario = flight.scenario
-    notes = []
+    notes = [f"{one.track.name} {line}" for one in exports for line in not_safe(one) if flies]
     if scenario.moving_obstacles:
         notes.append("files of legs carry no time: moving obstacles are not avoided")
     if scenario.wind is not None or scenario.uncertainty is not None or scenario.disturbances:

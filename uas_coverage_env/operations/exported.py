@@ -10,21 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
+from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow, landing_s
 from uas_coverage_env.mission.separation import Waits
 from uas_coverage_env.operations.asked import most_mps, not_as_asked, triggers_m
-from uas_coverage_env.operations.charge import Charged, charged, worst_wind_mps
+from uas_coverage_env.operations.charge import Charged, Levels, charged, levels, worst_wind_mps
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.room import Surroundings
-from uas_coverage_env.operations.tracks import LIFT_M, STOP_S, Tolerances, Track
+from uas_coverage_env.operations.homeward import Homeward, Other, homeward
+from uas_coverage_env.operations.tracks import STOP_S, Tolerances, Track
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
 
 _SLOWEST_MPS = 0.5
 _SAME_SPEED_MPS, _SAME_SHARE = 0.5, 0.1
-_LEAST_RETURN_M = 15.0
-_ABOVE_ROOFS_M = 1.0
-_EVERY = 5
+_LANDING = 1.1
+"""Of the time that landing is expected to take, what is allowed for it."""
 
 
 class Start(NamedTuple):
@@ -35,12 +34,14 @@ class Start(NamedTuple):
         delay_s: How much later that is than the UAS could be started [s].
         soc: State of charge [-].
         soc_in_wind: The same, where all before was flown in the worst wind [-].
+        others: Who is in the air at the same time.
     """
 
     at_s: float
     delay_s: float
     soc: float
     soc_in_wind: float
+    others: tuple[Other, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +59,8 @@ class Exported:
         followed: How an autopilot flies them.
         still: What that takes of the battery, in still air.
         in_wind: The same in the worst wind; None: there is none.
-        return_m: Height at which flying straight home is clear from everywhere on the path [m];
-            None where there is none below the fence's top.
+        home: The way home when something fails.
+        levels: At what charge it is flown.
         vehicle: Its vehicle.
         frame: Where it is on the Earth.
         looks_ahead: Whether it looks where it flies; else, north.
@@ -77,7 +78,8 @@ class Exported:
     followed: Followed
     still: Charged
     in_wind: Charged | None
-    return_m: float | None
+    home: Homeward
+    levels: Levels
     vehicle: VehicleParams
     frame: LocalFrame
     looks_ahead: bool
@@ -95,7 +97,7 @@ class Exported:
 
 
 def followed(track: Track, scenario: Scenario, tolerances: Tolerances, waits: Waits) -> Followed:
-    """How an autopilot flies the file of a track.
+    """How an autopilot flies the file of a track: it waits for others when it has taken off.
 
     Args:
         track: The track.
@@ -108,7 +110,7 @@ def followed(track: Track, scenario: Scenario, tolerances: Tolerances, waits: Wa
         file_speeds(track, scenario),
         file_holds(track, waits),
         Autopilot.of(scenario.vehicles[track.uas], tolerances.corner_m),
-        waits.start_s,
+        hover_s=waits.start_s,
     )
 
 
@@ -120,6 +122,8 @@ def exported(
     waits: Waits = Waits(),  # noqa: B008 (immutable)
     start: Start | None = None,
     wind_mps: float | None = None,
+    *,
+    px4: bool = False,
 ) -> Exported:
     """What there is to say about a track.
 
@@ -131,25 +135,45 @@ def exported(
         waits: Where it waits for others.
         start: When it is started, and how much is in its battery; None: first of all, as planned.
         wind_mps: The worst wind; None: that of the scenario [m/s].
+        px4: Whether PX4 flies it; else, ArduPilot.
     """
     scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
     soc_0 = scenario.uas[track.uas].soc_0
     begins = start or Start(0.0, 0.0, soc_0, soc_0)
     flown, speeds_mps = followed(track, scenario, tolerances, waits), file_speeds(track, scenario)
     wind_mps = worst_wind_mps(scenario, track) if wind_mps is None else wind_mps
-    take = partial(charged, flight, track, flown, speeds_mps, waits.start_s)
+    by, holds_s = Autopilot.of(vehicle, tolerances.corner_m), file_holds(track, waits)
+    home = homeward(
+        *(scenario, track, flown, by),
+        holds_s=holds_s,
+        begins_s=begins.at_s,
+        others=begins.others,
+        nearer_end=px4,
+    )
+    take = partial(charged, flight, track, flown, speeds_mps, home)
+    still = take(begins.soc)
+    in_wind = take(begins.soc_in_wind, wind_mps) if wind_mps else None
+    highest_m = max(-float(flown.places_m[:, 2].min()), home.height_m or 0.0)
     return Exported(
         track=track,
         begins_s=begins.at_s,
         delay_s=begins.delay_s,
         soc_0=begins.soc,
         speeds_mps=speeds_mps,
-        holds_s=file_holds(track, waits),
+        holds_s=holds_s,
         waits=waits,
         followed=flown,
-        still=take(begins.soc),
-        in_wind=take(begins.soc_in_wind, wind_mps) if wind_mps else None,
-        return_m=return_height_m(scenario, track),
+        still=still,
+        in_wind=in_wind,
+        home=home,
+        levels=levels(
+            vehicle,
+            in_wind or still,
+            _LANDING * landing_s(highest_m, by),
+            dod_max=scenario.uas[track.uas].dod_max,
+            soc_start=begins.soc,
+            soc_fresh=soc_0,
+        ),
         vehicle=vehicle,
         frame=frame,
         looks_ahead=scenario.uas[track.uas].heading == "course",
@@ -180,46 +204,13 @@ def file_holds(track: Track, waits: Waits) -> tuple[float, ...]:
     return tuple(holds_s)
 
 
-def return_height_m(scenario: Scenario, track: Track) -> float | None:
-    """A height at which climbing and flying straight home is clear from everywhere on a path.
-
-    "Return to launch" of an autopilot flies like this. Where no height is clear, the way back that
-    is known to be is the way there.
-    """
-    around = Surroundings(scenario, track.uas)
-    top_m = -float(scenario.fence.vertices_m[:, 2].min()) - scenario.geofence.margin_m
-    roofs_m = {
-        -float(hull.vertices_m[:, 2].min()) + obstacle.safe_distance_m + _ABOVE_ROOFS_M
-        for hull, obstacle in zip(scenario.hulls, scenario.obstacles, strict=True)
-    }
-    places = track.flown_m[-track.flown_m[:, 2] >= LIFT_M][::_EVERY]
-    for height_m in sorted({_LEAST_RETURN_M, *roofs_m}):
-        if _LEAST_RETURN_M <= height_m <= top_m and all(
-            _returns(around, place, track.landing_m, height_m) for place in places
-        ):
-            return height_m
-    return None
-
-
-def _returns(
-    around: Surroundings,
-    place: NDArray[np.float64],
-    landing_m: NDArray[np.float64],
-    height_m: float,
-) -> bool:
-    up = np.array([*place[:2], min(float(place[2]), -height_m)])
-    above = np.array([*landing_m[:2], up[2]])
-    ways = ((place, up), (up, above), (above, landing_m - (0.0, 0.0, LIFT_M)))
-    return all(around.room(a, b, 1.0).contact_m > 0.0 for a, b in ways)
-
-
 def waiting(one: Exported) -> list[str]:
     """What a UAS does for others to be out of its way, as phrases that follow its name."""
     lines, waits = [], one.waits
     if one.track.layer:
         lines.append(one.track.layer)
     if waits.start_s:
-        lines.append(f"takes off {waits.start_s} s after the start of its mission")
+        lines.append(f"hovers for {waits.start_s} s where its take-off ends")
     if one.delay_s:
         lines.append(f"is started {one.delay_s:.0f} s later than it could be")
     if waits.leg is not None:

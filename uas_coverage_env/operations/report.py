@@ -6,22 +6,24 @@ from typing import Any
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission.lateness import Pair
-from uas_coverage_env.operations.apart import Part
+from uas_coverage_env.operations.apart import Part, Settled
 from uas_coverage_env.operations.charge import Charged
 from uas_coverage_env.operations.exported import Exported, waiting, waypoint_margins
+from uas_coverage_env.operations.failures import failures_of, low_charge, not_safe
+from uas_coverage_env.operations.formats.fence import ZONES
 from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.tracks import Tolerances
 
 
-def report(parts: Sequence[Part], frame: LocalFrame, tolerances: Tolerances) -> dict[str, Any]:
+def report(parts: Sequence[Part], frame: LocalFrame, settled: Settled) -> dict[str, Any]:
     """The report as plain data; times, charges and delays are those of the leg model.
 
     Args:
         parts: The flights of the mission, with their files.
         frame: Where on the Earth.
-        tolerances: Those of the export.
+        settled: How it was exported.
     """
-    flight = parts[0].flight
+    flight, tolerances = parts[0].flight, settled.tolerances
+    zones = [obstacle.kind in ZONES for obstacle in flight.scenario.obstacles]
     passed = [{w for one in part.exports for w in one.track.waypoints} for part in parts]
     return {
         "scenario": flight.scenario.name,
@@ -32,7 +34,9 @@ def report(parts: Sequence[Part], frame: LocalFrame, tolerances: Tolerances) -> 
         "waypoints": len(flight.scenario.waypoints),
         "waypoints_passed": sum(map(len, passed)),
         "duration_s": round(max(part.lands_s for part in parts), 1),
-        "uas": [_file(part, one) for part, one in _in_order(parts)],
+        "zones": sum(zones),
+        "obstacles_not_told": len(zones) - sum(zones),
+        "uas": [_file(part, one, settled) for part, one in _in_order(parts)],
         "turnarounds": _turnarounds(parts),
         "pairs": [_pair(pair, frame) for part in parts for pair in part.pairs],
     }
@@ -67,7 +71,7 @@ def _turnarounds(parts: Sequence[Part]) -> list[dict[str, Any]]:
     return sorted(found, key=lambda entry: entry["lands_s"])
 
 
-def _file(part: Part, one: Exported) -> dict[str, Any]:
+def _file(part: Part, one: Exported, settled: Settled) -> dict[str, Any]:
     flight: Flight = part.flight
     track, room = one.track, one.track.room
     sortie, dt_s = track.sortie, flight.scenario.dt_s
@@ -95,7 +99,10 @@ def _file(part: Part, one: Exported) -> dict[str, Any]:
         "waypoints_not_as_asked": len(one.not_as_asked),
         "picture_each_m": min(filter(None, one.triggers_m), default=None),
         "waypoint_margin_m": round(min(margins), 3) if margins else None,
-        "return_height_m": one.return_m,
+        "return_height_m": one.home.height_m,
+        "low_charge": low_charge(one),
+        "not_safe": list(not_safe(one)),
+        "failures": dict(failures_of(one, px4=settled.px4)),
         **_charge(one, one.still),
         "in_wind": None if one.in_wind is None else _in_wind(one, one.in_wind),
         "legs": [_leg(one, n) for n in range(len(track.legs))],

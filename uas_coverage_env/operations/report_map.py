@@ -11,7 +11,7 @@ from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.flight.seen import SEARCH_AREA
 from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.convex import hull_of
-from uas_coverage_env.operations.formats.qgc import ZONES
+from uas_coverage_env.operations.formats.fence import ZONES
 from uas_coverage_env.scenario import Decoration, Obstacle
 
 # custom properties of the page's style, so that it can be light or dark

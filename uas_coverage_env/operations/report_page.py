@@ -5,6 +5,7 @@ from html import escape
 from typing import Any
 
 from uas_coverage_env.operations.apart import Part
+from uas_coverage_env.operations.failures import FAILURES
 from uas_coverage_env.operations.report_map import DARK, LIGHT, key_of, map_of
 
 _STYLE = f"""
@@ -36,8 +37,9 @@ _COLUMNS = (
     "of all legs. Room: least distance from obstacles and fence beyond the safe distances, of "
     "which legs may use up 1 m. Return: the height at which a UAS can climb and fly straight home "
     "from anywhere on its path; where there is none, only the way that it came is known to be "
-    "clear."
+    "clear. Low charge: at what the vehicle comes home on its own, that way."
 )
+_EVENTS = {failure.event: n for n, failure in enumerate(FAILURES)}
 
 
 def report_page(parts: Sequence[Part], data: dict[str, Any], notes: Sequence[str]) -> str:
@@ -55,6 +57,7 @@ def report_page(parts: Sequence[Part], data: dict[str, Any], notes: Sequence[str
         map_of(parts),
         key_of(parts),
         _order(data),
+        _failing(data),
         _fleet(data["uas"]),
         _pairs(data),
         "<h2>Legs</h2>",
@@ -72,7 +75,10 @@ def _summary(data: dict[str, Any], notes: Sequence[str]) -> str:
     flying = len({uas["uas"] for uas in fleet})
     first = fleet[0]["legs"][-1]
     passed, all_of_them = data["waypoints_passed"], data["waypoints"]
-    lines = [
+    waits = [f"{uas['name']} {line}" for uas in fleet for line in uas["waits"]]
+    unsafe = [f"{uas['name']} {line}" for uas in fleet for line in uas["not_safe"]]
+    lines = [_marked(f"{escape(line)}.", True) for line in unsafe]
+    lines += [
         f"{_count(flying, 'UAS', 'UAS')} with {_count(len(fleet), 'file', 'files')}, "
         f"{_clock(data['duration_s'])} min from the first start to the last landing, near "
         f"{_degrees(first)}.",
@@ -88,9 +94,13 @@ def _summary(data: dict[str, Any], notes: Sequence[str]) -> str:
         late = "any delay" if slack_s is None else f"{slack_s:.0f} s"
         how = "as the order below says" if data["turnarounds"] else "at the same time"
         lines.append(f"Start the files {how}. Any UAS may be late by {late}.")
-    waits = [f"{uas['name']} {line}" for uas in fleet for line in uas["waits"]]
+        timed = sum(p["slack_s"] is not None for p in pairs)
+        lines.append(
+            f"Of {_count(len(pairs), 'pair', 'pairs')}, {timed} {'is' if timed == 1 else 'are'} "
+            f"kept apart by timing (see Delays), the others whatever the delay."
+        )
     lines += [f"To keep apart, {escape(line)}." for line in waits]
-    lines += [f"Note: {escape(note)}." for note in notes if note not in waits]
+    lines += [f"Note: {escape(note)}." for note in notes if note not in (*waits, *unsafe)]
     return f"<ul>{''.join(f'<li>{line}</li>' for line in lines)}</ul>"
 
 
@@ -190,12 +200,13 @@ def _fleet(fleet: Sequence[dict[str, Any]]) -> str:
                 f"{uas['off_path_m']:.1f}",
                 f"{uas['spare_room_m']:.1f}",
                 "the way it came" if height is None else f"at {height:g} m",
+                f"{uas['low_charge']['soc']:.0%} or {uas['low_charge']['voltage_V']:g} V",
             ]
         )
     head = [
         *("UAS", "flight (planned), s", "charge landed (planned)", "reserve", "spare"),
         *(("charge landed in wind", "spare in wind") if windy else ()),
-        *("off the path, m", "room, m", "return"),
+        *("off the path, m", "room, m", "return", "low charge"),
     ]
     return f"<h2>Fleet</h2>{_table(head, rows)}<p>{_COLUMNS}</p>"
 
@@ -207,6 +218,26 @@ def _comes_home(charge: dict[str, Any]) -> str:
             f"{least['spare']:.1%} at {least['time_s']:.0f} s, {least['spare_s']:.0f} s of flight"
         )
     return _marked(f"no return before leg {lost['leg']} ends, at {lost['time_s']:.0f} s", True)
+
+
+def _failing(data: dict[str, Any]) -> str:
+    """What vehicles do when something fails, and what they do not know."""
+    names: dict[tuple[str, str], list[str]] = {}
+    for uas in data["uas"]:
+        for failed in uas["failures"].items():
+            names.setdefault(failed, []).append(uas["name"])
+    rows = [
+        [escape(event), escape(", ".join(whose)), escape(then)]
+        for (event, then), whose in sorted(names.items(), key=lambda entry: _EVENTS[entry[0][0]])
+    ]
+    zones, obstacles = data["zones"], data["obstacles_not_told"]
+    text = (
+        f"<p>With their parameters loaded, too. The vehicles know the fence, its ceiling and "
+        f"{_count(zones, 'no-fly zone', 'no-fly zones')}, where the fence is uploaded with the "
+        f"mission; they do not know {_count(obstacles, 'obstacle', 'obstacles')}, each other, and "
+        f"what moves.</p>"
+    )
+    return f"<h2>If something fails</h2>{text}" + _table(["if", "UAS", "then"], rows)
 
 
 def _pairs(data: dict[str, Any]) -> str:

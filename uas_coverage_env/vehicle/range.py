@@ -179,6 +179,12 @@ def margin_to_land(seconds, obstructed):
     return _MARGIN_S + _MARGIN_SHARE * seconds + (_OBSTRUCTED_S if obstructed else 0.0)
 
 
+def level_power_W(vehicle: VehicleParams) -> float:
+    """Power of level flight at full speed [W]."""
+    drag_N = vehicle.thrust_correction.speed_N_per_mps * vehicle.limits.v_xy_max_mps
+    return vehicle.power.hover_W + vehicle.power.slope_W_per_N * drag_N
+
+
 def dod_per_s(vehicle: VehicleParams, dod: float) -> float:
     """Depth of discharge that a second of level flight at full speed takes [1/s].
 
@@ -186,9 +192,7 @@ def dod_per_s(vehicle: VehicleParams, dod: float) -> float:
         vehicle: Parameters.
         dod: Depth of discharge at which it flies; deeper, the same power takes more current.
     """
-    drag_N = vehicle.thrust_correction.speed_N_per_mps * vehicle.limits.v_xy_max_mps
-    power_W = vehicle.power.hover_W + vehicle.power.slope_W_per_N * drag_N
-    current_A = steady_current_A(vehicle.battery, dod, power_W)
+    current_A = steady_current_A(vehicle.battery, dod, level_power_W(vehicle))
     return current_A / (3600.0 * vehicle.battery.capacity_Ah)
 
 

@@ -4,49 +4,54 @@ from collections.abc import Callable, Mapping, Sequence
 
 from uas_coverage_env.operations.apart import Part
 from uas_coverage_env.operations.exported import Exported
-from uas_coverage_env.operations.formats.ardupilot import parameters_text, waypoints_text
+from uas_coverage_env.operations.formats.ardupilot import waypoints_text
+from uas_coverage_env.operations.formats.fence import fence_text
+from uas_coverage_env.operations.formats.parameters import PX4, Facts, param_text, params_text
 from uas_coverage_env.operations.formats.qgc import plan_text
 from uas_coverage_env.operations.formats.tracks import csv_text, geojson_text, kml_text
 from uas_coverage_env.operations.tracks import Tolerances
-from uas_coverage_env.scenario import Scenario
 
 Flown = Sequence[tuple[Part, Exported]]
 """The sorties of one UAS in their order, each with the flight that it is part of."""
 
-Writer = Callable[[str, Flown, Tolerances, str], Mapping[str, str]]
-"""Name of a UAS, its sorties, tolerances, autopilot -> name of a file and its text."""
+Writer = Callable[[str, Flown, Tolerances, str | None], Mapping[str, str]]
+"""Name of a UAS, its sorties, tolerances, firmware -> name of a file and its text."""
+
+_OneSortie = Callable[[Facts, str | None, int], Mapping[str, str]]
+"""A sortie, firmware, system id of its vehicle -> ending of a file and its text."""
 
 
-def _qgc(
-    scenario: Scenario, one: Exported, tolerances: Tolerances, autopilot: str
-) -> Mapping[str, str]:
-    files = {".plan": plan_text(scenario, one, tolerances, autopilot)}
-    if autopilot == "ardupilot":
-        files[".param"] = parameters_text(scenario, one, tolerances)
-    return files
+def _qgc(facts: Facts, firmware: str | None, system_id: int) -> Mapping[str, str]:
+    px4 = firmware == PX4
+    files = {
+        ".plan": plan_text(*facts, px4=px4),
+        ".params": params_text(facts, firmware, system_id),
+    }
+    return files if px4 else files | {".param": param_text(facts, firmware)}
 
 
-def _ardupilot(
-    scenario: Scenario, one: Exported, tolerances: Tolerances, autopilot: str
-) -> Mapping[str, str]:
-    del autopilot
+def _ardupilot(facts: Facts, firmware: str | None, system_id: int) -> Mapping[str, str]:
+    del system_id
     return {
-        ".waypoints": waypoints_text(one, tolerances),
-        ".param": parameters_text(scenario, one, tolerances),
+        ".waypoints": waypoints_text(facts.one, facts.tolerances),
+        ".fence": fence_text(facts.scenario, facts.one),
+        ".param": param_text(facts, firmware),
     }
 
 
-def _each(write: Callable[[Scenario, Exported, Tolerances, str], Mapping[str, str]]) -> Writer:
+def _each(write: _OneSortie) -> Writer:
     """Files for each sortie: a mission of an autopilot is one take-off and one landing."""
 
     def written(
-        name: str, flown: Flown, tolerances: Tolerances, autopilot: str
+        name: str, flown: Flown, tolerances: Tolerances, firmware: str | None
     ) -> Mapping[str, str]:
-        del name
+        system_id = 1 + flown[0][0].flight.names.index(name)
         return {
             f"{one.track.name}{ending}": text
             for part, one in flown
-            for ending, text in write(part.flight.scenario, one, tolerances, autopilot).items()
+            for ending, text in write(
+                Facts(part.flight.scenario, one, tolerances), firmware, system_id
+            ).items()
         }
 
     return written
@@ -60,5 +65,39 @@ FORMATS: Mapping[str, Writer] = {
     "csv": lambda name, flown, *_: {f"{name}.csv": csv_text(name, flown)},
 }
 
-ENDINGS = frozenset({".plan", ".waypoints", ".param", ".kml", ".geojson", ".csv"})
-"""Of the files of all formats."""
+AUTOPILOTS = ("qgc", "ardupilot")
+"""Formats that a vehicle flies, with parameters; the others are for maps and tables."""
+
+ENDINGS: Mapping[str, tuple[str, str, str]] = {
+    ".plan": (
+        "qgc",
+        "QGroundControl",
+        "take-off, waits, waypoints, speeds, heading, camera triggers, landing; the fence and "
+        "no-fly zones; a rally point where it lands",
+    ),
+    ".params": (
+        "qgc",
+        "QGroundControl of any version, for ArduPilot and for PX4",
+        "the parameters below, in QGroundControl's own form, for the vehicle of that system id: "
+        "`uas_1` is 1, `uas_2` is 2",
+    ),
+    ".param": (
+        "qgc, ardupilot",
+        "Mission Planner, MAVProxy; QGroundControl since June 2026; none for PX4",
+        "the same parameters, a line `NAME,VALUE` for each",
+    ),
+    ".waypoints": (
+        "ardupilot",
+        "Mission Planner, MAVProxy",
+        "the commands of `.plan` (QGC WPL 110), without fence and rally point",
+    ),
+    ".fence": ("ardupilot", "MAVProxy", "the fence and no-fly zones (QGC WPL 110)"),
+    ".kml": ("kml", "Google Earth and other maps", "the flown track and the legs of each sortie"),
+    ".geojson": ("geojson", "maps", "the same"),
+    ".csv": (
+        "csv",
+        "tables, `import-log`",
+        "the flown samples in degrees, of which sortie they are, charge, voltage and current",
+    ),
+}
+"""Of the files of all formats -> the formats that write them, for whom, and what they hold."""

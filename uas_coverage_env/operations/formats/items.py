@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from uas_coverage_env.operations.exported import Exported
 
-WAYPOINT, LAND, TAKE_OFF, DELAY, CHANGE_SPEED, TRIGGER_DISTANCE = 16, 21, 22, 93, 178, 206
+WAYPOINT, LAND, TAKE_OFF, YAW, CHANGE_SPEED, TRIGGER_DISTANCE = 16, 21, 22, 115, 178, 206
 """MAV_CMD."""
 
 MISSION_FRAME, RELATIVE_FRAME = 2, 3
@@ -15,8 +15,9 @@ LATITUDE, LONGITUDE, ALTITUDE = 4, 5, 6
 """Places in the seven parameters of an item with a place."""
 
 _NORTH_DEG = 0.0
-"""Heading at waypoints, as the world flies: cameras keep their wide side from west to east. Without
-one (NaN), an autopilot turns as it is set to, which is towards where it flies."""
+"""Heading, as the world flies: cameras keep their wide side from west to east. Without one, an
+autopilot turns as it is set to, which is towards where it flies. PX4 takes it from each waypoint.
+ArduCopter drops it there: it turns once, by an item, and keeps it where `WP_YAW_BEHAVIOR` is 0."""
 
 
 @dataclass(frozen=True)
@@ -34,22 +35,29 @@ class Item:
     params: tuple[float, ...]
 
 
-def items_of(one: Exported, corner_m: float) -> list[Item]:
-    """What is waited for, take-off, legs with their speeds and pictures, and landing.
+def items_of(one: Exported, corner_m: float, *, px4: bool) -> list[Item]:
+    """Take-off, the wait for others, legs with their speeds and pictures, and landing.
+
+    A wait is a stay at a waypoint: one on the ground would pass while a vehicle in AUTO is not
+    armed yet.
 
     Args:
         one: The UAS.
         corner_m: How far from a corner it may pass [m].
+        px4: Whether PX4 flies it; else, ArduPilot.
     """
     latitude, longitude, height = one.geodetic(one.track.take_off_m)
     ground = float(latitude), float(longitude)
     anyhow = (0.0, 0.0, 0.0, math.nan)
-    items = []
-    if one.waits.start_s:  # the time of day is not what it waits for
-        items.append(Item(DELAY, MISSION_FRAME, (one.waits.start_s, -1.0, -1.0, -1.0, 0, 0, 0)))
-    items.append(Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height))))
+    items = [Item(TAKE_OFF, RELATIVE_FRAME, (*anyhow, *ground, float(height)))]
+    turns = not px4 and not one.looks_ahead
+    heading_deg = _NORTH_DEG if px4 and not one.looks_ahead else math.nan
+    if one.waits.start_s:
+        items += [_turn()] * turns
+        turns = False
+        stay = float(one.waits.start_s), corner_m, 0.0, heading_deg
+        items.append(Item(WAYPOINT, RELATIVE_FRAME, (*stay, *ground, float(height))))
     set_mps, apart_m = None, 0.0
-    heading_deg = math.nan if one.looks_ahead else _NORTH_DEG
     for n, (leg, speed_mps, hold_s) in enumerate(
         zip(one.track.legs, one.speeds_mps, one.holds_s, strict=True)
     ):
@@ -59,6 +67,9 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
         if one.triggers_m[n] != apart_m:
             apart_m = one.triggers_m[n]
             items.append(_trigger(apart_m))
+        if turns:  # after what does not take time: it would keep that from being done
+            items.append(_turn())
+            turns = False
         place = (float(number) for number in one.geodetic(leg.end_m))
         first = (hold_s, corner_m, 0.0, heading_deg)
         items.append(Item(WAYPOINT, RELATIVE_FRAME, (*first, *place)))
@@ -67,6 +78,11 @@ def items_of(one: Exported, corner_m: float) -> list[Item]:
     latitude, longitude, _ = one.geodetic(one.track.landing_m)
     items.append(Item(LAND, RELATIVE_FRAME, (*anyhow, float(latitude), float(longitude), 0.0)))
     return items
+
+
+def _turn() -> Item:
+    """North, at the vehicle's own rate, whichever way is shorter."""
+    return Item(YAW, MISSION_FRAME, (_NORTH_DEG, 0.0, 0.0, 0.0, 0, 0, 0))
 
 
 def _trigger(apart_m: float) -> Item:
