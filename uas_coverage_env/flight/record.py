@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, LIMITS, PHI, WX, body_attitude
 
@@ -159,6 +160,7 @@ class FlightRecord:
         reward_terms: (T - 1, U, R) the weighted terms of the reward that an environment pays for
             these steps; None: a record from before they were kept.
         reward_names: (R,) of the terms.
+        of_log: What only a flight from a log has; None: it was simulated.
     """
 
     scenario: Scenario
@@ -191,6 +193,7 @@ class FlightRecord:
     open_waypoints: int | None = None
     reward_terms: NDArray[np.float64] | None = None
     reward_names: tuple[str, ...] = ()
+    of_log: OfLog | None = None
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""
@@ -231,6 +234,13 @@ class FlightRecord:
             first, last = np.rint(np.divide((swap.landed_s, swap.time_s), self.scenario.dt_s))
             resting[int(first) : int(last), self.names.index(swap.uas)] = True
         return resting
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(T, U) whether it is known where each was: always, but for gaps of a log."""
+        if self.of_log is None:
+            return np.ones(self.mode.shape, np.bool_)
+        return self.of_log.known(self.time_s, self.names)
 
     @property
     def attitude_rad(self) -> NDArray[np.float64]:
