@@ -81,8 +81,7 @@ def import_log(
             )
     screen.print(table)
     screen.print(f"beside its plan: uas-coverage replay {plan} {out}", markup=False)
-    estimates = made.flight.of_log.estimates if made.flight.of_log else ()
-    for note in (*made.notes, *map(str, estimates)):
+    for note in made.notes:
         sys.stderr.write(f"warning: {one_line(note)}\n")
 
 

@@ -1,4 +1,4 @@
-"""What only a flight from a log has: what of it is estimated, what is not known, where it covered."""
+"""What only a flight from a log has: what is estimated, what is not known, where it covered."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ class Estimate:
     Attributes:
         uas: Which UAS.
         what: `charge`, `current`, `voltage`, `height`, `attitude` or `flight`.
-        how: It was estimated.
+        how: It was estimated, in words that follow `estimated`.
     """
 
     uas: str
@@ -27,7 +27,7 @@ class Estimate:
 
     def __str__(self) -> str:
         """As a line for people."""
-        return f"{self.uas}: {self.what} estimated: {self.how}"
+        return f"{self.uas}: {self.what} estimated {self.how}"
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class Flown:
         flight: As the world judges it.
         off_path_m: UAS -> (N,) distance of each position of its log in the air from the planned
             path.
-        notes: What is to be known of the logs; `flight.of_log` has what was estimated.
+        notes: What is to be known of the logs, with what was estimated (`flight.of_log`).
     """
 
     flight: Flight
@@ -86,6 +86,7 @@ def flown_flight(
     for i, name in enumerate(names):
         if i in ways:
             notes += [f"{name}: {note}" for note in (*ways[i].notes, *flown.batteries[i].notes)]
+    notes += map(str, flown.estimates())
     flight = flown.flight()
     return Flown(
         flight,
@@ -196,7 +197,7 @@ class _Judged:
             ended="complete" if world.done else "stopped",
             wall_time_s=0.0,
             versions=recorded_versions(),
-            of_log=OfLog(tuple(self._estimates()), tuple(self._unknown()), tuple(passes)),
+            of_log=OfLog(tuple(self.estimates()), tuple(self._unknown()), tuple(passes)),
             **fields,
         )
 
@@ -206,7 +207,7 @@ class _Judged:
             return np.zeros(0)
         way = self._ways[i]
         times_s = way.log.time_s - self._begins_s
-        times_s = times_s[(0.0 <= times_s) & (times_s <= way.ends_s - self._begins_s)]
+        times_s = times_s[(times_s >= 0.0) & (times_s <= way.ends_s - self._begins_s)]
         near = np.rint(times_s / self._scenario.dt_s).astype(int)
         near = np.minimum(near, len(self._grid_s) - 1)
         same = np.abs(times_s - self._grid_s[near]) <= _SAME_S
@@ -271,17 +272,18 @@ class _Judged:
                 fields["voltage_V"][: last + 1, i] = battery.voltage_V[: last + 1]
                 fields["voltage_V"][last:, i] = battery.voltage_V[last]
 
-    def _estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[Estimate]:
+        """What was not measured."""
         found = []
         for i, uas in enumerate(self._scenario.uas):
             if i not in self._ways:
-                how = "it has no log: it is taken to have stayed at its start"
+                how = "as a stay at its start: it has no log"
                 found.append(Estimate(uas.name, "flight", how))
                 continue
             found += [*self._ways[i].estimates, *self.batteries[i].estimates]
             if uas.sensors and self._ways[i].log.attitude_rad is None:
                 found.append(
-                    Estimate(uas.name, "attitude", "its log has none: level, facing north")
+                    Estimate(uas.name, "attitude", "as level and facing north: its log has none")
                 )
         return found
 

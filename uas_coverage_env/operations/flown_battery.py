@@ -59,7 +59,7 @@ def battery_of(
         used = per_s * scenario.dt_s * np.append(0.0, np.cumsum(in_air[:-1]))
         # an estimate takes no UAS away
         dod = np.minimum(1.0 - uas.soc_0 + used, max(uas.dod_max, 1.0 - uas.soc_0))
-        how = "its log has none: as of level flight at full speed"
+        how = "as of level flight at full speed: its log has none"
         estimates.append(Estimate(uas.name, "charge", how))
     if log.current_A is not None:
         current_A = np.interp(times_s, log.time_s, log.current_A)

@@ -114,7 +114,7 @@ def way_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) 
         if abs(offset_m) > OFFSET_M:
             places_m = places_m + np.array([0.0, 0.0, offset_m])
             side = "high" if offset_m > 0.0 else "low"
-            how = f"its log is {abs(offset_m):.1f} m too {side} at take-off, and so all along"
+            how = f"from take-off, where it is {abs(offset_m):.1f} m too {side}, and so all along"
             estimates.append(Estimate(uas.name, "height", how))
     left_s, ends_s, home, said = _ends(scenario, flight, start_m, log.time_s, places_m)
     return Way(
@@ -153,13 +153,15 @@ def _believed(
         at_s = float(times_s[first])
         if after is None:
             notes.append(f"its position jumps by {far_m:.0f} m {flight.since(at_s)}, for good")
-        else:
-            good[first:after] = False
-            back = flight.since(float(times_s[after]))
-            notes.append(
-                f"its position jumps by {far_m:.0f} m {flight.since(at_s)} and comes back {back}: "
-                f"taken for a GPS glitch"
-            )
+            continue
+        good[first:after] = False
+        back = ""
+        if first > 0 and after < len(times_s):
+            back = f" and comes back {flight.since(float(times_s[after]))}"
+        notes.append(
+            f"its position jumps by {far_m:.0f} m {flight.since(at_s)}{back}: taken for a GPS "
+            f"glitch"
+        )
     if good.sum() < 2:  # nothing would be left
         return np.ones(len(times_s), np.bool_), [], notes
     kept_s, unknown = times_s[good], []
@@ -181,11 +183,10 @@ def _believed(
 def _jumps(
     times_s: FloatArray, places_m: FloatArray, good: NDArray[np.bool_], top_mps: float
 ) -> list[tuple[int, int | None, float]]:
-    """Where the position jumps, where it is back (None: never), and how far it jumped [m]."""
+    """Which positions have jumped: the first, the one after (None: all later), and how far [m]."""
     numbers = np.flatnonzero(good)
-    found: list[tuple[int, int | None, float]] = []
 
-    def too_far_m(n: int, m: int) -> float:
+    def jump_m(n: int, m: int) -> float:
         """How far it is from one to another, if that is too far, else 0."""
         far_m = float(np.linalg.norm(places_m[m] - places_m[n]))
         most_m = _JUMP_M + _JUMP_SPEEDS * top_mps * float(times_s[m] - times_s[n])
@@ -193,18 +194,28 @@ def _jumps(
 
     steps_m = np.linalg.norm(np.diff(places_m[numbers], axis=0), axis=1)
     most_m = _JUMP_M + _JUMP_SPEEDS * top_mps * np.diff(times_s[numbers])
-    # where a run of positions begins that do not jump
-    begins = [int(numbers[k + 1]) for k in np.flatnonzero(steps_m > most_m)]
-    ends = [int(numbers[k]) for k in np.flatnonzero(steps_m > most_m)]
-    trusted, away = None, None  # the last one that is believed; the first that is not, and how far
-    for before, first in zip(ends, begins, strict=True):
-        if away is None:
-            trusted, away = before, (first, too_far_m(before, first))
-        elif not too_far_m(trusted, first):
-            found.append((away[0], first, away[1]))
-            away = None
+    # runs of positions that do not jump; the first that lasts is believed
+    parts = np.split(numbers, 1 + np.flatnonzero(steps_m > most_m))
+    runs = [(int(part[0]), int(part[-1])) for part in parts]
+    lasts = [times_s[last] - times_s[first] >= LONGEST_GAP_S for first, last in runs]
+    begin = lasts.index(True) if True in lasts else 0
+    found: list[tuple[int, int | None, float]] = []
+    if begin:
+        first, after = runs[0][0], runs[begin][0]
+        found.append((first, after, jump_m(runs[begin - 1][1], after)))
+    trusted, away = runs[begin][1], None
+    for first, last in runs[begin + 1 :]:
+        far_m = jump_m(trusted, first)
+        if far_m and away is None:
+            away = (first, far_m)
+        elif not far_m:
+            if away is not None:
+                found.append((away[0], first, away[1]))
+            trusted, away = last, None
     if away is not None:
-        found.append((away[0], None, away[1]))
+        first, far_m = away
+        brief = times_s[-1] - times_s[first] < LONGEST_GAP_S
+        found.append((first, len(times_s) if brief else None, far_m))
     return found
 
 

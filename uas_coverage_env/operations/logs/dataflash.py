@@ -120,6 +120,8 @@ def read_bin(path: Path, battery: int | None) -> list[Logged]:
         raise InputError(f"{path}: is empty")
     streams = Streams()
     whole, dropped = _undamaged(content)
+    if not whole:
+        raise InputError(f"{path}: holds no position (POS); is it the log of a flight?")
     if dropped:
         streams.notes.append(f"{dropped} bytes of its log are damaged, and were passed over")
     source = path
