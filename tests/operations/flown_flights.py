@@ -26,7 +26,7 @@ FLIES_S = sum(
     np.linalg.norm(np.subtract(b, a)) / speed
     for a, b, speed in zip(_CORNERS, _CORNERS[1:], _SPEEDS_MPS, strict=False)
 )
-"""From the ground to the ground, out and back over the waypoints: 58 s."""
+"""From the ground to the ground, out and back over the waypoints."""
 
 
 def mission(obstacles=(), uas=2):

@@ -1,6 +1,6 @@
 /*
 Built from viewer/ by "npm ci && npm run build"; do not edit.
-sources sha256:699060ae59caf111de90e89d7a9e0465986d5db94669cd8a204c3d5b36196d6c
+sources sha256:2e47626b1e47f180250ce0cad0ac1e15641adfc367caf67efa7baa4673c69352
 
 Contains three.js 0.187.0:
 
