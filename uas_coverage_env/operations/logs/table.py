@@ -90,6 +90,16 @@ def _logged(uas: str, names: list[str], values: np.ndarray) -> Logged:
     sortie = by_name.pop(SORTIE, None)
     armed = None
     if sortie is not None and len(set(sortie.tolist())) > 1:
-        of_each = (t[sortie == number] for number in sorted(set(sortie.tolist())))
-        armed = tuple(Span(times[0], times[-1]) for times in of_each)
+        places = np.stack([latitude, longitude, height], axis=1)
+        armed = tuple(
+            Span(times[0], times[-1])
+            for of in (sortie == number for number in sorted(set(sortie.tolist())))
+            for times in [t[of][_moving(places[of])]]
+        )
     return Logged(uas, t, latitude, longitude, height, armed=armed, **by_name)
+
+
+def _moving(places: np.ndarray) -> slice:
+    """The rows (N, 3) without those before the first move and after the last: packs are swapped."""
+    moves = np.flatnonzero((np.diff(places, axis=0) != 0.0).any(axis=1))
+    return slice(int(moves[0]), int(moves[-1]) + 2) if len(moves) else slice(0, 1)
