@@ -27,8 +27,10 @@ LONGEST_GAP_S = 3.0
 """Between two positions a straight line is taken to have been flown; a longer time is a gap, unless
 the log is as slow as that."""
 
-_GAP_INTERVALS = 2.5
-_JUMP_M, _JUMP_SPEEDS = 5.0, 2.0
+GAP_INTERVALS = 2.5
+"""How many of the usual intervals a log may be silent for."""
+
+JUMP_M, JUMP_SPEEDS = 5.0, 2.0
 """From one position to the next a UAS moves by no more than a distance, and as many times its top
 speed; what does is no flight."""
 
@@ -166,7 +168,7 @@ def _believed(
         return np.ones(len(times_s), np.bool_), [], notes
     kept_s, unknown = times_s[good], []
     intervals_s = np.diff(kept_s)
-    longest_s = max(LONGEST_GAP_S, _GAP_INTERVALS * float(np.median(intervals_s)))
+    longest_s = max(LONGEST_GAP_S, GAP_INTERVALS * float(np.median(intervals_s)))
     numbers = np.flatnonzero(good)
     left_out = np.diff(numbers) > 1
     for k in np.flatnonzero(left_out | (intervals_s > longest_s)).tolist():
@@ -189,11 +191,11 @@ def _jumps(
     def jump_m(n: int, m: int) -> float:
         """How far it is from one to another, if that is too far, else 0."""
         far_m = float(np.linalg.norm(places_m[m] - places_m[n]))
-        most_m = _JUMP_M + _JUMP_SPEEDS * top_mps * float(times_s[m] - times_s[n])
+        most_m = JUMP_M + JUMP_SPEEDS * top_mps * float(times_s[m] - times_s[n])
         return far_m if far_m > most_m else 0.0
 
     steps_m = np.linalg.norm(np.diff(places_m[numbers], axis=0), axis=1)
-    most_m = _JUMP_M + _JUMP_SPEEDS * top_mps * np.diff(times_s[numbers])
+    most_m = JUMP_M + JUMP_SPEEDS * top_mps * np.diff(times_s[numbers])
     # runs of positions that do not jump; the first that lasts is believed
     parts = np.split(numbers, 1 + np.flatnonzero(steps_m > most_m))
     runs = [(int(part[0]), int(part[-1])) for part in parts]
