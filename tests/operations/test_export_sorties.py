@@ -261,14 +261,16 @@ def test_a_table_of_one_flight_leaves_no_second_out(flight):
     assert [float(row["t_s"]) for row in rows] == list(range(flight.last_sample[0]))
 
 
-def test_a_log_of_several_sorties_says_that_only_the_first_is_judged(flight, tmp_path):
+def test_a_table_of_several_sorties_holds_as_many_flights_of_which_one_is_judged(flight, tmp_path):
     (tmp_path / "uas_1.csv").write_text(made_of(flight, "csv").files["uas_1.csv"])
     (log,) = read_log(tmp_path / "uas_1.csv")
-    flown_again = flown_flight(flight, {"uas_1": log}, LocalFrame(HERE))
-    landed_s = next(swap.landed_s for swap in flight.swaps if swap.uas == "uas_1")
-    said = [note for note in flown_again.notes if "its log flies on after the landing" in note]
-    assert len(said) == 1
-    assert f"at {landed_s:g} s" in said[0]
+    swaps = [swap for swap in flight.swaps if swap.uas == "uas_1"]
+    with pytest.raises(InputError, match=f"holds {len(swaps) + 1} flights: 1 .*choose with --flig"):
+        flown_flight(flight, {"uas_1": log}, LocalFrame(HERE))
+    again = flown_flight(flight, {"uas_1": log}, LocalFrame(HERE), {"uas_1": 2}).flight
+    flown_s = swaps[1].landed_s - swaps[0].time_s
+    assert again.last_sample[0] * again.scenario.dt_s == pytest.approx(flown_s, abs=2.0)
+    assert again.soc[0, 0] == pytest.approx(0.29)  # with a fresh pack
 
 
 def test_the_command_exports_both_forms_and_says_what_to_swap_when(flight, chain, tmp_path, capsys):

@@ -125,6 +125,20 @@ def by_uas(flight: Flight) -> list[tuple[str, str, str, str, str]]:
     ]
 
 
+def of_log(flight: Flight) -> list[str]:
+    """What was estimated of a flight from a log, and when it is not known where a UAS was."""
+    if flight.of_log is None:
+        return []
+    return [
+        *map(str, flight.of_log.estimates),
+        *(
+            f"{one.uas}: where it was from {one.from_s:.1f} to {one.to_s:.1f} s is not known: "
+            f"{one.why}"
+            for one in flight.of_log.unknown
+        ),
+    ]
+
+
 def data(flight: Flight, directory: str) -> dict[str, Any]:
     """A flight as plain data for machines: `summary.json` and what identifies the flight."""
     return {

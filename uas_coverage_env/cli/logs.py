@@ -1,7 +1,7 @@
 """`uas-coverage import-log`: what was flown comes back in."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,9 +23,9 @@ def import_log(
     logs: Annotated[
         list[str],
         typer.Argument(
-            metavar="[UAS=]LOG...",
-            help="One file per UAS, named like it, or a table of several: .csv, or .bin and .tlog "
-            "of ArduPilot.",
+            metavar="[UAS=]LOG[:SYSTEM]...",
+            help="One file per UAS, named like it, or a table of several: .csv, .bin and .tlog of "
+            "ArduPilot, .ulg of PX4. SYSTEM chooses a vehicle of a .tlog that holds several.",
         ),
     ],
     plan: Annotated[Path, typer.Option(help="Flight directory whose files were flown.")],
@@ -33,6 +33,20 @@ def import_log(
     place: Annotated[
         str | None,
         typer.Option(metavar="LAT,LON", help="Of the origin, for a scenario without [place]."),
+    ] = None,
+    flight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[UAS=]N",
+            help="Which flight of a log that holds several, from 1 on; of one UAS, or of all.",
+        ),
+    ] = None,
+    battery: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[UAS=]N",
+            help="Which battery monitor, from 1 on, of one UAS, or of all; otherwise the first.",
+        ),
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the flight in --out.")
@@ -46,8 +60,11 @@ def import_log(
     planned = Flight.load(plan)
     scenario = planned.scenario
     there = place_of_flight(planned, asked_place(place))
+    numbers = _chosen("--flight", flight, planned.names)
+    batteries = _chosen("--battery", battery, planned.names)
     with extra():
-        made = flown_flight(planned, _by_uas(logs, planned.names), LocalFrame(there))
+        found = _by_uas(logs, planned.names, batteries)
+        made = flown_flight(planned, found, LocalFrame(there), numbers)
     keep_flight(made.flight, out, overwrite=overwrite)
     screen = console()
     report_flight(screen, made.flight, out)
@@ -68,7 +85,26 @@ def import_log(
         sys.stderr.write(f"warning: {one_line(note)}\n")
 
 
-def _by_uas(logs: Sequence[str], names: Sequence[str]) -> "dict[str, Logged]":
+def _chosen(option: str, texts: Sequence[str] | None, names: Sequence[str]) -> dict[str, int]:
+    """UAS -> the number that an option gives it; one without a UAS is that of all."""
+    found: dict[str, int] = {}
+    for text in texts or ():
+        name, equals, number = text.rpartition("=")
+        if equals and name not in names:
+            raise InputError(
+                f"{option} {text}: there is no UAS {name!r}; the plan has {', '.join(names)}"
+            )
+        if not (number.isascii() and number.isdecimal() and int(number) >= 1):
+            raise InputError(f"{option} {text}: give a number from 1 on, or UAS=NUMBER")
+        for of in [name] if equals else names:
+            if found.setdefault(of, int(number)) != int(number):
+                raise InputError(f"{option} {text}: {of} is given another one, too; give one")
+    return found
+
+
+def _by_uas(
+    logs: Sequence[str], names: Sequence[str], batteries: Mapping[str, int]
+) -> "dict[str, Logged]":
     """The logs by the UAS that they are of."""
     from uas_coverage_env.operations.logs import read_log
 
@@ -76,9 +112,10 @@ def _by_uas(logs: Sequence[str], names: Sequence[str]) -> "dict[str, Logged]":
     for text in logs:
         given, equals, rest = text.partition("=")
         told = given if equals and given in names else ""
-        path = Path(rest if told else text)
-        for logged in read_log(path):
-            name = told or logged.uas or _named_like(path, names)
+        path, system = _path_and_system(rest if told else text)
+        meant = told or _named_like(path, names)
+        for logged in _of_system(path, read_log(path, batteries.get(meant)), system):
+            name = told or logged.uas or meant
             if name not in names:
                 what = f"is of {name[:40]!r}" if name else "does not say of which UAS it is"
                 raise InputError(
@@ -88,6 +125,30 @@ def _by_uas(logs: Sequence[str], names: Sequence[str]) -> "dict[str, Logged]":
                 raise InputError(f"{path}: is a second log of {name}; give one")
             found[name] = logged
     return found
+
+
+def _path_and_system(text: str) -> tuple[Path, int | None]:
+    """A file, and which vehicle of it: the number behind a colon, unless a file is called so."""
+    before, colon, number = text.rpartition(":")
+    if colon and number.isascii() and number.isdecimal() and not Path(text).exists():
+        return Path(before), int(number)
+    return Path(text), None
+
+
+def _of_system(path: Path, logs: "list[Logged]", system: int | None) -> "list[Logged]":
+    """The log of a vehicle, all of a table; of several vehicles of a link one is to be chosen."""
+    systems = [logged.system for logged in logs if logged.system is not None]
+    listed = ", ".join(map(str, systems))
+    if system is None:
+        if len(systems) > 1:
+            raise InputError(
+                f"{path}: holds several vehicles (systems {listed}); choose one for each UAS, as "
+                f"in UAS={path.name}:{systems[0]}"
+            )
+        return logs
+    if system not in systems:
+        raise InputError(f"{path}: has no vehicle of system {system}; it has {listed or 'none'}")
+    return [logged for logged in logs if logged.system == system]
 
 
 def _named_like(path: Path, names: Sequence[str]) -> str:

@@ -18,6 +18,7 @@ from uas_coverage_env.cli.figures_of_flight import (
     by_uas,
     data,
     figures,
+    of_log,
     verdict,
 )
 from uas_coverage_env.cli.output import console
@@ -72,6 +73,8 @@ def show(
         out.print(each)
         for violation in flight.violations:
             out.print(f"violation: {violation}", markup=False)
+        for line in of_log(flight):
+            out.print(line, markup=False)
         out.print(verdict(flight), markup=False)
         if best := beside_the_best(flight):
             out.print(best, markup=False)

@@ -14,6 +14,7 @@ from typing import Any
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.metrics import summary
+from uas_coverage_env.flight.of_log import STATES
 from uas_coverage_env.flight.record import MODES, FlightRecord
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.toml_text import toml_text
@@ -33,6 +34,8 @@ PLAN_COLUMNS = ("t_s", "uas", "n", "x_m", "y_m", "z_m")
 REWARD_FILE = "rewards.csv"
 REWARD_COLUMNS = ("t_s", "uas")
 """Then one for each term."""
+PASS_FILE = "passes.csv"
+PASS_COLUMNS = ("t_s", "uas", *STATE_COLUMNS[:STATES])
 
 
 def check_directory(directory: Path, *, overwrite: bool) -> None:
@@ -59,12 +62,15 @@ def write_flight(flight: FlightRecord, directory: Path, *, overwrite: bool = Fal
         "moving_obstacles.csv": _csv(MOVING_COLUMNS, _moving_rows(flight, times)),
         "plan.csv": _csv(PLAN_COLUMNS, _plan_rows(flight, times)),
         **_reward_file(flight, times),
+        **_pass_file(flight),
         "run.json": _json(_run(flight)),
         # the summary last: where it is, the rest is
         "summary.json": _json(summary(flight)),
     }
     if flight.reward_terms is None:  # those of a former flight are not this one's
         (directory / REWARD_FILE).unlink(missing_ok=True)
+    if flight.of_log is None:
+        (directory / PASS_FILE).unlink(missing_ok=True)
     write_files(directory, {name: text.encode() for name, text in texts.items()})
     return directory
 
@@ -125,6 +131,14 @@ def _reward_file(flight: FlightRecord, times: Sequence[str]) -> dict[str, str]:
         if k < last[i]
     )
     return {REWARD_FILE: _csv((*REWARD_COLUMNS, *flight.reward_names), rows)}
+
+
+def _pass_file(flight: FlightRecord) -> dict[str, str]:
+    """What covered something, of a flight from a log; nothing of any other."""
+    if flight.of_log is None:
+        return {}
+    rows = ([repr(one.time_s), one.uas, *one.x] for one in flight.of_log.passes)
+    return {PASS_FILE: _csv(PASS_COLUMNS, rows)}
 
 
 def _run(flight: FlightRecord) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """Measures of one flight, each a pure function of its record, and the summary made of them."""
 
 from collections import Counter
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.flight.record import (
     LANDED,
     LIMIT,
@@ -171,6 +173,8 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         # a record from before rewards were kept stays as it was
         **({"return": episode_return(flight)} if flight.reward_terms is not None else {}),
         **({"reward_terms": reward_sums(flight)} if flight.reward_terms is not None else {}),
+        # of a log: what was not measured
+        **(_of_log(flight.of_log) if flight.of_log is not None else {}),
         "all_home": bool(home(flight).all()),
         "min_separation_m": flight.min_separation_m,
         "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
@@ -189,6 +193,13 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
         "versions": dict(flight.versions),
         "seed": flight.seed,
         "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
+    }
+
+
+def _of_log(of_log: OfLog) -> dict[str, Any]:
+    return {
+        "estimated": [asdict(one) for one in of_log.estimates],
+        "not_known": [asdict(one) for one in of_log.unknown],
     }
 
 

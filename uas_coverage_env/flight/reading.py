@@ -1,10 +1,12 @@
 """A flight directory read back: whoever hands one over, nothing in it is believed unchecked."""
 
 import csv
+import dataclasses
 import io
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -18,11 +20,14 @@ from uas_coverage_env.flight.directory import (
     FLIGHT_COLUMNS,
     INPUT_COLUMNS,
     MOVING_COLUMNS,
+    PASS_COLUMNS,
+    PASS_FILE,
     PLAN_COLUMNS,
     REWARD_COLUMNS,
     REWARD_FILE,
     STATE_COLUMNS,
 )
+from uas_coverage_env.flight.of_log import Estimate, OfLog, Pass, Unknown
 from uas_coverage_env.flight.record import (
     LIMIT,
     MODES,
@@ -73,6 +78,19 @@ class _LeftOpen(StrictModel):
     detail: str
 
 
+class _Estimate(StrictModel):
+    uas: str
+    what: str
+    how: str
+
+
+class _Unknown(StrictModel):
+    uas: str
+    from_s: float
+    to_s: float
+    why: str
+
+
 class _Planner(StrictModel):
     name: str
     options: dict[str, JsonValue]
@@ -85,6 +103,8 @@ class _Summary(StrictModel):
 
     violations: tuple[_Violation, ...]
     left_open: tuple[_LeftOpen, ...] = ()
+    estimated: tuple[_Estimate, ...] | None = None
+    not_known: tuple[_Unknown, ...] = ()
     breaches: Count
     height_breaches: Count = 0
     min_separation_m: float | None
@@ -138,9 +158,11 @@ def read_flight(directory: Path) -> dict[str, Any]:
     scenario = _parsed(directory / "scenario.json", Scenario, context={"folder": directory})
     samples = _read(directory / "flight.csv", lambda text: _flight_arrays(text, scenario))
     steps = len(samples["x"]) - 1
+    summary = _summary_fields(directory / "summary.json", scenario)
     return {
         "scenario": scenario,
-        **_summary_fields(directory / "summary.json", scenario),
+        **summary,
+        **_of_log(directory, summary.pop("of_log"), scenario),
         **_run_fields(directory / "run.json", scenario, steps),
         **samples,
         "moving_position_m": _read(
@@ -262,6 +284,29 @@ def _reward_arrays(text: str, scenario: Scenario, steps: int) -> dict[str, Any]:
     return {"reward_terms": terms, "reward_names": names}
 
 
+def _of_log(directory: Path, of_log: OfLog | None, scenario: Scenario) -> dict[str, Any]:
+    """What is estimated and not known, with what covered something; nothing of other flights."""
+    if of_log is None:
+        return {}
+    passes = _read(directory / PASS_FILE, lambda text: _passes(text, scenario))
+    return {"of_log": dataclasses.replace(of_log, passes=passes)}
+
+
+def _passes(text: str, scenario: Scenario) -> tuple[Pass, ...]:
+    index = {uas.name: i for i, uas in enumerate(scenario.uas)}
+
+    def read(row: list[str]) -> Pass:
+        time_s, uas, *x = row
+        _step(time_s, scenario)
+        _chosen("uas", uas, index)
+        return Pass(_number(time_s), uas, tuple(_number(value) for value in x))
+
+    found = _each(_rows(text, PASS_COLUMNS), read)
+    if any(one.time_s > other.time_s for one, other in pairwise(found)):
+        raise ValueError("its times are not in order")
+    return tuple(found)
+
+
 def _run_fields(path: Path, scenario: Scenario, steps: int) -> dict[str, Any]:
     run = _parsed(path, _Run)
     if len(run.decisions) != steps:
@@ -306,8 +351,23 @@ def _summary_fields(path: Path, scenario: Scenario) -> dict[str, Any]:
             _step(violation.time_s, scenario)
         except ValueError as error:
             raise InputError(f"{path}: was damaged: violations[{number}]: {error}") from error
+    for number, entry in enumerate((*(summary.estimated or ()), *summary.not_known)):
+        if entry.uas not in names:
+            raise InputError(
+                f"{path}: was damaged: entry {number} of estimated and not_known is of "
+                f"{_short(entry.uas)}; there are {', '.join(names)}"
+            )
+    fields = dict(summary)
+    estimated, unknown = fields.pop("estimated"), fields.pop("not_known")
+    of_log = None
+    if estimated is not None:
+        of_log = OfLog(
+            tuple(Estimate(**dict(one)) for one in estimated),
+            tuple(Unknown(**dict(one)) for one in unknown),
+        )
     return {
-        **dict(summary),
+        **fields,
+        "of_log": of_log,
         "violations": tuple(Violation(**dict(violation)) for violation in summary.violations),
         "left_open": tuple(LeftOpen(**dict(one)) for one in summary.left_open),
         "planner": summary.planner.name,

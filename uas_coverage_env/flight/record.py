@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, LIMITS, PHI, WX, body_attitude
 from uas_coverage_env.world import CONTACT_NAMES
@@ -225,6 +226,7 @@ class FlightRecord:
         reward_names: (R,) of the terms.
         left_open: Why waypoints were left open; empty, too, of a flight from a log, or from before
             that was kept.
+        of_log: What only a flight from a log has; None: it was simulated.
     """
 
     scenario: Scenario
@@ -258,6 +260,7 @@ class FlightRecord:
     reward_terms: NDArray[np.float64] | None = None
     reward_names: tuple[str, ...] = ()
     left_open: tuple[LeftOpen, ...] = ()
+    of_log: OfLog | None = None
 
     def __eq__(self, other: object) -> bool:
         """Flights are equal when every field is: arrays to the last bit, scenarios by content."""
@@ -298,6 +301,13 @@ class FlightRecord:
             first, last = np.rint(np.divide((swap.landed_s, swap.time_s), self.scenario.dt_s))
             resting[int(first) : int(last), self.names.index(swap.uas)] = True
         return resting
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(T, U) whether it is known where each was: always, but for gaps of a log."""
+        if self.of_log is None:
+            return np.ones(self.mode.shape, np.bool_)
+        return self.of_log.known(self.time_s, self.names)
 
     @property
     def attitude_rad(self) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ class _Story:
     """
 
     def __init__(self, flight: FlightRecord) -> None:
-        self._flight, self._flying = flight, _flying(flight)
+        self._flight, self._seen = flight, _seen(flight)
         self.known = flight.scenario
         self.since = {key: [0] * len(getattr(self.known, key)) for key in _GROWING}
         self.dropped: dict[int, int] = {}
@@ -183,7 +183,7 @@ class _Story:
         end = len(self._flight.x)
         for w in range(len(self.covered_at), len(self.known.waypoints)):
             since = self.since["waypoints"][w]
-            covered_at = _covered_at(self._flight.x, self._flying, self.known, w, since)
+            covered_at = _covered_at(self._seen, self.known, w, since)
             self.covered_at.append(covered_at)
             gaps_s = self.known.waypoints[w].again_after_s
             asked_later = bool(gaps_s) and covered_at < end
@@ -196,20 +196,36 @@ class _Story:
 
 def covered_since(flight: FlightRecord, known: Scenario, since: IntArray) -> IntArray:
     """(W,) the sample in which each waypoint was covered, not before `since`; T: never."""
-    flying = _flying(flight)
-    each = [_covered_at(flight.x, flying, known, w, k) for w, k in enumerate(since.tolist())]
+    seen = _seen(flight)
+    each = [_covered_at(seen, known, w, k) for w, k in enumerate(since.tolist())]
     return np.array(each, int)
 
 
-def _covered_at(
-    x: NDArray[np.float64], flying: NDArray[np.bool_], known: Scenario, w: int, since: int
-) -> int:
+class _Seen(NamedTuple):
+    """The states that may cover something, N in order of time: as a rule those of the samples."""
+
+    x: NDArray[np.float64]  # (N, U, 14)
+    flying: NDArray[np.bool_]  # (N, U)
+    sample: IntArray  # (N,) in which each counts
+    end: int  # T
+
+
+def _seen(flight: FlightRecord) -> _Seen:
+    end = len(flight.x)
+    if flight.of_log is None:
+        return _Seen(flight.x, _flying(flight), np.arange(end), end)
+    # a log is judged more often than at samples, and says what covered something
+    x, sample = flight.of_log.passing(flight.names, flight.x.shape[2], flight.scenario.dt_s)
+    return _Seen(x, np.ones(x.shape[:2], np.bool_), sample, end)
+
+
+def _covered_at(seen: _Seen, known: Scenario, w: int, since: int) -> int:
     """The sample in which a waypoint was covered that is there since a sample; T: never."""
     # what comes at a sample comes after that sample was judged
-    first = since + 1 if since else 0
-    covers = covering_samples(known, w, x[first:]) & flying[first:]
+    first = int(np.searchsorted(seen.sample, since + 1 if since else 0))
+    covers = covering_samples(known, w, seen.x[first:]) & seen.flying[first:]
     found = covers.any(axis=1)
-    return first + int(found.argmax()) if found.any() else len(x)
+    return int(seen.sample[first + found.argmax()]) if found.any() else seen.end
 
 
 def _flying(flight: FlightRecord) -> NDArray[np.bool_]:

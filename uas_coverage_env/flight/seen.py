@@ -210,7 +210,7 @@ def _seen(
 def _taken(flight: FlightRecord, samples: slice) -> dict[str, Iterator[_Picture]]:
     """Camera -> its pictures that count, in order of time."""
     x = flight.x[samples].copy()
-    flies = (flight.mode[samples] < LANDED) & ~flight.resting[samples]
+    flies = (flight.mode[samples] < LANDED) & ~flight.resting[samples] & flight.known[samples]
     x[..., PHI:WX] = flight.attitude_rad[samples]
     carried: dict[str, list[tuple[int, Sensor]]] = {}
     for i, uas in enumerate(flight.scenario.uas):

@@ -1,5 +1,6 @@
 """A flight from logs: put to the samples of its plan, and judged by the rules of the world."""
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,32 +12,30 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.log import FlightLog
+from uas_coverage_env.flight.of_log import STATES, Estimate, OfLog, Pass, Unknown
 from uas_coverage_env.flight.rollout import recorded_versions
 from uas_coverage_env.operations.corners import distances_m
+from uas_coverage_env.operations.flown_battery import Battery, battery_of, unused
+from uas_coverage_env.operations.flown_way import AT_HOME_M, Way, way_of
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged
+from uas_coverage_env.operations.logs.flights import chosen_flight
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation.flown import FlownWorld
-from uas_coverage_env.vehicle import (
-    DOD,
-    N_STATES,
-    PHI,
-    VX,
-    VehicleParams,
-    dod_per_s,
-    tilts_and_turn,
-)
-from uas_coverage_env.vehicle.battery import open_circuit_voltage
+from uas_coverage_env.simulation.flown import FlownWorld, Moments
+from uas_coverage_env.vehicle import DOD, N_STATES, PHI, VX, tilts_and_turn
+
+__all__ = ["AT_HOME_M", "PLANNER", "Flown", "flown_flight"]
 
 PLANNER = "log"
 """Name of the planner of what was flown elsewhere."""
 
-AT_HOME_M = 5.0
-"""Of its start, horizontally, a UAS on the ground is at home: satellite navigation is no better."""
-
-_LONGEST_GAP_S = 5.0
 _MOST_STEPS = 100_000
-_LIFT_M = 0.5
+
+_FINEST_S = 0.05
+"""Between two samples of a log that are judged: at full speed that is a metre."""
+
+_SAME_S = 1e-3
+"""A sample of a log that is no farther from one of the flight is that one."""
 
 FloatArray = NDArray[np.float64]
 
@@ -47,8 +46,9 @@ class Flown:
 
     Attributes:
         flight: As the world judges it.
-        off_path_m: UAS -> (N,) distance of each of its samples in the air from the planned path.
-        notes: What the logs do not say, and was assumed.
+        off_path_m: UAS -> (N,) distance of each position of its log in the air from the planned
+            path.
+        notes: What is to be known of the logs, with what was estimated (`flight.of_log`).
     """
 
     flight: Flight
@@ -56,102 +56,61 @@ class Flown:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Track:
-    """One UAS on the samples of the flight.
-
-    Attributes:
-        x: (T, 14).
-        resting: (T,) whether it stands at home for good.
-        voltage_V: (T,).
-        current_A: (T,).
-    """
-
-    x: FloatArray
-    resting: NDArray[np.bool_]
-    voltage_V: FloatArray
-    current_A: FloatArray
-
-
-def flown_flight(plan: Flight, logs: Mapping[str, Logged], frame: LocalFrame) -> Flown:
+def flown_flight(
+    plan: Flight,
+    logs: Mapping[str, Logged],
+    frame: LocalFrame,
+    numbers: Mapping[str, int] | None = None,
+) -> Flown:
     """The flight of some logs.
 
     Args:
         plan: The flight whose files were flown.
         logs: UAS -> what was logged; one without a log stayed at its start.
         frame: Where on the Earth it was.
+        numbers: UAS -> which flight of its log, from 1 on; of others it must be the only one.
 
     Raises:
-        InputError: The logs are of another place, or no flight of the plan.
+        InputError: The logs are of another place, of no flight of the plan, or of several.
     """
-    notes: list[str] = []
-    places_m = {
-        name: frame.to_ned(log.latitude_deg, log.longitude_deg, log.height_m)
-        for name, log in logs.items()
+    flights = {name: chosen_flight(log, (numbers or {}).get(name)) for name, log in logs.items()}
+    names = plan.names
+    ways = {
+        i: way_of(plan.scenario, i, flights[name], frame)
+        for i, name in enumerate(names)
+        if name in flights
     }
-    for name, places in places_m.items():
-        _check_place(plan.scenario, name, places)
-    times_s = _samples_s(plan.scenario.dt_s, logs, places_m)
-    scenario, dropped = _scenario(plan.scenario, len(times_s) - 1)
-    notes += dropped
-    tracks = []
-    for i, uas in enumerate(scenario.uas):
-        log = logs.get(uas.name)
-        if log is None:
-            notes.append(f"{uas.name} has no log: it is taken to have stayed at its start")
-            tracks.append(_grounded(scenario, i, len(times_s)))
-        else:
-            notes += [f"{uas.name}: {note}" for note in _gaps(log)]
-            track, said = _track(scenario, i, log, places_m[uas.name], times_s)
-            notes += [f"{uas.name}: {note}" for note in said]
-            tracks.append(track)
-    flight = _judged(scenario, tracks)
-    for i, (uas, track) in enumerate(zip(scenario.uas, tracks, strict=True)):
-        landed = int(flight.last_sample[i])
-        away_m = np.linalg.norm(track.x[landed:, :2] - uas.start_m[:2], axis=1)
-        if (away_m > AT_HOME_M).any():
-            notes.append(
-                f"{uas.name}: its log flies on after the landing at {landed * scenario.dt_s:g} s; "
-                f"only the sortie until then is judged"
-            )
-    off_path_m = {
-        uas.name: _off_path_m(plan, flight, i)
-        for i, uas in enumerate(scenario.uas)
-        if uas.name in logs
-    }
-    return Flown(flight, off_path_m, tuple(notes))
+    begins_s, steps = _clock(plan.scenario.dt_s, list(ways.values()))
+    scenario, notes = _scenario(plan.scenario, steps)
+    flown = _Judged(scenario, ways, begins_s, steps)
+    for i, name in enumerate(names):
+        if i in ways:
+            notes += [f"{name}: {note}" for note in (*ways[i].notes, *flown.batteries[i].notes)]
+    notes += map(str, flown.estimates())
+    flight = flown.flight()
+    return Flown(
+        flight,
+        {names[i]: _off_path_m(plan, flight, i, way, begins_s) for i, way in ways.items()},
+        tuple(notes),
+    )
 
 
-def _check_place(scenario: Scenario, name: str, places_m: FloatArray) -> None:
-    corners_m = scenario.fence.vertices_m
-    size_m = float(np.linalg.norm(np.ptp(corners_m, axis=0)))
-    away_m = np.linalg.norm(places_m - corners_m.mean(axis=0), axis=1).min()
-    if away_m > size_m:
-        raise InputError(
-            f"the log of {name} is never nearer than {away_m / 1e3:.1f} km to the mission; give "
-            f"the log of this place, or the right --place"
-        )
-
-
-def _samples_s(
-    dt_s: float, logs: Mapping[str, Logged], places_m: Mapping[str, FloatArray]
-) -> FloatArray:
-    """(T,) times of the samples on the clock of the logs: from the first that takes off."""
-    begins, ends = [], []
-    for name, log in logs.items():
-        up = np.flatnonzero(-places_m[name][:, 2] > _LIFT_M)
-        if len(up):
-            begins.append(log.time_s[max(up[0] - 1, 0)])
-            ends.append(log.time_s[min(up[-1] + 1, len(log.time_s) - 1)])
-    if not begins:
-        raise InputError(f"no log is higher than {_LIFT_M:g} m: it is of no flight")
-    steps = math.ceil((max(ends) - min(begins)) / dt_s) + 1
+def _clock(dt_s: float, ways: Sequence[Way]) -> tuple[float, int]:
+    """When the flight begins, on the clock of the logs, and how many steps it has."""
+    begins_s = min(way.flight.begins_s for way in ways)
+    steps = max(_last_step(way, begins_s, dt_s) for way in ways)
     if steps > _MOST_STEPS:
         raise InputError(
-            f"the logs last {max(ends) - min(begins):.0f} s, more than {_MOST_STEPS} steps; give "
-            f"logs of one flight on one clock"
+            f"the logs last {steps * dt_s:.0f} s, more than {_MOST_STEPS} steps; give logs of one "
+            f"flight on one clock"
         )
-    return min(begins) + dt_s * np.arange(steps + 1)
+    return begins_s, max(steps, 1)
+
+
+def _last_step(way: Way, begins_s: float, dt_s: float) -> int:
+    """The step in which it is home, or the last of which all is known."""
+    steps = (way.ends_s - begins_s) / dt_s
+    return math.ceil(steps - _SAME_S) if way.home else math.floor(steps + _SAME_S)
 
 
 def _scenario(scenario: Scenario, steps: int) -> tuple[Scenario, list[str]]:
@@ -175,136 +134,175 @@ def _scenario(scenario: Scenario, steps: int) -> tuple[Scenario, list[str]]:
     return scenario.model_copy(update=changes), notes if dropped else []
 
 
-def _gaps(log: Logged) -> list[str]:
-    gaps_s = np.diff(log.time_s)
-    worst = int(gaps_s.argmax())
-    if gaps_s[worst] <= _LONGEST_GAP_S:
-        return []
-    return [
-        f"nothing was logged for {gaps_s[worst]:.1f} s from {log.time_s[worst]:.1f} s on; a "
-        f"straight line is taken to have been flown"
-    ]
+class _Judged:
+    """The ways of all UAS, as the world judges them.
+
+    Args:
+        scenario: The mission.
+        ways: Index of UAS -> its way; one without stays at its start.
+        begins_s: When the flight begins, on the clock of the logs [s].
+        steps: How many it has.
+    """
+
+    def __init__(
+        self, scenario: Scenario, ways: Mapping[int, Way], begins_s: float, steps: int
+    ) -> None:
+        self._scenario, self._ways, self._begins_s = scenario, ways, begins_s
+        self._n_uas = len(scenario.uas)
+        self._grid_s = scenario.dt_s * np.arange(steps + 1)
+        # each as if it were the last: what ends away from home ends where its log does
+        self._last = [
+            _last_step(ways[i], begins_s, scenario.dt_s) if i in ways else 0
+            for i in range(self._n_uas)
+        ]
+        own_s = [self._own_s(i) for i in range(self._n_uas)]
+        self._time_s = np.unique(np.concatenate([self._grid_s, *own_s]))
+        self._measured = np.stack([np.isin(self._time_s, of_one) for of_one in own_s], axis=1)
+        self.batteries: list[Battery] = [self._battery(i) for i in range(self._n_uas)]
+        self._x = np.stack([self._states(i) for i in range(self._n_uas)], axis=1)
+
+    def flight(self) -> Flight:
+        """The flight."""
+        world = FlownWorld(self._scenario, self._x[0])
+        log, passes = FlightLog(world, self._scenario), self._starts()
+        known, ends = self._known(), np.searchsorted(self._time_s, self._grid_s)
+        n_steps = len(self._grid_s) - 1
+        home = np.array([i not in self._ways or self._ways[i].home for i in range(self._n_uas)])
+        last = np.array(self._last)
+        for k in range(1, n_steps + 1):
+            if world.done:
+                break
+            part = slice(ends[k - 1] + 1, ends[k] + 1)
+            moments = Moments(self._x[part], known[part], self._measured[part])
+            over = last <= k
+            gone = ~home & over if k < n_steps else np.zeros_like(home)
+            outcome, covering = world.follow(moments, home & over, gone)
+            passes += [self._pass(int(ends[k - 1]) + 1 + m, i) for m, i in covering]
+            for i, battery in enumerate(self.batteries):
+                outcome["voltage_V"][i] = battery.voltage_V[k - 1]
+                outcome["current_A"][i] = battery.current_A[k - 1]
+            outcome["returning"] = False  # no mode of the log
+            log.add({}, None, 0.0, None, outcome)
+        fields = log.series()
+        self._keep_measured(fields)
+        return Flight(
+            scenario=self._scenario,
+            planner=PLANNER,
+            planner_options={},
+            seed=0,
+            dynamics="lpv",
+            return_mode=False,
+            safety_filter=False,
+            disturbances=(),
+            ended="complete" if world.done else "stopped",
+            wall_time_s=0.0,
+            versions=recorded_versions(),
+            of_log=OfLog(tuple(self.estimates()), tuple(self._unknown()), tuple(passes)),
+            **fields,
+        )
+
+    def _own_s(self, i: int) -> FloatArray:
+        """(N,) when UAS i was measured, since the beginning of the flight [s]."""
+        if i not in self._ways:
+            return np.zeros(0)
+        way = self._ways[i]
+        times_s = way.log.time_s - self._begins_s
+        times_s = times_s[(times_s >= 0.0) & (times_s <= way.ends_s - self._begins_s)]
+        near = np.rint(times_s / self._scenario.dt_s).astype(int)
+        near = np.minimum(near, len(self._grid_s) - 1)
+        same = np.abs(times_s - self._grid_s[near]) <= _SAME_S
+        times_s = np.unique(np.where(same, self._grid_s[near], times_s))
+        times_s = times_s[times_s <= self._grid_s[-1]]
+        # of several in one interval, the first
+        _, first = np.unique(np.floor(times_s / _FINEST_S + _SAME_S), return_index=True)
+        return times_s[first]
+
+    def _battery(self, i: int) -> Battery:
+        if i not in self._ways:
+            return unused(self._scenario, i, len(self._grid_s))
+        way, at_s = self._ways[i], self._begins_s + self._grid_s
+        in_air = ~way.standing(at_s) & (at_s < way.ends_s)
+        return battery_of(self._scenario, i, way.log, at_s, in_air)
+
+    def _states(self, i: int) -> FloatArray:
+        """(M, 14) of UAS i at all moments."""
+        uas = self._scenario.uas[i]
+        x = np.zeros((len(self._time_s), N_STATES))
+        x[:, DOD] = np.interp(self._time_s, self._grid_s, self.batteries[i].dod)
+        if i not in self._ways:
+            x[:, :3] = uas.start_m
+            return x
+        way, start_m = self._ways[i], np.array(uas.start_m)
+        at_s, half_s = self._begins_s + self._time_s, 0.5 * self._scenario.dt_s
+        x[:, :3] = way.places_at(at_s, start_m)
+        moved_m = way.places_at(at_s + half_s, start_m) - way.places_at(at_s - half_s, start_m)
+        x[:, VX : VX + 3] = moved_m / (2.0 * half_s)
+        x[way.standing(at_s), VX : VX + 3] = 0.0
+        attitude_rad = way.attitude_at(at_s)
+        if attitude_rad is not None:
+            turns = uas.heading == "course"
+            x[:, PHI : PHI + 3] = tilts_and_turn(attitude_rad) if turns else attitude_rad
+        return x
+
+    def _known(self) -> NDArray[np.int8]:
+        """(M, U) what is known at each moment, see `Moments`."""
+        known = np.full(self._measured.shape, 2, np.int8)
+        for i, way in self._ways.items():
+            at_s = self._begins_s + self._time_s
+            there = way.knows(at_s)
+            known[~there, i] = 0
+            # the way to a moment leads through a gap where it or the moment before is in one
+            through = np.append(False, ~way.knows(0.5 * (at_s[1:] + at_s[:-1])))
+            known[there & through, i] = 1
+        return known
+
+    def _starts(self) -> list[Pass]:
+        return [self._pass(0, i) for i in range(self._n_uas)]
+
+    def _pass(self, moment: int, i: int) -> Pass:
+        time_s, x = float(self._time_s[moment]), self._x[moment, i, :STATES]
+        return Pass(time_s, self._scenario.uas[i].name, tuple(x.tolist()))
+
+    def _keep_measured(self, fields: dict[str, NDArray[np.float64]]) -> None:
+        """Put voltages that were measured back where the record has those of the model."""
+        n_samples = len(fields["voltage_V"])
+        for i, battery in enumerate(self.batteries):
+            if battery.measured_V:
+                last = min(self._last[i], n_samples - 1)
+                fields["voltage_V"][: last + 1, i] = battery.voltage_V[: last + 1]
+                fields["voltage_V"][last:, i] = battery.voltage_V[last]
+
+    def estimates(self) -> list[Estimate]:
+        """What was not measured."""
+        found = []
+        for i, uas in enumerate(self._scenario.uas):
+            if i not in self._ways:
+                how = "as a stay at its start: it has no log"
+                found.append(Estimate(uas.name, "flight", how))
+                continue
+            found += [*self._ways[i].estimates, *self.batteries[i].estimates]
+            if uas.sensors and self._ways[i].log.attitude_rad is None:
+                found.append(
+                    Estimate(uas.name, "attitude", "as level and facing north: its log has none")
+                )
+        return found
+
+    def _unknown(self) -> list[Unknown]:
+        return [
+            dataclasses.replace(
+                one, from_s=one.from_s - self._begins_s, to_s=one.to_s - self._begins_s
+            )
+            for _, way in sorted(self._ways.items())
+            for one in way.unknown
+        ]
 
 
-def _grounded(scenario: Scenario, i: int, n_samples: int) -> _Track:
-    x = np.zeros((n_samples, N_STATES))
-    x[:, :3], x[:, DOD] = scenario.uas[i].start_m, 1.0 - scenario.uas[i].soc_0
-    none = np.zeros(n_samples)
-    return _Track(x, np.ones(n_samples, np.bool_), none, none)
-
-
-def _track(
-    scenario: Scenario, i: int, log: Logged, places_m: FloatArray, times_s: FloatArray
-) -> tuple[_Track, list[str]]:
-    notes = []
-    start_m = np.array(scenario.uas[i].start_m)
-    at = _at_home(scenario, start_m, places_m)
-    away = np.flatnonzero(~at)
-    x = np.zeros((len(times_s), N_STATES))
-    x[:, :3] = _interpolated(times_s, log.time_s, places_m)
-    # the ground is under the volume in which missions are judged: how it gets to its start and
-    # from there to the ground is no part of them
-    x[:, 2] = np.minimum(x[:, 2], 0.0)
-    left_s, back_s = (
-        (log.time_s[max(away[0] - 1, 0)], log.time_s[min(away[-1] + 1, len(at) - 1)])
-        if len(away)
-        else (math.inf, -math.inf)
-    )
-    before = (times_s <= left_s) & at[0]
-    resting = (times_s >= back_s) & at[-1]
-    x[before | resting, :3] = start_m
-    x[:, VX : VX + 3] = np.gradient(x[:, :3], scenario.dt_s, axis=0)
-    x[before | resting, VX : VX + 3] = 0.0
-    if not at[-1]:
-        notes.append(f"its log ends away from home, at {log.time_s[-1]:.1f} s")
-    if log.attitude_rad is not None:
-        attitude_rad = _interpolated(times_s, log.time_s, log.attitude_rad)
-        turns = scenario.uas[i].heading == "course"
-        x[:, PHI : PHI + 3] = tilts_and_turn(attitude_rad) if turns else attitude_rad
-    in_air = ~(before | resting)
-    x[:, DOD], said = _depths(scenario, i, log, times_s, in_air)
-    voltage_V, current_A = _battery(scenario.vehicles[i], scenario.dt_s, log, times_s, x[:, DOD])
-    return _Track(x, resting, voltage_V, current_A), [*notes, *said]
-
-
-def _at_home(scenario: Scenario, start_m: FloatArray, places_m: FloatArray) -> NDArray[np.bool_]:
-    """(N,) whether a UAS is on the ground below its start, or on the way to it or from it."""
-    beside_m = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1)
-    top_m = max(-start_m[2], 0.0) + scenario.landing_distance_m
-    return (beside_m <= AT_HOME_M) & (-places_m[:, 2] <= top_m)
-
-
-def _interpolated(at_s: FloatArray, times_s: FloatArray, values: FloatArray) -> FloatArray:
-    return np.stack([np.interp(at_s, times_s, column) for column in values.T], axis=1)
-
-
-def _depths(
-    scenario: Scenario, i: int, log: Logged, times_s: FloatArray, in_air: NDArray[np.bool_]
-) -> tuple[FloatArray, list[str]]:
-    """(T,) depth of discharge, and what is to be said of it."""
-    uas, vehicle = scenario.uas[i], scenario.vehicles[i]
-    full = 1.0 - uas.soc_0
-    if log.used_Ah is not None:
-        used_Ah = np.interp(times_s, log.time_s, log.used_Ah)
-        used = (used_Ah - used_Ah[0]) / vehicle.battery.capacity_Ah
-        return np.minimum(full + used, 1.0), []
-    if log.soc is not None:
-        return 1.0 - np.interp(times_s, log.time_s, log.soc), []
-    per_s = dod_per_s(vehicle, full)
-    estimated = full + per_s * scenario.dt_s * np.append(0.0, np.cumsum(in_air[:-1]))
-    note = "its log has no charge: estimated as of level flight at full speed"
-    # an estimate takes no UAS away
-    return np.minimum(estimated, max(uas.dod_max, full)), [note]
-
-
-def _battery(
-    vehicle: VehicleParams, dt_s: float, log: Logged, times_s: FloatArray, dod: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(T,) voltage and current from a sample to the next; what was not logged, from the charge."""
-    battery = vehicle.battery
-    if log.current_A is not None:
-        current_A = np.interp(times_s, log.time_s, log.current_A)
-    else:
-        current_A = np.append(np.diff(dod), 0.0) * 3_600.0 * battery.capacity_Ah / dt_s
-    if log.voltage_V is not None:
-        return np.interp(times_s, log.time_s, log.voltage_V), current_A
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    return open_circuit_voltage(vehicle, dod) - resistance_ohm * current_A, current_A
-
-
-def _judged(scenario: Scenario, tracks: Sequence[_Track]) -> Flight:
-    x = np.stack([track.x for track in tracks], axis=1)
-    resting = np.stack([track.resting for track in tracks], axis=1)
-    voltage_V = np.stack([track.voltage_V for track in tracks], axis=1)
-    current_A = np.stack([track.current_A for track in tracks], axis=1)
-    world = FlownWorld(scenario, x[0])
-    log = FlightLog(world, scenario)
-    for k in range(1, len(x)):
-        if world.done:
-            break
-        outcome = world.follow(x[k], resting[k])
-        outcome["voltage_V"], outcome["current_A"] = voltage_V[k - 1], current_A[k - 1]
-        outcome["returning"] = False  # no mode of the log
-        log.add({}, None, 0.0, None, outcome)
-    return Flight(
-        scenario=scenario,
-        planner=PLANNER,
-        planner_options={},
-        seed=0,
-        dynamics="lpv",
-        return_mode=False,
-        safety_filter=False,
-        disturbances=(),
-        ended="complete" if world.done else "stopped",
-        wall_time_s=0.0,
-        versions=recorded_versions(),
-        **log.series(),
-    )
-
-
-def _off_path_m(plan: Flight, flight: Flight, i: int) -> FloatArray:
-    """(N,) distances of the samples that UAS i flew from the path that it was to fly [m]."""
-    places_m = flight.x[: flight.last_sample[i] + 1, i, :3]
+def _off_path_m(plan: Flight, flight: Flight, i: int, way: Way, begins_s: float) -> FloatArray:
+    """(N,) distances of the places that UAS i flew from the path that it was to fly [m]."""
+    ends_s = begins_s + flight.last_sample[i] * flight.scenario.dt_s
+    times_s = way.log.time_s
+    in_air = (times_s >= way.flight.take_off_s) & (times_s <= min(ends_s, way.ends_s))
+    places_m = way.places_m[in_air] if in_air.any() else way.places_m[:1]
     path_m = plan.x[: plan.last_sample[i] + 1, i, :3]
     nearest_m = np.linalg.norm(places_m - path_m[0], axis=1)
     for a, b in pairwise(path_m):

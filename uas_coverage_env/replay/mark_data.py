@@ -30,6 +30,8 @@ def marks(
 ) -> list[dict[str, Any]]:
     """Breaches, points of no return, fallbacks, large gaps and events and swaps, in order of time.
 
+    Of a flight from a log also what was estimated, and when it is not known where a UAS was.
+
     What lasts is one mark: `t_s`, `until_s`, `kind`, `uas` (None: of no one in particular) and
     `text`. Contacts and limits are not among them: the page has them as violations.
     """
@@ -40,6 +42,7 @@ def marks(
         *_gaps(flight),
         *_events(flight),
         *_swaps(flight),
+        *_of_log(flight),
     ]
     return sorted(found, key=lambda mark: mark["t_s"])
 
@@ -127,6 +130,20 @@ def _swaps(flight: Flight) -> Iterator[dict[str, Any]]:
             round(time_s / flight.scenario.dt_s) for time_s in (swap.landed_s, swap.time_s)
         )
         yield _mark(flight, first, last, "event", f"{swap.uas}: swaps its battery pack", swap.uas)
+
+
+def _of_log(flight: Flight) -> Iterator[dict[str, Any]]:
+    if flight.of_log is None:
+        return
+    for estimate in flight.of_log.estimates:
+        yield _mark(flight, 0, flight.steps, "estimated", str(estimate), estimate.uas)
+    for unknown in flight.of_log.unknown:
+        first, last = (
+            min(round(time_s / flight.scenario.dt_s), flight.steps)
+            for time_s in (unknown.from_s, unknown.to_s)
+        )
+        text = f"{unknown.uas}: where it was is not known ({unknown.why})"
+        yield _mark(flight, first, last, "not known", text, unknown.uas)
 
 
 def _runs(values: Sequence[Any]) -> Iterator[tuple[int, int]]:

@@ -1,6 +1,6 @@
 /*
 Built from viewer/ by "npm ci && npm run build"; do not edit.
-sources sha256:0c86ec0f804206352ca167c27373bf5bba9dd1bf6aaf974b3b679b1b651b6e98
+sources sha256:d4a94c9e2e631d54ba29ed8e295962179fd5718a1ed0872d2dfdbce0511a80d1
 
 Contains three.js 0.187.0:
 

@@ -1,7 +1,9 @@
 """One UAS of a log, whatever file it comes from."""
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,22 @@ from uas_coverage_env.files.errors import InputError
 FloatArray = NDArray[np.float64]
 
 _LONGEST_S = 24 * 3_600.0
+
+
+class Span(NamedTuple):
+    """From a time to another, of the clock of the log [s]."""
+
+    begins_s: float
+    ends_s: float
+    is_open: bool = False
+    """Whether it lasts on where the log ends."""
+
+
+class Said(NamedTuple):
+    """Something that the autopilot said, and when [s]."""
+
+    time_s: float
+    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +42,19 @@ class Logged:
         longitude_deg: (N,) [degrees].
         height_m: (N,) above the ground of home [m].
         attitude_rad: (N, 3) roll, pitch, yaw [rad]; None: not logged.
-        soc: (N,) state of charge [-]; None: not logged.
-        used_Ah: (N,) taken from the battery since the start [A h]; None: not logged.
+        soc: (N,) state of charge [-]; None: not logged. Beside `used_Ah`, what that is counted
+            from at the first sample.
+        used_Ah: (N,) taken from the battery [A h]: without `soc`, since it was full; None: not
+            logged.
         voltage_V: (N,) of the battery [V]; None: not logged.
         current_A: (N,) of the battery [A]; None: not logged.
+        system: Of telemetry, which vehicle of the link it is.
+        armed: When it was armed; None: not logged.
+        in_air: When its autopilot took it to be in the air; None: not logged.
+        glitches: When its autopilot took its position to be wrong.
+        said: Failsafes and the like.
+        notes: What its reader has to say of it.
+        source: The file.
     """
 
     uas: str
@@ -40,6 +67,22 @@ class Logged:
     used_Ah: FloatArray | None = None
     voltage_V: FloatArray | None = None
     current_A: FloatArray | None = None
+    system: int | None = None
+    armed: tuple[Span, ...] | None = None
+    in_air: tuple[Span, ...] | None = None
+    glitches: tuple[Span, ...] = ()
+    said: tuple[Said, ...] = ()
+    notes: tuple[str, ...] = ()
+    source: str = ""
+
+    def at(self, samples: NDArray[np.bool_]) -> Self:
+        """The same with some of its samples (N,)."""
+        changes = {
+            field.name: value[samples]
+            for field in dataclasses.fields(self)
+            if isinstance(value := getattr(self, field.name), np.ndarray)
+        }
+        return dataclasses.replace(self, **changes)
 
 
 def limited(path: Path, logged: Logged) -> Logged:

@@ -1,0 +1,163 @@
+"""PX4's logs (.ulg), by the fields of its uORB messages.
+
+The clock is that of the satellites (`vehicle_gps_position.time_utc_usec`), and without any the one
+that starts with the autopilot.
+"""
+
+import io
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.plain_files import read_bytes
+from uas_coverage_env.operations.logs.logged import Logged
+from uas_coverage_env.operations.logs.streams import (
+    UNKNOWN,
+    Armed,
+    Attitude,
+    Fact,
+    InAir,
+    Message,
+    Messages,
+    Position,
+    Power,
+    Streams,
+    facts_of_text,
+)
+
+_MOST_BYTES = 500_000_000
+_ARMED = 2
+"""Of `vehicle_status.arming_state`, in all versions."""
+
+Row = Mapping[str, Any]
+_HOME_ALT = "home_alt"
+"""What is added to a row of a position: the altitude of home at that time [m]."""
+
+
+def _attitude(m: Row) -> list[Fact]:
+    w, x, y, z = (m[f"q[{k}]"] for k in range(4))
+    return [
+        Attitude(
+            math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))),
+            math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        )
+    ]
+
+
+def _power(m: Row) -> list[Fact]:
+    def known(least: float, unit: float, *names: str) -> float:
+        value = next((float(m[name]) for name in names if name in m), UNKNOWN)
+        return unit * value if value >= least else UNKNOWN
+
+    return [
+        Power(
+            m["multi_id"],
+            0,
+            voltage_V=known(1e-3, 1.0, "voltage_v", "voltage_filtered_v"),
+            current_A=known(0.0, 1.0, "current_a", "current_filtered_a"),
+            used_Ah=known(0.0, 1e-3, "discharged_mah"),
+            soc=known(0.0, 1.0, "remaining"),
+        )
+    ]
+
+
+MESSAGES: Messages = {
+    "vehicle_global_position": Message(
+        "position", lambda m: [Position(m["lat"], m["lon"], m["alt"] - m[_HOME_ALT])]
+    ),
+    "home_position": Message("altitude of home", lambda m: []),
+    "vehicle_gps_position": Message("time of the satellites", lambda m: []),
+    "vehicle_attitude": Message("attitude", _attitude),
+    "battery_status": Message("batteries, by instance", _power),
+    "vehicle_status": Message(
+        "armed, disarmed (`arming_state`)", lambda m: [Armed(m["arming_state"] == _ARMED)]
+    ),
+    "vehicle_land_detected": Message("landed or not", lambda m: [InAir(not m["landed"])]),
+}
+"""Topic -> what is read of it; texts that were logged are read, too."""
+
+TEXTS = Message("GPS glitch, failsafes", lambda m: facts_of_text(m))
+
+
+def read_ulg(path: Path, battery: int | None) -> list[Logged]:
+    """A log of PX4.
+
+    Args:
+        path: The file.
+        battery: Which monitor, from 1 on; None: the first that there is.
+
+    Raises:
+        InputError: It cannot be read, or holds no position.
+    """
+    from pyulog import ULog
+
+    content = read_bytes(path, _MOST_BYTES)
+    if not content:
+        raise InputError(f"{path}: is empty")
+    try:
+        with redirect_stdout(io.StringIO()):  # it prints what is damaged
+            log: Any = ULog(io.BytesIO(content), list(MESSAGES))
+    except Exception as error:  # its parser raises whatever a damaged file makes it
+        raise InputError(f"{path}: cannot be read as a log: {error}") from error
+    streams = Streams()
+    if log.file_corruption:
+        streams.notes.append("parts of its log are damaged, and were passed over")
+    topics: dict[str, list[Any]] = {}
+    for topic in log.data_list:
+        topics.setdefault(topic.name, []).append(topic)
+    offset_s = _offset_s(topics)
+    home = topics.get("home_position")
+    try:
+        for name, message in MESSAGES.items():
+            for topic in topics.get(name, []):
+                # of all but batteries, others are spare sensors or estimates of their own
+                if topic.multi_id and name != "battery_status":
+                    continue
+                rows = _rows(topic, home[0] if home else None)
+                for time_s, row in rows:
+                    streams.add(offset_s + time_s, message.facts(row))
+    except KeyError as error:
+        raise InputError(f"{path}: {name} of its log has no field {error}") from error
+    for said in log.logged_messages:
+        streams.add(offset_s + 1e-6 * said.timestamp, TEXTS.facts(said.message))
+    if not home:
+        streams.notes.append("its log has no home_position: heights are above where it began")
+    return [streams.logged(path, "vehicle_global_position", battery)]
+
+
+def _rows(topic: Any, home: Any) -> Iterator[tuple[float, dict[str, Any]]]:
+    """Time [s] and fields of each message of a topic, with its instance and the height of home."""
+    columns = {name: values.tolist() for name, values in topic.data.items()}
+    times_us = topic.data["timestamp"]
+    if topic.name == "vehicle_global_position":
+        columns[_HOME_ALT] = _home_alt(times_us, topic.data["alt"], home).tolist()
+    for n, time_us in enumerate(times_us.tolist()):
+        row = {name: values[n] for name, values in columns.items()}
+        yield 1e-6 * time_us, {**row, "multi_id": topic.multi_id}
+
+
+def _home_alt(times_us: Any, alt: Any, home: Any) -> Any:
+    """(N,) the altitude of home as it was set last, or will be first [m]."""
+    if home is None:
+        return np.full(len(times_us), alt[0])
+    last = np.searchsorted(home.data["timestamp"], times_us, side="right") - 1
+    return home.data["alt"][np.maximum(last, 0)]
+
+
+def _offset_s(topics: Mapping[str, list[Any]]) -> float:
+    """From the clock of the autopilot to that of the satellites [s]; 0 where there is none."""
+    for topic in topics.get("vehicle_gps_position", []):
+        utc_us = topic.data.get("time_utc_usec")
+        if utc_us is not None and (utc_us > 0).any():
+            known = utc_us > 0
+            ahead_us = utc_us[known].astype(np.int64) - topic.data["timestamp"][known].astype(
+                np.int64
+            )
+            return 1e-6 * float(np.median(ahead_us))
+    return 0.0
