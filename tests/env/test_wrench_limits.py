@@ -66,7 +66,7 @@ def test_beyond_a_limit_each_step_is_paid_for_and_beyond_one_and_a_half_the_uas_
         beyond, lost = info["limits_exceeded"] != 0, used > 1.5
         assert beyond or used <= tolerance
         assert info["reward_terms"]["violation"] == (-10.0 if beyond else 0.0)
-        assert rewards["uas_1"] == sum(info["reward_terms"].values())
+        assert rewards["uas_1"] == pytest.approx(sum(info["reward_terms"].values()), abs=1e-12)
         assert info["contact"] == (ContactKind.LIMITS if lost else ContactKind.NONE)
         assert info["contact_with"] == -1
         assert info["status"] == (UasStatus.LOST if lost else UasStatus.FLYING)
