@@ -21,6 +21,8 @@ RTL, SMART_RTL, LANDS = "RTL", "SMART_RTL", "LAND"
 _BATTERY_ACTIONS = {1: LANDS, 2: RTL, 3: SMART_RTL, 4: SMART_RTL}
 _RADIO_ACTIONS = {1: RTL, 3: LANDS, 4: SMART_RTL, 5: SMART_RTL}
 _CONTINUE_IN_AUTO = 1
+_SLOWER, _TIDIES_S = 1.4, 10.0
+"""SmartRTL, as flown in its simulator in November 2026."""
 
 
 @dataclass
@@ -144,7 +146,8 @@ class Copter:
         if action == SMART_RTL:
             back = [p for p in places if -p[2] >= -self._corners[0][2] - 0.1][::-1]
             moving = [p for p, q in pairwise(back) if np.any(p != q)]
-            return way + moving + self._lands(self._corners[0])
+            slow = [moving[int(n / _SLOWER)] for n in range(int(_SLOWER * len(moving)))]
+            return way + [stop] * round(_TIDIES_S / DT_S) + slow + self._lands(self._corners[0])
         if action == RTL:
             most_m = self.values["FENCE_ALT_MAX"] - self.values["FENCE_MARGIN"]
             height_m = min(max(self._value("RTL_ALT_M", "RTL_ALT"), -stop[2]), most_m)

@@ -145,7 +145,8 @@ class Levels(NamedTuple):
         low_V: The same as a voltage in level flight [V]; reached earlier by a pack that holds less
             than it should.
         critical_soc: It lands where it is [-].
-        critical_V: Likewise [V].
+        critical_V: Likewise: the least voltage of the vehicle file, late, since it lands anywhere
+            then [V].
         capacity_mAh: Of the pack from how full it was put in until it is empty [mAh].
         rest_V: At which it is no longer as full as it is said to be at the start, at rest [V].
         suffices: Whether that brings it home from everywhere without ending a flight that goes
@@ -168,9 +169,16 @@ class Levels(NamedTuple):
 _UNEVEN = 0.02
 """How far below its lowest charge before the landing a flight as planned may come unnoticed [-]."""
 
+_WORN = np.linspace(0.3, 1.0, 15)
+"""Shares of its capacity that a pack may have left: a monitor that counts ampere-hours does not
+know, but the voltage falls."""
+
 _EARLIER = 1.0 / 3.0
-"""Of what a flight as planned has left above the low level, what the voltage comes before it: a
-worn pack's voltage falls although the ampere-hours that are counted do not tell."""
+"""Of what a flight as planned has left above the low level, what the voltage comes before it at
+least."""
+
+_NOTICED = 0.05
+"""How far above that of a worn pack the state of charge of a sound one is kept [-]."""
 
 _NOT_FULL = 0.2
 _STEP_V = 0.1
@@ -205,8 +213,8 @@ def levels(
     most = max(charge.most_home + 1.0 - dod_max, least)
     last = charge.legs[-1].soc
     low = min(max(last - _UNEVEN, least), most)
-    critical_V = max(_loaded_V(vehicle, critical), battery.voltage_min_V)
-    low_V = _loaded_V(vehicle, low + _EARLIER * max(last - low, 0.0))
+    critical_V = battery.voltage_min_V
+    low_V = _loaded_V(vehicle, _worn_soc(charge, soc_start, low))
     return Levels(
         low_soc=low,
         low_V=max(low_V, critical_V + _STEP_V),
@@ -216,6 +224,24 @@ def levels(
         rest_V=_rest_V(vehicle, soc_start - _NOT_FULL),
         suffices=bool(low <= last),
     )
+
+
+def _worn_soc(charge: Charged, soc_start: float, low: float) -> float:
+    """The lowest state of charge, of its own, at which a worn pack still brings its UAS home [-].
+
+    Not so high that a sound one gets there.
+    """
+    legs = charge.legs
+    used = np.array([0.0, *(soc_start - leg.soc for leg in legs)])
+    home = np.array([legs[0].home, *(leg.home for leg in legs)])
+    most = legs[-1].soc - _NOTICED
+    least = low + _EARLIER * max(legs[-1].soc - low, 0.0)
+    for soc in np.arange(least, most, 0.01).tolist():
+        drawn = (soc_start - soc) * _WORN
+        on_its_way = drawn <= used[-1]
+        if (soc * _WORN >= np.interp(drawn, used, home))[on_its_way].all():
+            return soc
+    return max(most, low)
 
 
 def _rest_V(vehicle: VehicleParams, soc: float) -> float:

@@ -39,6 +39,10 @@ _MARGIN_S, _MARGIN_SHARE = 4.0, 0.1
 _CLIMBING = 1.5
 """A second of climbing takes so much more than one of level flight."""
 
+_RETRACING, _TIDIES_S = 1.5, 15.0
+"""SmartRTL flies back 1.4 times as long as out, since it slows down at the points that it remembers
+of turns, and begins 10 s late, which it takes to tidy them up (flown in ArduCopter 4.7-dev)."""
+
 _MOST_TRIED = 6
 _FLYING_M = 0.5
 
@@ -245,8 +249,8 @@ class _Paths:
         stood_s = np.cumsum([0.0, *holds_s])
         done = np.searchsorted(followed.corner_s[1:], self.times_s, side="left")
         lands_s = landing_s(-float(followed.places_m[self._samples[0], 2]), self._by)
-        back_s = self._brakes_s + lands_s
-        back_s += np.maximum(self.times_s - followed.corner_s[0], 0.0) - stood_s[done]
+        out_s = np.maximum(self.times_s - followed.corner_s[0], 0.0) - stood_s[done]
+        back_s = self._brakes_s + _TIDIES_S + _RETRACING * out_s + lands_s
         on_s = followed.duration_s - self.times_s
         return _with_margin(np.where(flies_on, on_s, back_s))
 
