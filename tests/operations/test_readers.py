@@ -257,6 +257,8 @@ SOLID = {
     "a building of 20 levels": {"building": "yes", "building:levels": "20"},
     "nothing but a height": {"name": "thing", "height": 60},
     "a tag without a height": {"man_made": "tower"},
+    "a height in its name": {"name": "Tower 2 (60 m)"},
+    "feet in its name": {"name": "chimney 197ft"},
     "a kind": {"kind": "chimney", "name": "x", "height": "50-60 m"},
 }
 
@@ -273,6 +275,13 @@ def test_a_point_is_as_wide_as_its_kind_or_as_it_is_said_to_be():
     assert kept(drawn(mast), 20.0)[0] == pytest.approx(3.0, abs=0.2)
     mast["properties"]["diameter"] = 30
     assert kept(drawn(mast), 20.0)[0] == pytest.approx(15.0, abs=0.5)
+
+
+def test_the_height_in_the_name_of_a_point_counts_before_that_of_its_kind():
+    mast = of("Point", list(MIDDLE), name="Radio mast 105 m")
+    assert kept(drawn(mast), 104.0)[0] > 0.0
+    mast["properties"]["name"] = "mast 3, 20 m"
+    assert kept(drawn(mast), 24.0)[0] < 0.0
 
 
 def test_an_area_called_after_something_solid_is_refused_without_height_or_role():
