@@ -7,6 +7,7 @@ Tables are committed, so that a code host shows them too. They stand in any page
 in any README, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`; `PARTS` has the names.
 """
 
+import importlib
 import inspect
 import json
 import re
@@ -39,16 +40,6 @@ from uas_coverage_env.flight.registry import (
     KINDS,
     PlannerDescription,
     describe_planners,
-)
-from uas_coverage_env.operations.qgc_plan import ITEMS
-from uas_coverage_env.operations.roles import ROLES, SOLID_WORDS, UNSAID
-from uas_coverage_env.operations.tags import (
-    BUILDING,
-    GUESSED_M,
-    GUESSED_OTHER_M,
-    LOW,
-    MET_TALL,
-    STANDING,
 )
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
@@ -342,82 +333,21 @@ def _options(family: Sequence[PlannerDescription]) -> str:
     return "\n\n".join(lines)
 
 
-def area_roles() -> str:
-    """What a drawing may say of a thing, and what becomes of it by its shape."""
-    rows = []
-    for role, row in (*ROLES.items(), ("", UNSAID)):
-        spellings = ", ".join(f"`{one}`" for one in row.spellings)
-        rows.append(
-            (
-                f"`{role}`" if role else "nothing says it",
-                (row.meaning if role else "")
-                + (f". Also written {spellings}" if spellings else ""),
-                row.polygon,
-                "left out" if not role else row.polygon,
-                row.line,
-                row.point,
-            )
-        )
-    head = ("`role`", "meaning", "polygon", "closed line", "open line", "point")
-    return table(head, rows)
-
-
-def area_words() -> str:
-    """The words in names and folders that say a role."""
-    rows = [(f"`{role}`", ", ".join(row.words)) for role, row in ROLES.items() if row.words]
-    rows.insert(2, ("`obstacle`", ", ".join(SOLID_WORDS)))
-    return table(("role", "words"), rows)
-
-
-def plan_items() -> str:
-    """What becomes of what a QGroundControl plan holds."""
-    rows = [(f"`{kind}`", item.becomes) for kind, item in ITEMS.items()]
-    return table(("item of the mission", "becomes"), rows)
-
-
-def town_kinds() -> str:
-    """What is an obstacle of a town, how high and how wide where no tag says it."""
-    found: dict[tuple[str, float, float, bool], list[str]] = {}
-    for (key, value), what in STANDING.items():
-        tag = f"`{key}={value}`" if value != "*" else f"any other `{key}`"
-        found.setdefault(tuple(what), []).append(tag)
-    rows = [
-        (
-            ", ".join(tags),
-            f"`{kind}`",
-            f"{height_m:g}",
-            f"{half_m:g}" if half_m else "its outline alone",
-            "along its line" if along else "",
-        )
-        for (kind, half_m, height_m, along), tags in found.items()
-    ]
-    for height_m in sorted(set(GUESSED_M.values())):
-        tags = (f"`building={value}`" for value, high in GUESSED_M.items() if high == height_m)
-        rows.append((", ".join(tags), f"`{BUILDING}`", f"{height_m:g}", "10", ""))
-    rows.append(
-        ("any other `building`, `building:part`", f"`{BUILDING}`", f"{GUESSED_OTHER_M:g}", "10", "")
-    )
-    head = ("tag", "obstacle", "height, m", "half the width of a line, radius of a point, m", "")
-    return table(head, rows)
-
-
-def town_not_read() -> str:
-    """Tall kinds that are named and not read, and low values of keys that are mostly tall."""
-    met = ", ".join(f"`{key}={value}` ({high})" for (key, value), high in MET_TALL.items())
-    low = "; ".join(
-        f"`{key}` = {', '.join(f'`{value}`' for value in values)}" for key, values in LOW.items()
-    )
-    other = ", ".join(f"`{key}`" for key in LOW)
-    return (
-        f"Named with their number, and no obstacles unless a height is tagged: {met}; values of "
-        f"{other} that no table lists. Taken to be low: {low}."
-    )
-
-
 def _without_meanings(rows: str) -> str:
     """Of a table of features, the columns of indices and names."""
     cut = [line.split("|")[1:3] for line in rows.splitlines()]
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
+
+
+def of_operations(module: str, name: str) -> Callable[[], str]:
+    """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
+
+    def made() -> str:
+        found = importlib.import_module(f"uas_coverage_env.operations.{module}")
+        head, rows = getattr(found, name)()
+        return table(head, rows)
+
+    return made
 
 
 PARTS: dict[str, Callable[[], str]] = {
@@ -438,11 +368,11 @@ PARTS: dict[str, Callable[[], str]] = {
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
     "planners": planners,
-    "area_roles": area_roles,
-    "area_words": area_words,
-    "plan_items": plan_items,
-    "town_kinds": town_kinds,
-    "town_not_read": town_not_read,
+    "area_roles": of_operations("area_tables", "area_roles"),
+    "area_words": of_operations("area_tables", "area_words"),
+    "plan_items": of_operations("area_tables", "plan_items"),
+    "town_kinds": of_operations("area_tables", "town_kinds"),
+    "town_not_read": of_operations("area_tables", "town_not_read"),
 }
 
 
