@@ -1,5 +1,7 @@
 """Tables of pages on what readers make of files: roles, words, plans, kinds of a town."""
 
+from collections.abc import Sequence
+
 from uas_coverage_env.operations.qgc_plan import ITEMS
 from uas_coverage_env.operations.roles import ROLES, SOLID_WORDS, UNSAID
 from uas_coverage_env.operations.tags import (
@@ -11,7 +13,7 @@ from uas_coverage_env.operations.tags import (
     STANDING,
 )
 
-Table = tuple[tuple[str, ...], list[tuple[str, ...]]]
+Table = tuple[tuple[str, ...], Sequence[tuple[str, ...]]]
 
 
 def area_roles() -> Table:
