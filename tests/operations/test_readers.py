@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("shapely")
 pytest.importorskip("shapefile")
 import shapefile
-from drawings import feature
+from drawings import feature, imported
 from drawn_files import (
     MIDDLE,
     ZONE,
@@ -24,6 +24,7 @@ from drawn_files import (
 )
 from random_drawings import AREA, HOME, mission
 
+from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, read_drawings
 from uas_coverage_env.operations.drawing import LeftOut
 
@@ -368,3 +369,16 @@ def test_what_was_drawn_is_said_and_what_lies_outside_the_fence():
     assert "drawn: 1 area 'field', 2 no-fly zones 'NFZ …', 1 obstacle 'Tower A'" in said
     assert "heights guessed from their kind: 1 obstacle of 100 m 'Tower A'" in said
     assert "outside the fence, where no UAS flies: 1 no-fly zone 'NFZ 2'" in said
+
+
+def test_the_shipped_zones_a_structure_and_a_tower_are_flown_around(capsys):
+    scenario = imported("zones", "--flown-by", "autopilot")
+    kinds = sorted(obstacle.kind for obstacle in scenario.obstacles)
+    assert kinds == ["mast", "no_fly", "no_fly", "no_fly", "structure"]
+    out = capsys.readouterr().out
+    assert "left out: 2 points 'GCP …', 1 line 'footpath'" in out
+    flight = rollout(scenario, load_planner("trajectory"))
+    assert accomplished(flight)
+    for longitude, latitude, top_m in ((8.0036, 50.00075, 25.0), (8.0023, 50.0020, 75.0)):
+        place = LocalFrame(scenario.place).to_ned(latitude, longitude, top_m - 0.5)
+        assert min(hull.signed_distance(place) for hull in scenario.hulls) < 0.0
