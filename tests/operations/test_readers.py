@@ -21,6 +21,7 @@ from drawn_files import (
     placemark,
     polygon,
     refusal,
+    ring,
 )
 from random_drawings import AREA, HOME, mission
 
@@ -42,6 +43,8 @@ ATTRIBUTES = {
     "a kind": {"name": "school", "type": "NO FLY ZONE"},
     "a category": {"name": "hospital", "Category": "restricted"},
     "a description alone": {"name": "school", "description": "No-fly zone."},
+    "a remark alone": {"name": "school", "Bemerkung": "NFZ"},
+    "a key": {"name": "school", "no_fly": "yes"},
     "another language": {"name": "Flugverbotszone Grundschule"},
     "nothing but a role": {"Role": "nfz"},
     "a role in words": {"role": "no-fly zone"},
@@ -354,6 +357,16 @@ def test_a_point_within_the_geometry_of_a_polygon_is_its_label():
     depth, said = kept(kml(placemark("no-fly school", both)))
     assert depth > 30.0
     assert "left out: 1 label of a polygon 'no-fly school'" in said
+
+
+def test_a_key_that_says_no_does_not_count_and_a_polygon_may_have_two_outlines():
+    assert kept(drawn(feature(ZONE, name="school", no_fly=False)))[0] < 0.0
+    more = f"<outerBoundaryIs><LinearRing>{ring(ZONE)}</LinearRing></outerBoundaryIs>"
+    far = [[x + 0.001, y - 0.001] for x, y in ZONE]
+    assert kept(kml(placemark("NFZ", polygon(far, more))))[0] > 30.0
+    assert (
+        kept(kml(placemark("NFZ", polygon(far).replace("</Polygon>", f"{more}</Polygon>"))))[0] > 30
+    )
 
 
 def test_a_name_that_stands_twice_counts_twice():

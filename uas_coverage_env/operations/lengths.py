@@ -10,6 +10,7 @@ _UNITS_M = {
     **dict.fromkeys(("in", "inch", "inches", '"', "″", "”"), 0.0254),
     "cm": 0.01,
     "km": 1000.0,
+    **dict.fromkeys(("storey", "storeys", "story", "stories", "floor", "floors", "levels"), 3.2),
 }
 _NUMBER = re.compile(r"(\d{1,3}(?:,\d{3})+(?!\d)|\d+)(?:[.,](\d+))?\s*([a-z]+|['\"′’″”])?")
 
