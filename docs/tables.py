@@ -7,12 +7,13 @@ Tables are committed, so that a code host shows them too. They stand in any page
 in any README, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`; `PARTS` has the names.
 """
 
+import importlib
 import inspect
 import json
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -40,20 +41,6 @@ from uas_coverage_env.flight.registry import (
     KINDS,
     PlannerDescription,
     describe_planners,
-)
-from uas_coverage_env.operations import ENDINGS, FIRMWARES
-from uas_coverage_env.operations.failures import FAILURES
-from uas_coverage_env.operations.formats.parameters import PARAMETERS, Named
-from uas_coverage_env.operations.homeward import RETRACE, RETURN
-from uas_coverage_env.operations.qgc_plan import ITEMS
-from uas_coverage_env.operations.roles import ROLES, SOLID_WORDS, UNSAID
-from uas_coverage_env.operations.tags import (
-    BUILDING,
-    GUESSED_M,
-    GUESSED_OTHER_M,
-    LOW,
-    MET_TALL,
-    STANDING,
 )
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
@@ -347,185 +334,21 @@ def _options(family: Sequence[PlannerDescription]) -> str:
     return "\n\n".join(lines)
 
 
-def area_roles() -> str:
-    """What a drawing may say of a thing, and what becomes of it by its shape."""
-    rows = []
-    for role, row in (*ROLES.items(), ("", UNSAID)):
-        spellings = ", ".join(f"`{one}`" for one in row.spellings)
-        rows.append(
-            (
-                f"`{role}`" if role else "nothing says it",
-                (row.meaning if role else "")
-                + (f". Also written {spellings}" if spellings else ""),
-                row.polygon,
-                "left out" if not role else row.polygon,
-                row.line,
-                row.point,
-            )
-        )
-    head = ("`role`", "meaning", "polygon", "closed line", "open line", "point")
-    return table(head, rows)
-
-
-def area_words() -> str:
-    """The words in names and folders that say a role."""
-    rows = [(f"`{role}`", ", ".join(row.words)) for role, row in ROLES.items() if row.words]
-    rows.insert(2, ("`obstacle`", ", ".join(SOLID_WORDS)))
-    return table(("role", "words"), rows)
-
-
-def plan_items() -> str:
-    """What becomes of what a QGroundControl plan holds."""
-    rows = [(f"`{kind}`", item.becomes) for kind, item in ITEMS.items()]
-    return table(("item of the mission", "becomes"), rows)
-
-
-def town_kinds() -> str:
-    """What is an obstacle of a town, how high and how wide where no tag says it."""
-    found: dict[tuple[str, float, float, bool], list[str]] = {}
-    for (key, value), what in STANDING.items():
-        tag = f"`{key}={value}`" if value != "*" else f"any other `{key}`"
-        found.setdefault(tuple(what), []).append(tag)
-    rows = [
-        (
-            ", ".join(tags),
-            f"`{kind}`",
-            f"{height_m:g}",
-            f"{half_m:g}" if half_m else "its outline alone",
-            "along its line" if along else "",
-        )
-        for (kind, half_m, height_m, along), tags in found.items()
-    ]
-    for height_m in sorted(set(GUESSED_M.values())):
-        tags = (f"`building={value}`" for value, high in GUESSED_M.items() if high == height_m)
-        rows.append((", ".join(tags), f"`{BUILDING}`", f"{height_m:g}", "10", ""))
-    rows.append(
-        ("any other `building`, `building:part`", f"`{BUILDING}`", f"{GUESSED_OTHER_M:g}", "10", "")
-    )
-    head = ("tag", "obstacle", "height, m", "half the width of a line, radius of a point, m", "")
-    return table(head, rows)
-
-
-def town_not_read() -> str:
-    """Tall kinds that are named and not read, and low values of keys that are mostly tall."""
-    met = ", ".join(f"`{key}={value}` ({high})" for (key, value), high in MET_TALL.items())
-    low = "; ".join(
-        f"`{key}` = {', '.join(f'`{value}`' for value in values)}" for key, values in LOW.items()
-    )
-    other = ", ".join(f"`{key}`" for key in LOW)
-    return (
-        f"Named with their number, and no obstacles unless a height is tagged: {met}; values of "
-        f"{other} that no table lists. Taken to be low: {low}."
-    )
-
-
 def _without_meanings(rows: str) -> str:
     """Of a table of features, the columns of indices and names."""
     cut = [line.split("|")[1:3] for line in rows.splitlines()]
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
-def exported_files() -> str:
-    """What an export writes, and for whom."""
-    rows = [
-        (f"`{ending}`", ", ".join(f"`{kind}`" for kind in formats.split(", ")), whom, holds)
-        for ending, (formats, whom, holds) in ENDINGS.items()
-    ]
-    return table(("file", "`--format`", "for", "holds"), rows)
+def of_operations(module: str, name: str) -> Callable[[], str]:
+    """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
 
+    def made() -> str:
+        found = importlib.import_module(f"uas_coverage_env.operations.{module}")
+        head, rows = getattr(found, name)()
+        return table(head, rows)
 
-def autopilot_parameters() -> str:
-    """Every parameter that exports set, by its name in each firmware."""
-
-    def cell(named: Named | None) -> str:
-        unit = f" ({named.unit})" if named and named.unit else ""
-        return f"`{named.name}`{unit}" if named else ""
-
-    rows = [
-        (parameter.purpose, *(cell(parameter.names.get(key)) for key in FIRMWARES))
-        for parameter in PARAMETERS
-    ]
-    return table(("what", *(f"`{key}`" for key in FIRMWARES)), rows)
-
-
-def autopilot_failures() -> str:
-    """What vehicles do when something fails."""
-
-    def cell(says: Mapping[str, str]) -> str:
-        texts = [says[a].replace("{height:g} m", "its height") for a in (RETURN, RETRACE)]
-        if texts[0] == texts[1]:
-            return texts[0]
-        return f"{texts[0]}; where no such way is clear: {texts[1]}"
-
-    rows = [
-        (failure.event, cell(failure.copter), cell(failure.px4), failure.checked)
-        for failure in FAILURES
-    ]
-    return table(("if", "ArduCopter", "PX4", "checked"), rows)
-
-
-def log_formats() -> str:
-    """Every kind of log, and what is read of it."""
-    from uas_coverage_env.operations.logs import FORMATS  # needs the extra `ops`
-
-    rows = []
-    for ending, kind in FORMATS.items():
-        read = "; ".join(f"`{name}`: {meaning}" for name, meaning in kind.messages.items())
-        rows.append((f"`{ending}`", kind.of, read.replace("`logged texts`", "logged texts")))
-    return table(("file", "what it is", "what is read"), rows)
-
-
-def log_rules() -> str:
-    """What of a log is taken off, left out or refused."""
-    from uas_coverage_env.operations import flown_way as way
-    from uas_coverage_env.operations.logs import flights
-
-    at_home, beside = f"{way.AT_HOME_M:g} m", f"{way.BESIDE_M:g} m"
-    rows = [
-        ("armed, but never higher than " + f"{flights.RISE_M:g} m above the ground", "no flight"),
-        (
-            "several flights, or several vehicles on one link",
-            "refused, and listed; `--flight 2` or `--flight uas_1=2`, `uas_1=link.tlog:7` choose",
-        ),
-        (
-            "several battery monitors",
-            "the first is used, and said; `--battery 2` or `--battery uas_1=2` choose",
-        ),
-        (
-            f"no position for {way.LONGEST_GAP_S:g} s, or {way.GAP_INTERVALS:g} of the usual "
-            "intervals",
-            "a gap: named; nothing is judged in it",
-        ),
-        (
-            "a GPS glitch that the autopilot tells, until it is cleared; positions that jump (more "
-            f"than {way.JUMP_M:g} m and {way.JUMP_SPEEDS:g} times the top speed) and come back",
-            "named; nothing is judged until it is over",
-        ),
-        ("positions that jump for good", "named, and judged as they are"),
-        (
-            "a height at take-off that is not between the ground and the start, by more than "
-            f"{way.OFFSET_M:g} m",
-            "an offset of the barometer: taken off all heights, and said",
-        ),
-        (
-            f"a take-off more than {at_home}, and up to {beside}, from the start",
-            "said; it is taken to stand at its start, and home is where it took off",
-        ),
-        (
-            f"a landing more than {at_home} from home",
-            "said: it is not home, and out of the mission while others fly on (`lost`)",
-        ),
-        (
-            "a log that ends in the air",
-            "said; the flight of that UAS ends there, in the mode `lost` while others fly on",
-        ),
-        ("damaged parts of a file", "passed over, and counted or named as a gap"),
-        (
-            "another place, a clock that goes back, no position, an empty file",
-            "refused in a line",
-        ),
-    ]
-    return table(("in the log", "what is done"), rows)
+    return made
 
 
 PARTS: dict[str, Callable[[], str]] = {
@@ -547,16 +370,20 @@ PARTS: dict[str, Callable[[], str]] = {
     "event_fields": event_fields,
     "planners": planners,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
-    "area_roles": area_roles,
-    "area_words": area_words,
-    "plan_items": plan_items,
-    "town_kinds": town_kinds,
-    "town_not_read": town_not_read,
-    "exported_files": exported_files,
-    "autopilot_parameters": autopilot_parameters,
-    "autopilot_failures": autopilot_failures,
-    "log_formats": log_formats,
-    "log_rules": log_rules,
+    "area_roles": of_operations("area_tables", "area_roles"),
+    "area_words": of_operations("area_tables", "area_words"),
+    "plan_items": of_operations("area_tables", "plan_items"),
+    "town_kinds": of_operations("area_tables", "town_kinds"),
+    "town_not_read": of_operations("area_tables", "town_not_read"),
+    "exported_files": of_operations("export_tables", "exported_files"),
+    "autopilot_parameters": of_operations("export_tables", "autopilot_parameters"),
+    "autopilot_failures": of_operations("export_tables", "autopilot_failures"),
+    "stream_troubles": of_operations("stream_tables", "stream_troubles"),
+    "stream_failsafes": of_operations("stream_tables", "stream_failsafes"),
+    "stream_reactions": of_operations("stream_tables", "stream_reactions"),
+    "stream_limits": of_operations("stream_tables", "stream_limits"),
+    "log_formats": of_operations("log_tables", "log_formats"),
+    "log_rules": of_operations("log_tables", "log_rules"),
 }
 
 

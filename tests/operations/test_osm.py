@@ -121,7 +121,7 @@ def test_a_building_of_which_the_file_lacks_corners_is_told(capsys):
     part = osm().replace('<nd ref="3"/>', '<nd ref="99"/>')  # of the house
     more = cut.format(8, 14) + cut.format(9, 13)  # node 13 is outside
     town(part.replace("<relation", f"{more}<relation"))
-    assert "2 buildings or woods in the area lack corners in the file" in capsys.readouterr().out
+    assert "2 outlines in the area lack corners in the file" in capsys.readouterr().out
 
 
 SQUARE_OF = "".join(f'<nd ref="{n}"/>' for n in (8, 9, 10, 8))
@@ -173,6 +173,13 @@ def test_whatever_has_a_height_is_an_obstacle(tags, kind, top_m):
     assert top_m in tops_m(town(osm(node)))[kind]
     scenario = town(with_way(9, SQUARE_OF, tags_of(**tags)))
     assert top_m in tops_m(scenario)[kind]
+
+
+@pytest.mark.parametrize("refs", [(8, 9, 10, 8), (1, 3, 2, 4, 1)])
+def test_a_closed_way_of_which_nothing_is_missing_is_an_outline_whatever_it_is_like(refs):
+    corners = "".join(f'<nd ref="{n}"/>' for n in refs)  # the second crosses itself
+    scenario = town(with_way(9, corners, tags_of(man_made="chimney", area="no", height="90")))
+    assert 90.0 in tops_m(scenario)["mast"]
 
 
 def test_cables_are_walls_along_their_line_also_where_it_is_closed():
@@ -228,7 +235,7 @@ def test_a_building_without_an_area_does_not_spoil_the_others(capsys):
     dot = '<way id="9"><nd ref="14"/><nd ref="14"/><nd ref="14"/><nd ref="14"/>{}</way><relation'
     dot = dot.format('<tag k="building" v="yes"/>')
     assert tops_m(town(osm().replace("<relation", dot))) == tops_m(town(osm()))
-    assert "1 buildings or woods in the area lack corners" in capsys.readouterr().out
+    assert "1 outlines in the area lack corners" in capsys.readouterr().out
 
 
 def test_who_takes_off_in_a_wood_is_told_where(capsys):

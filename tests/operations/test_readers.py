@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("shapely")
 pytest.importorskip("shapefile")
 import shapefile
-from drawings import feature
+from drawings import feature, imported
 from drawn_files import (
     MIDDLE,
     ZONE,
@@ -21,9 +21,11 @@ from drawn_files import (
     placemark,
     polygon,
     refusal,
+    ring,
 )
 from random_drawings import AREA, HOME, mission
 
+from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, read_drawings
 from uas_coverage_env.operations.drawing import LeftOut
 
@@ -41,6 +43,8 @@ ATTRIBUTES = {
     "a kind": {"name": "school", "type": "NO FLY ZONE"},
     "a category": {"name": "hospital", "Category": "restricted"},
     "a description alone": {"name": "school", "description": "No-fly zone."},
+    "a remark alone": {"name": "school", "Bemerkung": "NFZ"},
+    "a key": {"name": "school", "no_fly": "yes"},
     "another language": {"name": "Flugverbotszone Grundschule"},
     "nothing but a role": {"Role": "nfz"},
     "a role in words": {"role": "no-fly zone"},
@@ -257,6 +261,8 @@ SOLID = {
     "a building of 20 levels": {"building": "yes", "building:levels": "20"},
     "nothing but a height": {"name": "thing", "height": 60},
     "a tag without a height": {"man_made": "tower"},
+    "a height in its name": {"name": "Tower 2 (60 m)"},
+    "feet in its name": {"name": "chimney 197ft"},
     "a kind": {"kind": "chimney", "name": "x", "height": "50-60 m"},
 }
 
@@ -273,6 +279,13 @@ def test_a_point_is_as_wide_as_its_kind_or_as_it_is_said_to_be():
     assert kept(drawn(mast), 20.0)[0] == pytest.approx(3.0, abs=0.2)
     mast["properties"]["diameter"] = 30
     assert kept(drawn(mast), 20.0)[0] == pytest.approx(15.0, abs=0.5)
+
+
+def test_the_height_in_the_name_of_a_point_counts_before_that_of_its_kind():
+    mast = of("Point", list(MIDDLE), name="Radio mast 105 m")
+    assert kept(drawn(mast), 104.0)[0] > 0.0
+    mast["properties"]["name"] = "mast 3, 20 m"
+    assert kept(drawn(mast), 24.0)[0] < 0.0
 
 
 def test_an_area_called_after_something_solid_is_refused_without_height_or_role():
@@ -346,6 +359,16 @@ def test_a_point_within_the_geometry_of_a_polygon_is_its_label():
     assert "left out: 1 label of a polygon 'no-fly school'" in said
 
 
+def test_a_key_that_says_no_does_not_count_and_a_polygon_may_have_two_outlines():
+    assert kept(drawn(feature(ZONE, name="school", no_fly=False)))[0] < 0.0
+    more = f"<outerBoundaryIs><LinearRing>{ring(ZONE)}</LinearRing></outerBoundaryIs>"
+    far = [[x + 0.001, y - 0.001] for x, y in ZONE]
+    assert kept(kml(placemark("NFZ", polygon(far, more))))[0] > 30.0
+    assert (
+        kept(kml(placemark("NFZ", polygon(far).replace("</Polygon>", f"{more}</Polygon>"))))[0] > 30
+    )
+
+
 def test_a_name_that_stands_twice_counts_twice():
     zone = {**feature(ZONE), "properties": {"name": "polygon 7", "Name": "NFZ"}}
     assert kept(drawn(zone))[0] > 30.0
@@ -359,3 +382,16 @@ def test_what_was_drawn_is_said_and_what_lies_outside_the_fence():
     assert "drawn: 1 area 'field', 2 no-fly zones 'NFZ …', 1 obstacle 'Tower A'" in said
     assert "heights guessed from their kind: 1 obstacle of 100 m 'Tower A'" in said
     assert "outside the fence, where no UAS flies: 1 no-fly zone 'NFZ 2'" in said
+
+
+def test_the_shipped_zones_a_structure_and_a_tower_are_flown_around(capsys):
+    scenario = imported("zones", "--flown-by", "autopilot")
+    kinds = sorted(obstacle.kind for obstacle in scenario.obstacles)
+    assert kinds == ["mast", "no_fly", "no_fly", "no_fly", "structure"]
+    out = capsys.readouterr().out
+    assert "left out: 2 points 'GCP …', 1 line 'footpath'" in out
+    flight = rollout(scenario, load_planner("trajectory"))
+    assert accomplished(flight)
+    for longitude, latitude, top_m in ((8.0036, 50.00075, 25.0), (8.0023, 50.0020, 75.0)):
+        place = LocalFrame(scenario.place).to_ned(latitude, longitude, top_m - 0.5)
+        assert min(hull.signed_distance(place) for hull in scenario.hulls) < 0.0

@@ -203,3 +203,43 @@ def test_openstreetmap_keeps_what_stands(things):
     for thing in things:
         for height_m in (1.0, thing.height_m - 0.5):
             assert depth_m(scenario, *place_of(thing), min(height_m, 109.0)) > 0.0, (thing, said)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers(-200, 200) | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner),
+    max_leaves=6,
+)
+KEYS = st.sampled_from(
+    [
+        *("name", "Role", "height", "radius", "width", "man_made", "building", "weight", "camera"),
+        *("tags", "building:levels", "height_m", "description", "kind", "generator:source"),
+    ]
+)
+KINDS = ["Point", "LineString", "Polygon", "MultiPolygon", "GeometryCollection", "MultiPoint", "x"]
+GEOMETRY = st.fixed_dictionaries(
+    {"type": st.sampled_from(KINDS)},
+    optional={"coordinates": JSON, "geometries": JSON, "crs": JSON},
+)
+
+
+@EXAMPLES
+@given(
+    attributes=st.dictionaries(KEYS, JSON, max_size=4),
+    geometry=st.one_of(JSON, GEOMETRY, st.just({"type": "Polygon", "coordinates": [AREA]})),
+    crs=st.none() | JSON,
+)
+def test_whatever_json_holds_is_read_or_refused_in_one_line(attributes, geometry, crs):
+    one = feature_of(geometry, attributes)
+    try:
+        text = json.dumps({"type": "FeatureCollection", "crs": crs, "features": [one]})
+    except ValueError:
+        return
+    Path("x.geojson").write_text(text, encoding="utf-8", errors="replace")
+    write_geojson([])
+    for paths, options in (
+        (["area.geojson", "x.geojson"], {}),
+        (["area.geojson"], {"town": Path("x.geojson")}),
+    ):
+        scenario, said = mission(paths, **options)
+        assert scenario is not None or "\n" not in said

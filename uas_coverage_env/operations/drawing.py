@@ -13,10 +13,10 @@ from shapely.geometry import Polygon
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.operations.features import Feature, Part, parts_of
-from uas_coverage_env.operations.lengths import length_m
+from uas_coverage_env.operations.lengths import length_m, length_with_unit_m
 from uas_coverage_env.operations.outlines import Rings, circle, strip
 from uas_coverage_env.operations.roles import ROLES, Meaning, meaning_of
-from uas_coverage_env.operations.tags import OTHER, half_width_m, height_m
+from uas_coverage_env.operations.tags import LEAST_M, OTHER, half_width_m, height_m
 from uas_coverage_env.operations.wishes import NAMES, NOTHING, Wishes, wishes_of
 
 MOST_BYTES = 20_000_000
@@ -207,6 +207,9 @@ def _obstacle(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]
     what = meaning.solid or OTHER
     _check_not_seen(source, feature, but="height_m")
     top_m, known = height_m(feature.attributes, what.guessed_m)
+    named_m = length_with_unit_m(feature.name)
+    if not known and named_m >= LEAST_M:  # `Chimney 85 m`
+        top_m, known = named_m, True
     said = feature.attributes.get("height", feature.attributes.get("height_m"))
     is_area = part.shape in ("polygon", "closed line")
     if is_area and not known and not meaning.sure:

@@ -125,8 +125,9 @@ def _geometry(element: Element) -> dict[str, Any]:
     """As in GeoJSON; a ring may stand without a polygon, as some programs write it."""
     tag = _tag(element)
     if tag == "Polygon":
-        outer = _lines(element, "outerBoundaryIs") or [[]]
-        return {"type": tag, "coordinates": [outer[0], *_lines(element, "innerBoundaryIs")]}
+        outer, *more = _lines(element, "outerBoundaryIs") or [[]]
+        parts = [[outer, *_lines(element, "innerBoundaryIs")], *([ring] for ring in more)]
+        return {"type": "MultiPolygon", "coordinates": parts}
     if tag == "LinearRing":
         return {"type": "Polygon", "coordinates": _lines(element, None)[:1]}
     if tag == "Track":

@@ -10,6 +10,7 @@ _UNITS_M = {
     **dict.fromkeys(("in", "inch", "inches", '"', "″", "”"), 0.0254),
     "cm": 0.01,
     "km": 1000.0,
+    **dict.fromkeys(("storey", "storeys", "story", "stories", "floor", "floors", "levels"), 3.2),
 }
 _NUMBER = re.compile(r"(\d{1,3}(?:,\d{3})+(?!\d)|\d+)(?:[.,](\d+))?\s*([a-z]+|['\"′’″”])?")
 
@@ -31,10 +32,18 @@ def length_m(given: Any) -> float:
         except OverflowError:
             return math.nan
     text = str(given).strip().lower()[:80]
-    if text.startswith("-"):
-        return math.nan
+    return math.nan if text.startswith("-") else _largest_m(_NUMBER.findall(text))
+
+
+def length_with_unit_m(text: str) -> float:
+    """The largest length in a name that has a unit: 85 of `Chimney 2, 85 m`; NaN: none [m]."""
+    found = _NUMBER.findall(text.lower()[:80])
+    return _largest_m([each for each in found if each[-1] in _UNITS_M])
+
+
+def _largest_m(numbers: list[tuple[str, str, str]]) -> float:
     found, feet_m = [], 0.0
-    for whole, part, unit in _NUMBER.findall(text):
+    for whole, part, unit in numbers:
         value = float(f"{whole.replace(',', '')}.{part or 0}") * _UNITS_M.get(unit, 1.0)
         inches = _UNITS_M.get(unit) == _UNITS_M["in"]
         found.append(value + feet_m if inches else value)

@@ -147,7 +147,7 @@ def standing_notes(standing: Sequence[Standing], town: Town) -> list[str]:
             )
     if town.incomplete:
         notes.append(
-            f"{town.incomplete} buildings or woods in the area lack corners in the file and are "
+            f"{town.incomplete} outlines in the area lack corners in the file and are "
             "left out: cut out more of the surroundings"
         )
     if town.unread:

@@ -85,11 +85,14 @@ def _features(file: str, data: Any) -> Iterator[Feature]:
 
     for thing in osmium.FileProcessor(data).with_areas():
         line: list[list[float]] = []
+        lacks = LACKS_CORNERS
         if isinstance(thing, Way):
             known = [node.location for node in thing.nodes if node.location.valid()]
             line = [[place.lon, place.lat] for place in known]
             if line:
                 corners[thing.id] = line[0]
+            if thing.is_closed() and len(known) == len(thing.nodes):
+                lacks = ""  # and is an outline, also where it crosses itself
         if not any(map(_matters, thing.tags)):
             continue
         what = standing_of(_tags(thing))
@@ -102,7 +105,7 @@ def _features(file: str, data: Any) -> Iterator[Feature]:
             is_outline = thing.is_closed() or (what is not None and what.kind in (BUILDING, FOREST))
             if is_outline and not along:
                 if what is not None:
-                    outlines[True, thing.id] = feature(thing, _line(line), LACKS_CORNERS)
+                    outlines[True, thing.id] = feature(thing, _line(line), lacks)
             else:
                 yield feature(thing, _line(line))
         elif isinstance(thing, Relation) and what is not None and not along:

@@ -231,16 +231,16 @@ def _told(feature: Feature, shape: Shape, *, on_map: bool) -> Meaning | None:
     if on_map:
         flying = (text for text in (*names, *kinds) if speaks_of_flying(text))
         found = [_meaning("no_fly", shape, "the name", text) for text in flying]
-        return found[0] if found else _standing(feature, shape)
+        return next(iter(found), None) or _plainly(feature, shape) or _standing(feature, shape)
     said = [_worded(feature, text, shape, "the name") for text in names]
     said += [_worded(feature, text, shape, "the kind", sure=True) for text in kinds]
     told = [each for each in said if each is not None]
     for each in told:
         if each.role not in ("obstacle", "search"):
             return each
-    description = str(feature.attributes.get("description", ""))[:200]
-    if _ALONE["no_fly"].fullmatch(_plain(description)):
-        return _meaning("no_fly", shape, "the description", description)
+    plainly = _plainly(feature, shape)
+    if plainly is not None:
+        return plainly
     standing, words = _standing(feature, shape), [each for each in told if each.role == "obstacle"]
     if words and (standing is None or standing.solid == OTHER):
         return words[0]._replace(sure=words[0].sure or standing is not None)
@@ -252,6 +252,17 @@ def _told(feature: Feature, shape: Shape, *, on_map: bool) -> Meaning | None:
     layers = [_layer(text, shape) for text in feature.layers]
     within = next((each for each in (*folders, *layers) if each is not None), None)
     return None if within is None or within.role == "search" else within
+
+
+def _plainly(feature: Feature, shape: Shape) -> Meaning | None:
+    """What any attribute says that is nothing but no-fly: `remark = "NFZ"`, `no_fly = true`."""
+    for key, value in feature.attributes.items():
+        words = _ALONE["no_fly"] if key == "description" else _FLYING
+        if isinstance(value, str) and words.fullmatch(_plain(value[:200])):
+            return _meaning("no_fly", shape, f"its {key}", value)
+        if _FLYING.fullmatch(_plain(key)) and str(value).strip().lower() not in _NO:
+            return _meaning("no_fly", shape, f"its {key}", str(value))
+    return None
 
 
 def _worded(
@@ -287,9 +298,8 @@ def _worded(
 
 def _layer(text: str, shape: Shape) -> Meaning | None:
     """What the name of a file or layer says that is nothing but a role: `no_fly`, `buildings`."""
-    plain = _plain(text)
     for role, words in _ALONE.items():
-        if words.fullmatch(plain) and _counts(role, shape):
+        if words.fullmatch(_plain(text)) and _counts(role, shape):
             solid = next(_solids(text), None) if role == "obstacle" else None
             return _meaning(role, shape, "the layer", text, solid)._replace(sure=False)
     return None
@@ -376,9 +386,12 @@ _WORDS = {role: _whole(row.words) for role, row in ROLES.items() if row.words}
 _FLIGHT = _whole(FLIGHT_WORDS)
 _SURVEY = _whole(("survey", "search"))
 _SOLIDS = [(_whole([word]), what) for word, what in SOLID_WORDS.items()]
+_AFTER = r"(?: ?(?:zones?|areas?|layers?|\d+))*"
+_FLYING = re.compile(_any_of(FLIGHT_WORDS) + _AFTER)
 _ALONE: Mapping[Role, re.Pattern[str]] = {
-    role: re.compile(rf"{_any_of((*row.words, *words))}(?: ?(?:zones?|areas?|layers?|\d+))*")
+    role: re.compile(_any_of((*row.words, *words)) + _AFTER)
     for role, row in ROLES.items()
     for words in [tuple(SOLID_WORDS) if role == "obstacle" else ()]
     if role != "search"
 }
+_NO = ("no", "false", "0", "f", "n", "none")

@@ -114,7 +114,7 @@ def _encodings(table: bytes, page: bytes) -> list[str]:
     if digits:
         found += ["utf-8"] if digits[0] == "65001" else [f"cp{digits[0]}"]
         if digits[0].startswith("8859"):
-            found.append(f"iso8859-{digits[0][4:] or 1}")
+            found.append(f"iso8859-{digits[0].removeprefix('8859') or 1}")
     language = _LANGUAGES.get(table[_LANGUAGE_AT]) if len(table) > _LANGUAGE_AT else None
     known = []
     for name in [*found, "utf-8", language or "utf-8", "latin-1"]:
