@@ -7,6 +7,7 @@ Tables are committed, so that a code host shows them too. They stand in any page
 in any README, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`; `PARTS` has the names.
 """
 
+import importlib
 import inspect
 import json
 import re
@@ -338,68 +339,15 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
-def log_formats() -> str:
-    """Every kind of log, and what is read of it."""
-    from uas_coverage_env.operations.logs import FORMATS  # needs the extra `ops`
+def of_operations(module: str, name: str) -> Callable[[], str]:
+    """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
 
-    rows = []
-    for ending, kind in FORMATS.items():
-        read = "; ".join(f"`{name}`: {meaning}" for name, meaning in kind.messages.items())
-        rows.append((f"`{ending}`", kind.of, read.replace("`logged texts`", "logged texts")))
-    return table(("file", "what it is", "what is read"), rows)
+    def made() -> str:
+        found = importlib.import_module(f"uas_coverage_env.operations.{module}")
+        head, rows = getattr(found, name)()
+        return table(head, rows)
 
-
-def log_rules() -> str:
-    """What of a log is taken off, left out or refused."""
-    from uas_coverage_env.operations import flown_way as way
-    from uas_coverage_env.operations.logs import flights
-
-    at_home, beside = f"{way.AT_HOME_M:g} m", f"{way.BESIDE_M:g} m"
-    rows = [
-        ("armed, but never higher than " + f"{flights.RISE_M:g} m above the ground", "no flight"),
-        (
-            "several flights, or several vehicles on one link",
-            "refused, and listed; `--flight 2` or `--flight uas_1=2`, `uas_1=link.tlog:7` choose",
-        ),
-        (
-            "several battery monitors",
-            "the first is used, and said; `--battery 2` or `--battery uas_1=2` choose",
-        ),
-        (
-            f"no position for {way.LONGEST_GAP_S:g} s, or {way.GAP_INTERVALS:g} of the usual "
-            "intervals",
-            "a gap: named; nothing is judged in it",
-        ),
-        (
-            "a GPS glitch that the autopilot tells, until it is cleared; positions that jump (more "
-            f"than {way.JUMP_M:g} m and {way.JUMP_SPEEDS:g} times the top speed) and come back",
-            "named; nothing is judged until it is over",
-        ),
-        ("positions that jump for good", "named, and judged as they are"),
-        (
-            "a height at take-off that is not between the ground and the start, by more than "
-            f"{way.OFFSET_M:g} m",
-            "an offset of the barometer: taken off all heights, and said",
-        ),
-        (
-            f"a take-off more than {at_home}, and up to {beside}, from the start",
-            "said; it is taken to stand at its start, and home is where it took off",
-        ),
-        (
-            f"a landing more than {at_home} from home",
-            "said: it is not home, and out of the mission while others fly on (`lost`)",
-        ),
-        (
-            "a log that ends in the air",
-            "said; the flight of that UAS ends there, in the mode `lost` while others fly on",
-        ),
-        ("damaged parts of a file", "passed over, and counted or named as a gap"),
-        (
-            "another place, a clock that goes back, no position, an empty file",
-            "refused in a line",
-        ),
-    ]
-    return table(("in the log", "what is done"), rows)
+    return made
 
 
 PARTS: dict[str, Callable[[], str]] = {
@@ -420,8 +368,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
     "planners": planners,
-    "log_formats": log_formats,
-    "log_rules": log_rules,
+    "log_formats": of_operations("log_tables", "log_formats"),
+    "log_rules": of_operations("log_tables", "log_rules"),
 }
 
 

@@ -12,7 +12,7 @@ from flown_flights import FAR_M, FLIES_S, WAYPOINTS_M, judged, logged, places_m,
 from uas_coverage_env import Flight
 from uas_coverage_env.flight import covered_at, energy_Wh
 from uas_coverage_env.flight.record import LANDED, LOST
-from uas_coverage_env.operations.logs import Said, Span
+from uas_coverage_env.operations.logs.logged import Said, Span
 
 N = len(WAYPOINTS_M)
 LONG_S = FLIES_S + 4.0

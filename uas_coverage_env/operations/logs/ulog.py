@@ -113,17 +113,16 @@ def read_ulg(path: Path, battery: int | None) -> list[Logged]:
         topics.setdefault(topic.name, []).append(topic)
     offset_s = _offset_s(topics)
     home = topics.get("home_position")
-    try:
-        for name, message in MESSAGES.items():
-            for topic in topics.get(name, []):
-                # of all but batteries, others are spare sensors or estimates of their own
-                if topic.multi_id and name != "battery_status":
-                    continue
-                rows = _rows(topic, home[0] if home else None)
-                for time_s, row in rows:
+    for name, message in MESSAGES.items():
+        for topic in topics.get(name, []):
+            # of all but batteries, others are spare sensors or estimates of their own
+            if topic.multi_id and name != "battery_status":
+                continue
+            try:
+                for time_s, row in _rows(topic, home[0] if home else None):
                     streams.add(offset_s + time_s, message.facts(row))
-    except KeyError as error:
-        raise InputError(f"{path}: {name} of its log has no field {error}") from error
+            except KeyError as error:
+                raise InputError(f"{path}: {name} of its log has no field {error}") from error
     for said in log.logged_messages:
         streams.add(offset_s + 1e-6 * said.timestamp, TEXTS.facts(said.message))
     if not home:
