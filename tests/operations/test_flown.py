@@ -157,6 +157,13 @@ def test_one_put_down_beside_its_start_comes_home_to_where_it_took_off(beside_m,
     assert f"it takes off {beside_m:.1f} m from its start" in said(made)
 
 
+def test_the_last_metres_to_the_ground_are_no_breach_of_the_fence():
+    made = judged(whole())
+    assert made.flight.scenario.fence is not None
+    assert made.flight.scenario.geofence.margin_m > 0.0
+    assert made.flight.breaches == 0
+
+
 def without(log, from_s, to_s):
     return log.at((log.time_s <= from_s) | (log.time_s >= to_s))
 

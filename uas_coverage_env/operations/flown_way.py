@@ -69,7 +69,9 @@ class Way:
         places_m = _interpolated(times_s, self.log.time_s, self.places_m)
         # the ground is under the volume in which missions are judged: how it gets to its start
         # and from there to the ground is no part of them
-        places_m[:, 2] = np.minimum(places_m[:, 2], 0.0)
+        near = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1) <= BESIDE_M
+        lowest_m = np.where(near, min(start_m[2], 0.0), 0.0)
+        places_m[:, 2] = np.minimum(places_m[:, 2], lowest_m)
         places_m[self.standing(times_s)] = start_m
         return places_m
 
