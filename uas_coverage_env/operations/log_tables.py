@@ -37,9 +37,13 @@ def log_rules() -> Table:
             "a gap: named; nothing is judged in it",
         ),
         (
-            "a GPS glitch that the autopilot tells, until it is cleared; positions that jump (more "
-            f"than {way.JUMP_M:g} m and {way.JUMP_SPEEDS:g} times the top speed) and come back",
-            "named; nothing is judged until it is over",
+            "a GPS glitch that the autopilot tells, until it is cleared",
+            "named; it covers by the autopilot's own estimate, contacts are not judged",
+        ),
+        (
+            f"positions that jump (more than {way.JUMP_M:g} m and {way.JUMP_SPEEDS:g} times the "
+            "top speed) and come back",
+            "taken for a GPS glitch: named; nothing is judged until they are back",
         ),
         ("positions that jump for good", "named, and judged as they are"),
         (

@@ -40,11 +40,11 @@ _LAST_BYTES = 256
 EVENTS: dict[int, Fact] = {
     10: Armed(True, is_change=True),
     11: Armed(False, is_change=True),
-    15: Armed(True, is_change=True),
     18: InAir(False),
     28: InAir(True),
 }
-"""`EV.Id` -> what it says: armed, disarmed, armed in an automatic mode, landed, not landed."""
+"""`EV.Id` -> what it says: armed, disarmed, landed, not landed. 15, AUTO_ARMED, is no arming:
+Copter 4.7 says it again and again after it has disarmed, where it may take off in AUTO."""
 
 ERRORS: dict[int, str] = {
     5: "radio failsafe",
