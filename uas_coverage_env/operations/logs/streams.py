@@ -275,7 +275,7 @@ def _once(rows: Rows) -> list[Said]:
     """The texts without those that are said again and again."""
     found: dict[Any, Said] = {}
     for time_s, text in sorted(rows):
-        found.setdefault(text, Said(time_s, str(text)))
+        found.setdefault(str(text).lower(), Said(time_s, str(text)))
     return list(found.values())
 
 
