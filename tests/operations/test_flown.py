@@ -288,8 +288,8 @@ def test_an_offset_of_the_height_is_taken_off_and_said(offset_m):
     assert (made.flight.mode[-1] == LANDED).all()
     (height,) = [one for one in made.flight.of_log.estimates if one.what == "height"]
     assert ("high" if offset_m > 0 else "low") in height.how
-    wanted = "8.0 m too high" if offset_m > 0 else "6.0 m too low"  # it stands on the ground
-    assert f"uas_1: height estimated from take-off, where it is {wanted}" in said(made)
+    wanted = "8.0 m (too high)" if offset_m > 0 else "6.0 m (too low)"  # it stands on the ground
+    assert f"uas_1: height estimated from take-off: an offset of {wanted}" in said(made)
 
 
 def test_what_is_estimated_stands_in_the_summary_and_is_read_back(tmp_path):

@@ -129,7 +129,7 @@ def way_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) 
         if abs(offset_m) > OFFSET_M:
             places_m = places_m + np.array([0.0, 0.0, offset_m])
             side = "high" if offset_m > 0.0 else "low"
-            how = f"from take-off, where it is {abs(offset_m):.1f} m too {side}, and so all along"
+            how = f"from take-off: an offset of {abs(offset_m):.1f} m (too {side}) is taken off"
             estimates.append(Estimate(uas.name, "height", how))
     left_s, ends_s, home, said = _ends(scenario, flight, start_m, log.time_s, places_m)
     return Way(
