@@ -36,12 +36,7 @@ from uas_coverage_env.env.rewards import rewards_table
 from uas_coverage_env.env.screen import RENDER_MODES
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight import Why
-from uas_coverage_env.flight.registry import (
-    GROUP,
-    KINDS,
-    PlannerDescription,
-    describe_planners,
-)
+from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -340,11 +335,20 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
+OPERATIONS = {
+    "areas": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
+    "exports": ("exported_files", "autopilot_parameters", "autopilot_failures"),
+    "streams": ("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
+    "logs": ("log_formats", "log_rules"),
+}
+"""Tables of `uas_coverage_env.operations.tables`, by module."""
+
+
 def of_operations(module: str, name: str) -> Callable[[], str]:
     """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
 
     def made() -> str:
-        found = importlib.import_module(f"uas_coverage_env.operations.{module}")
+        found = importlib.import_module(f"uas_coverage_env.operations.tables.{module}")
         head, rows = getattr(found, name)()
         return table(head, rows)
 
@@ -370,20 +374,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "event_fields": event_fields,
     "planners": planners,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
-    "area_roles": of_operations("area_tables", "area_roles"),
-    "area_words": of_operations("area_tables", "area_words"),
-    "plan_items": of_operations("area_tables", "plan_items"),
-    "town_kinds": of_operations("area_tables", "town_kinds"),
-    "town_not_read": of_operations("area_tables", "town_not_read"),
-    "exported_files": of_operations("export_tables", "exported_files"),
-    "autopilot_parameters": of_operations("export_tables", "autopilot_parameters"),
-    "autopilot_failures": of_operations("export_tables", "autopilot_failures"),
-    "stream_troubles": of_operations("stream_tables", "stream_troubles"),
-    "stream_failsafes": of_operations("stream_tables", "stream_failsafes"),
-    "stream_reactions": of_operations("stream_tables", "stream_reactions"),
-    "stream_limits": of_operations("stream_tables", "stream_limits"),
-    "log_formats": of_operations("log_tables", "log_formats"),
-    "log_rules": of_operations("log_tables", "log_rules"),
+    **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
 }
 
 

@@ -154,6 +154,9 @@ def _stamped(t, packed):
 
 _TOPICS = {
     "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt",
+    "vehicle_local_position": (
+        "uint64_t timestamp;float x;float y;float z;double ref_lat;double ref_lon;float ref_alt"
+    ),
     "vehicle_attitude": "uint64_t timestamp;float[4] q",
     "vehicle_status": "uint64_t timestamp;uint8_t arming_state",
     "vehicle_land_detected": "uint64_t timestamp;bool landed",
@@ -169,7 +172,7 @@ _ULOG_CODES = {
 HOME_ALT_M = 123.0
 
 
-def ulog(path, times_s, places, armed, said=(), first_s=20.0):
+def ulog(path, times_s, places, armed, said=(), first_s=20.0, without=(), local_m=None):
     """A log of PX4 (docs.px4.io, ULog File Format), with a second battery that is of no use.
 
     Args:
@@ -179,6 +182,8 @@ def ulog(path, times_s, places, armed, said=(), first_s=20.0):
         armed: (from, to).
         said: (t, text).
         first_s: The clock of the autopilot at t = 0.
+        without: Topics that are not logged.
+        local_m: (N, 3) north, east, height of its own map, whose origin is the first of `places`.
     """
     numbers = {name: n for n, name in enumerate([*_TOPICS, "battery_status 1"])}
     out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", int(1e6 * first_s))]
@@ -190,6 +195,8 @@ def ulog(path, times_s, places, armed, said=(), first_s=20.0):
         out.append(_ulog_message("A", head + topic.encode()))
 
     def data(t, name, *values):
+        if name in without:
+            return b""
         fields = [field.split() for field in _TOPICS[name.partition(" ")[0]].split(";")]
         codes = "".join(_ULOG_CODES[kind] for kind, _ in fields)
         packed = struct.pack("<" + codes, int(1e6 * (first_s + t)), *values)
@@ -197,12 +204,22 @@ def ulog(path, times_s, places, armed, said=(), first_s=20.0):
 
     said = list(said)
     out.append(data(times_s[0], "home_position", 0.0, 0.0, HOME_ALT_M))
-    for t, (latitude, longitude, height) in zip(times_s, places, strict=True):
+    for n, (t, (latitude, longitude, height)) in enumerate(zip(times_s, places, strict=True)):
         flies = armed[0] <= t < armed[1]
         turned = np.radians(0.5 * 40.0)
         out += [
             data(t, "vehicle_gps_position", int(1e6 * (1.7e9 + t))),
             data(t, "vehicle_global_position", latitude, longitude, HOME_ALT_M + height),
+            *(
+                data(
+                    t,
+                    "vehicle_local_position",
+                    *(local_m[n] * (1.0, 1.0, -1.0)),
+                    *places[0][:2],
+                    HOME_ALT_M,
+                )
+                for _ in range(local_m is not None)
+            ),
             data(t, "vehicle_attitude", np.cos(turned), 0.0, 0.0, np.sin(turned)),
             data(t, "vehicle_status", 2 if flies else 1),
             data(t, "vehicle_land_detected", not flies),

@@ -12,7 +12,7 @@ from flown_flights import FAR_M, FLIES_S, WAYPOINTS_M, judged, logged, places_m,
 from uas_coverage_env import Flight
 from uas_coverage_env.flight import covered_at, energy_Wh
 from uas_coverage_env.flight.record import LANDED, LOST
-from uas_coverage_env.operations.logs import Said, Span
+from uas_coverage_env.operations.logs.logged import Said, Span
 
 N = len(WAYPOINTS_M)
 LONG_S = FLIES_S + 4.0
@@ -157,6 +157,13 @@ def test_one_put_down_beside_its_start_comes_home_to_where_it_took_off(beside_m,
     assert f"it takes off {beside_m:.1f} m from its start" in said(made)
 
 
+def test_the_last_metres_to_the_ground_are_no_breach_of_the_fence():
+    made = judged(whole())
+    assert made.flight.scenario.fence is not None
+    assert made.flight.scenario.geofence.margin_m > 0.0
+    assert made.flight.breaches == 0
+
+
 def without(log, from_s, to_s):
     return log.at((log.time_s <= from_s) | (log.time_s >= to_s))
 
@@ -185,7 +192,7 @@ def test_nothing_is_judged_in_a_gap():
     assert known[34:].all()
 
 
-def test_a_glitch_that_the_autopilot_tells_is_named_and_costs_nothing():
+def test_positions_that_jump_and_come_back_are_named_and_cost_nothing():
     times_s = times_of(10.0)
     flown_m = places_m(times_s, 2.0)
     wrong = (times_s > 17.0) & (times_s < 27.0)
@@ -197,16 +204,24 @@ def test_a_glitch_that_the_autopilot_tells_is_named_and_costs_nothing():
         "its position jumps by 150 m 15.0 s after take-off and comes back 24.9 s after take-off: "
         "taken for a GPS glitch" in said(silent)
     )
-    told = logged(times_s, flown_m, armed=(Span(0.0, FLIES_S + 2.0),),
-                  glitches=(Span(17.0, 27.0),))  # fmt: skip
-    made = judged(told)
-    assert not made.flight.violations
+    made = silent
     assert (made.flight.mode[-1] == LANDED).all()
-    assert "GPS glitch from 14.9 s after take-off until 24.9 s after take-off" in said(made)
     assert [one.why for one in made.flight.of_log.unknown] == ["GPS glitch"]
     passed_s = np.array([one.time_s for one in made.flight.of_log.passes])
     assert not ((passed_s > 16.9) & (passed_s < 27.0)).any()
     assert np.abs(made.flight.x[:, 0, 1]).max() < 1.0
+
+
+def test_a_glitch_that_the_autopilot_tells_is_named_and_no_contact_of_it_counts():
+    log = whole(glitches=(Span(15.0, 35.0),))
+    made = judged(log, obstacles=[WALL])  # it flies through it twice, by its own estimate
+    assert not made.flight.violations
+    assert made.flight.covered[-1] == N
+    assert (
+        "uas_1: position estimated by its autopilot, which says GPS glitch from 12.9 s after "
+        "take-off until 32.9 s after take-off: contacts are not judged then" in said(made)
+    )
+    assert judged(whole(), obstacles=[WALL]).flight.violations
 
 
 def test_positions_that_jump_for_good_are_judged_as_they_are_and_named():
@@ -273,8 +288,8 @@ def test_an_offset_of_the_height_is_taken_off_and_said(offset_m):
     assert (made.flight.mode[-1] == LANDED).all()
     (height,) = [one for one in made.flight.of_log.estimates if one.what == "height"]
     assert ("high" if offset_m > 0 else "low") in height.how
-    wanted = "8.0 m too high" if offset_m > 0 else "6.0 m too low"  # it stands on the ground
-    assert f"uas_1: height estimated from take-off, where it is {wanted}" in said(made)
+    wanted = "8.0 m (too high)" if offset_m > 0 else "6.0 m (too low)"  # it stands on the ground
+    assert f"uas_1: height estimated from take-off: an offset of {wanted}" in said(made)
 
 
 def test_what_is_estimated_stands_in_the_summary_and_is_read_back(tmp_path):

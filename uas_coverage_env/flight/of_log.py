@@ -17,7 +17,7 @@ class Estimate:
 
     Attributes:
         uas: Which UAS.
-        what: `charge`, `current`, `voltage`, `height`, `attitude` or `flight`.
+        what: `charge`, `current`, `voltage`, `height`, `position`, `attitude` or `flight`.
         how: It was estimated, in words that follow `estimated`.
     """
 

@@ -16,15 +16,13 @@ from uas_coverage_env.flight.of_log import STATES, Estimate, OfLog, Pass, Unknow
 from uas_coverage_env.flight.rollout import recorded_versions
 from uas_coverage_env.operations.corners import distances_m
 from uas_coverage_env.operations.flown_battery import Battery, battery_of, unused
-from uas_coverage_env.operations.flown_way import AT_HOME_M, Way, way_of
+from uas_coverage_env.operations.flown_way import Way, way_of
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.operations.logs.flights import chosen_flight
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.flown import FlownWorld, Moments
 from uas_coverage_env.vehicle import DOD, N_STATES, PHI, VX, tilts_and_turn
-
-__all__ = ["AT_HOME_M", "PLANNER", "Flown", "flown_flight"]
 
 PLANNER = "log"
 """Name of the planner of what was flown elsewhere."""
@@ -157,6 +155,7 @@ class _Judged:
         ]
         own_s = [self._own_s(i) for i in range(self._n_uas)]
         self._time_s = np.unique(np.concatenate([self._grid_s, *own_s]))
+        self._log_s: FloatArray = np.asarray(begins_s + self._time_s, np.float64)
         self._measured = np.stack([np.isin(self._time_s, of_one) for of_one in own_s], axis=1)
         self.batteries: list[Battery] = [self._battery(i) for i in range(self._n_uas)]
         self._x = np.stack([self._states(i) for i in range(self._n_uas)], axis=1)
@@ -220,7 +219,7 @@ class _Judged:
     def _battery(self, i: int) -> Battery:
         if i not in self._ways:
             return unused(self._scenario, i, len(self._grid_s))
-        way, at_s = self._ways[i], self._begins_s + self._grid_s
+        way, at_s = self._ways[i], np.asarray(self._begins_s + self._grid_s, np.float64)
         in_air = ~way.standing(at_s) & (at_s < way.ends_s)
         return battery_of(self._scenario, i, way.log, at_s, in_air)
 
@@ -233,7 +232,7 @@ class _Judged:
             x[:, :3] = uas.start_m
             return x
         way, start_m = self._ways[i], np.array(uas.start_m)
-        at_s, half_s = self._begins_s + self._time_s, 0.5 * self._scenario.dt_s
+        at_s, half_s = self._log_s, 0.5 * self._scenario.dt_s
         x[:, :3] = way.places_at(at_s, start_m)
         moved_m = way.places_at(at_s + half_s, start_m) - way.places_at(at_s - half_s, start_m)
         x[:, VX : VX + 3] = moved_m / (2.0 * half_s)
@@ -248,7 +247,7 @@ class _Judged:
         """(M, U) what is known at each moment, see `Moments`."""
         known = np.full(self._measured.shape, 2, np.int8)
         for i, way in self._ways.items():
-            at_s = self._begins_s + self._time_s
+            at_s = self._log_s
             there = way.knows(at_s)
             known[~there, i] = 0
             # the way to a moment leads through a gap where it or the moment before is in one

@@ -10,6 +10,7 @@ from uas_coverage_env.flight.of_log import Estimate, Unknown
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.operations.logs.flights import LoggedFlight
+from uas_coverage_env.operations.logs.logged import Span
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
@@ -50,6 +51,7 @@ class Way:
         ends_s: When it was home, or nothing more is known.
         home: Whether it landed at home.
         unknown: When it is not known where it was.
+        doubtful: When its autopilot took its position to be wrong, and went on by its own estimate.
         estimates: Of its places.
         notes: What is to be said.
     """
@@ -61,6 +63,7 @@ class Way:
     ends_s: float
     home: bool
     unknown: tuple[Unknown, ...]
+    doubtful: tuple[Span, ...]
     estimates: tuple[Estimate, ...]
     notes: tuple[str, ...]
 
@@ -69,7 +72,9 @@ class Way:
         places_m = _interpolated(times_s, self.log.time_s, self.places_m)
         # the ground is under the volume in which missions are judged: how it gets to its start
         # and from there to the ground is no part of them
-        places_m[:, 2] = np.minimum(places_m[:, 2], 0.0)
+        near = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1) <= BESIDE_M
+        lowest_m = np.where(near, min(start_m[2], 0.0), 0.0)
+        places_m[:, 2] = np.minimum(places_m[:, 2], lowest_m)
         places_m[self.standing(times_s)] = start_m
         return places_m
 
@@ -78,10 +83,13 @@ class Way:
         return (times_s <= self.left_s) | (self.home & (times_s >= self.ends_s))
 
     def knows(self, times_s: FloatArray) -> NDArray[np.bool_]:
-        """(T,) whether it is known where it was."""
+        """(T,) whether it is known where it was, well enough for contacts to be judged."""
         known = np.ones(len(times_s), np.bool_)
-        for one in self.unknown:
-            known &= (times_s <= one.from_s) | (one.to_s <= times_s)
+        for from_s, to_s in (
+            *((one.from_s, one.to_s) for one in self.unknown),
+            *((span.begins_s, span.ends_s) for span in self.doubtful),
+        ):
+            known &= (times_s <= from_s) | (to_s <= times_s)
         return known
 
     def attitude_at(self, times_s: FloatArray) -> FloatArray | None:
@@ -110,19 +118,32 @@ def way_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) 
         for said in log.said
         if flight.begins_s <= said.time_s <= flight.ends_s
     ]
-    estimates = []
+    doubtful = tuple(
+        span
+        for span in flight.log.glitches
+        if span.begins_s < flight.ends_s and flight.begins_s < span.ends_s
+    )
+    estimates = [Estimate(uas.name, "position", _in_doubt(flight, span)) for span in doubtful]
     if flight.by_arming:
         offset_m = _offset_m(start_m, -places_m[0, 2])
         if abs(offset_m) > OFFSET_M:
             places_m = places_m + np.array([0.0, 0.0, offset_m])
             side = "high" if offset_m > 0.0 else "low"
-            how = f"from take-off, where it is {abs(offset_m):.1f} m too {side}, and so all along"
+            how = f"from take-off: an offset of {abs(offset_m):.1f} m (too {side}) is taken off"
             estimates.append(Estimate(uas.name, "height", how))
     left_s, ends_s, home, said = _ends(scenario, flight, start_m, log.time_s, places_m)
     return Way(
         flight, log, places_m, left_s, ends_s, home,
-        tuple(unknown), tuple(estimates), (*notes, *said),
+        tuple(unknown), doubtful, tuple(estimates), (*notes, *said),
     )  # fmt: skip
+
+
+def _in_doubt(flight: LoggedFlight, span: Span) -> str:
+    until = flight.since(span.ends_s) + ", never cleared" * span.is_open
+    return (
+        f"by its autopilot, which says GPS glitch from {flight.since(span.begins_s)} until "
+        f"{until}: contacts are not judged then"
+    )
 
 
 def _check_place(scenario: Scenario, name: str, places_m: FloatArray) -> None:
@@ -142,15 +163,7 @@ def _believed(
     """(N,) the positions that can be believed, when none can, and what is to be said of it."""
     times_s = flight.log.time_s
     good, notes = np.ones(len(times_s), np.bool_), []
-    for span in flight.log.glitches:
-        wrong = (span.begins_s <= times_s) & (times_s < span.ends_s)
-        if wrong.any():
-            good &= ~wrong
-            until = flight.since(span.ends_s) + ", never cleared" * span.is_open
-            notes.append(
-                f"its autopilot says GPS glitch from {flight.since(span.begins_s)} until {until}"
-            )
-    jumps = _jumps(times_s, places_m, good, top_mps)
+    jumps = _jumps(times_s, places_m, top_mps)
     for first, after, far_m in jumps:
         at_s = float(times_s[first])
         if after is None:
@@ -183,10 +196,9 @@ def _believed(
 
 
 def _jumps(
-    times_s: FloatArray, places_m: FloatArray, good: NDArray[np.bool_], top_mps: float
+    times_s: FloatArray, places_m: FloatArray, top_mps: float
 ) -> list[tuple[int, int | None, float]]:
     """Which positions have jumped: the first, the one after (None: all later), and how far [m]."""
-    numbers = np.flatnonzero(good)
 
     def jump_m(n: int, m: int) -> float:
         """How far it is from one to another, if that is too far, else 0."""
@@ -194,10 +206,10 @@ def _jumps(
         most_m = JUMP_M + JUMP_SPEEDS * top_mps * float(times_s[m] - times_s[n])
         return far_m if far_m > most_m else 0.0
 
-    steps_m = np.linalg.norm(np.diff(places_m[numbers], axis=0), axis=1)
-    most_m = JUMP_M + JUMP_SPEEDS * top_mps * np.diff(times_s[numbers])
+    steps_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1)
+    most_m = JUMP_M + JUMP_SPEEDS * top_mps * np.diff(times_s)
     # runs of positions that do not jump; the first that lasts is believed
-    parts = np.split(numbers, 1 + np.flatnonzero(steps_m > most_m))
+    parts = np.split(np.arange(len(times_s)), 1 + np.flatnonzero(steps_m > most_m))
     runs = [(int(part[0]), int(part[-1])) for part in parts]
     lasts = [times_s[last] - times_s[first] >= LONGEST_GAP_S for first, last in runs]
     begin = lasts.index(True) if True in lasts else 0

@@ -51,7 +51,8 @@ def judge_moment(at, commands, x, resting, known, measured, last, outcome):
         commands: (U,) of COMMAND_DTYPE; not flown.
         x: (U, 14) states at the next moment.
         resting: (U,) whether each stands at home for good, and has landed.
-        known: (U,) 2: the way there is known, and judged; 1: only where it is then; 0: neither.
+        known: (U,) 2: the way there is known, and contacts are judged; 1: only where it is then;
+            0: neither.
         measured: (U,) whether where it is was measured, so that it may cover something.
         last: Whether the moment is the next sample of the flight.
         outcome: (U,) of OUTCOME_DTYPE; written.
@@ -75,6 +76,7 @@ def judge_moment(at, commands, x, resting, known, measured, last, outcome):
     check_separation(arena, state, outcome)
     check_fence_and_battery(arena, state, outcome)
     count_breaches(arena, state, outcome)
+    _show(state)
     _hide(state, measured)
     cover(arena, state, state.step[0] + 1, outcome)
     _show(state)

@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.logs import dataflash, mavlink, table, ulog
-from uas_coverage_env.operations.logs.logged import Logged, Said, Span, limited
-
-__all__ = ["FORMATS", "Format", "Logged", "Said", "Span", "read_log"]
+from uas_coverage_env.operations.logs.logged import Logged, limited
 
 
 class Format(NamedTuple):

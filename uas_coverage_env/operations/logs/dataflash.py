@@ -35,14 +35,16 @@ from uas_coverage_env.operations.logs.streams import (
 MOST_BYTES = 500_000_000
 _FMT, _FMT_BYTES, _HEAD = 0x80, 89, b"\xa3\x95"
 
+_LAST_BYTES = 256
+
 EVENTS: dict[int, Fact] = {
     10: Armed(True, is_change=True),
     11: Armed(False, is_change=True),
-    15: Armed(True, is_change=True),
     18: InAir(False),
     28: InAir(True),
 }
-"""`EV.Id` -> what it says: armed, disarmed, armed in an automatic mode, landed, not landed."""
+"""`EV.Id` -> what it says: armed, disarmed, landed, not landed. 15, AUTO_ARMED, is no arming:
+Copter 4.7 says it again and again after it has disarmed, where it may take off in AUTO."""
 
 ERRORS: dict[int, str] = {
     5: "radio failsafe",
@@ -122,7 +124,7 @@ def read_bin(path: Path, battery: int | None) -> list[Logged]:
     whole, dropped = _undamaged(content)
     if not whole:
         raise InputError(f"{path}: holds no position (POS); is it the log of a flight?")
-    if dropped:
+    if dropped > _LAST_BYTES:  # fewer are a last message that was not finished, or an empty page
         streams.notes.append(f"{dropped} bytes of its log are damaged, and were passed over")
     source = path
     try:

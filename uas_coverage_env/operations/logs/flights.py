@@ -79,7 +79,9 @@ def chosen_flight(log: Logged, number: int | None) -> LoggedFlight:
     flights = flights_of(log)
     listed = ", ".join(f"{n} ({flight})" for n, flight in enumerate(flights, 1))
     if not flights:
-        raise InputError(f"{of}: never rises higher than {RISE_M:g} m: it is of no flight")
+        raise InputError(
+            f"{of}: never rises higher than {RISE_M:g} m: it is of no flight; leave it out"
+        )
     if number is None and len(flights) > 1:
         raise InputError(f"{of}: holds {len(flights)} flights: {listed}; choose with --flight N")
     if number is not None and not 1 <= number <= len(flights):

@@ -14,7 +14,10 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.logs.logged import Logged, Said, Span
 
 FloatArray = NDArray[np.float64]
-Rows = list[tuple[float, ...]]
+Rows = list[tuple[Any, ...]]
+
+_TIME, _LATITUDE, _LONGITUDE, _HEIGHT = range(4)
+"""Columns of the rows of positions."""
 
 UNKNOWN = float("nan")
 _LONGEST_STEP_BACK_S = 5.0
@@ -143,7 +146,7 @@ class Streams:
             if isinstance(fact, Power):
                 self.power[fact.monitor, fact.rank].append((time_s, *fact[2:]))
             else:
-                self.rows[type(fact)].append((time_s, *fact))
+                self.rows[type(fact)].append((time_s, *tuple(fact)))
 
     def logged(self, path: Path, position: str, battery: int | None) -> Logged:
         """All of it at the times of the positions.
@@ -157,15 +160,15 @@ class Streams:
             InputError: There are no positions, or no such monitor.
         """
         places = _places(path, np.array(self.rows[Position], float).reshape(-1, 4), position)
-        times_s = places[:, 0]
+        times_s = places[:, _TIME]
         angles = np.array(self.rows[Attitude], float)
         end_s = max(float(rows[-1][0]) for rows in self.rows.values() if rows)
         return Logged(
             uas="",
             time_s=times_s,
-            latitude_deg=places[:, 1],
-            longitude_deg=places[:, 2],
-            height_m=places[:, 3],
+            latitude_deg=places[:, _LATITUDE],
+            longitude_deg=places[:, _LONGITUDE],
+            height_m=places[:, _HEIGHT],
             attitude_rad=_attitude(angles, times_s) if len(angles) else None,
             **self._battery(path, times_s, battery),
             system=self.system,
@@ -212,20 +215,21 @@ def _added_up(times_s: FloatArray, current_A: FloatArray) -> tuple[FloatArray, F
 def _places(path: Path, places: FloatArray, position: str) -> FloatArray:
     """The positions that can be: known, on the Earth, in order of time."""
     known = np.isfinite(places).all(axis=1)
-    known &= (np.abs(places[:, 1:3]) > 0.0).any(axis=1)  # those not known yet are at 0, 0
-    known &= (np.abs(places[:, 1]) <= 90.0) & (np.abs(places[:, 2]) <= 180.0)
+    known &= (places[:, _LATITUDE : _LONGITUDE + 1] != 0.0).any(axis=1)  # not known yet: at 0, 0
+    known &= (np.abs(places[:, _LATITUDE]) <= 90.0) & (np.abs(places[:, _LONGITUDE]) <= 180.0)
     places = places[known]
     if len(places) < 2:
         raise InputError(f"{path}: holds no position ({position}); is it the log of a flight?")
-    kept = _in_order(places[:, 0])
-    back_s = np.maximum.accumulate(places[:, 0]) - places[:, 0]
+    times_s = places[:, _TIME]
+    kept = _in_order(times_s)
+    back_s = np.maximum.accumulate(times_s) - times_s
     late = back_s > _LONGEST_STEP_BACK_S
     # a damaged place has any time; a clock that was set goes on from where it is
     if late.any() and (~kept).mean() > _DAMAGED:
         at = int(late.argmax())
         raise InputError(
             f"{path}: its clock goes back by {back_s.max():.0f} s, "
-            f"{places[at - 1, 0] - places[0, 0]:.0f} s after its beginning; cut out one flight"
+            f"{times_s[at - 1] - times_s[0]:.0f} s after its beginning; cut out one flight"
         )
     return places[kept]
 
@@ -271,7 +275,7 @@ def _once(rows: Rows) -> list[Said]:
     """The texts without those that are said again and again."""
     found: dict[Any, Said] = {}
     for time_s, text in sorted(rows):
-        found.setdefault(text, Said(time_s, str(text)))
+        found.setdefault(str(text).lower(), Said(time_s, str(text)))
     return list(found.values())
 
 

@@ -6,8 +6,9 @@ that starts with the autopilot.
 
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +32,29 @@ from uas_coverage_env.operations.logs.streams import (
 )
 
 _MOST_BYTES = 500_000_000
+_EARTH_M = 6_371_000.0
+_GLOBAL, _LOCAL = "vehicle_global_position", "vehicle_local_position"
 _ARMED = 2
 """Of `vehicle_status.arming_state`, in all versions."""
 
 Row = Mapping[str, Any]
 _HOME_ALT = "home_alt"
 """What is added to a row of a position: the altitude of home at that time [m]."""
+
+
+def _local(m: Row) -> list[Fact]:
+    """PX4's map: azimuthal equidistant on a sphere."""
+    ahead, aside = m["x"] / _EARTH_M, m["y"] / _EARTH_M
+    far = math.hypot(ahead, aside)
+    ref, east = math.radians(m["ref_lat"]), math.radians(m["ref_lon"])
+    if not (math.isfinite(far) and math.isfinite(ref)):
+        return []
+    scale = math.sin(far) / far if far else 1.0
+    latitude = math.asin(math.cos(far) * math.sin(ref) + ahead * scale * math.cos(ref))
+    below = math.cos(far) * math.cos(ref) - ahead * scale * math.sin(ref)
+    longitude = east + math.atan2(aside * scale, below)
+    height_m = m["ref_alt"] - m["z"] - m[_HOME_ALT]
+    return [Position(math.degrees(latitude), math.degrees(longitude), height_m)]
 
 
 def _attitude(m: Row) -> list[Fact]:
@@ -71,6 +89,7 @@ MESSAGES: Messages = {
     "vehicle_global_position": Message(
         "position", lambda m: [Position(m["lat"], m["lon"], m["alt"] - m[_HOME_ALT])]
     ),
+    "vehicle_local_position": Message("position, where the global one is not logged", _local),
     "home_position": Message("altitude of home", lambda m: []),
     "vehicle_gps_position": Message("time of the satellites", lambda m: []),
     "vehicle_attitude": Message("attitude", _attitude),
@@ -112,42 +131,58 @@ def read_ulg(path: Path, battery: int | None) -> list[Logged]:
     for topic in log.data_list:
         topics.setdefault(topic.name, []).append(topic)
     offset_s = _offset_s(topics)
-    home = topics.get("home_position")
-    try:
-        for name, message in MESSAGES.items():
-            for topic in topics.get(name, []):
-                # of all but batteries, others are spare sensors or estimates of their own
-                if topic.multi_id and name != "battery_status":
-                    continue
-                rows = _rows(topic, home[0] if home else None)
-                for time_s, row in rows:
+    home_alt = _home_alt(topics, streams)
+    for name, message in MESSAGES.items():
+        if name == _LOCAL and _GLOBAL in topics:
+            continue
+        for topic in topics.get(name, []):
+            # of all but batteries, others are spare sensors or estimates of their own
+            if topic.multi_id and name != "battery_status":
+                continue
+            try:
+                for time_s, row in _rows(topic, home_alt):
                     streams.add(offset_s + time_s, message.facts(row))
-    except KeyError as error:
-        raise InputError(f"{path}: {name} of its log has no field {error}") from error
+            except KeyError as error:
+                raise InputError(f"{path}: {name} of its log has no field {error}") from error
     for said in log.logged_messages:
         streams.add(offset_s + 1e-6 * said.timestamp, TEXTS.facts(said.message))
-    if not home:
-        streams.notes.append("its log has no home_position: heights are above where it began")
-    return [streams.logged(path, "vehicle_global_position", battery)]
+    return [streams.logged(path, _GLOBAL, battery)]
 
 
-def _rows(topic: Any, home: Any) -> Iterator[tuple[float, dict[str, Any]]]:
+def _rows(topic: Any, home_alt: Callable[[Any], Any]) -> Iterator[tuple[float, dict[str, Any]]]:
     """Time [s] and fields of each message of a topic, with its instance and the height of home."""
     columns = {name: values.tolist() for name, values in topic.data.items()}
     times_us = topic.data["timestamp"]
-    if topic.name == "vehicle_global_position":
-        columns[_HOME_ALT] = _home_alt(times_us, topic.data["alt"], home).tolist()
+    if topic.name in (_GLOBAL, _LOCAL):
+        columns[_HOME_ALT] = home_alt(times_us).tolist()
     for n, time_us in enumerate(times_us.tolist()):
         row = {name: values[n] for name, values in columns.items()}
         yield 1e-6 * time_us, {**row, "multi_id": topic.multi_id}
 
 
-def _home_alt(times_us: Any, alt: Any, home: Any) -> Any:
-    """(N,) the altitude of home as it was set last, or will be first [m]."""
-    if home is None:
-        return np.full(len(times_us), alt[0])
-    last = np.searchsorted(home.data["timestamp"], times_us, side="right") - 1
-    return home.data["alt"][np.maximum(last, 0)]
+def _home_alt(topics: Mapping[str, list[Any]], streams: Streams) -> Callable[[Any], Any]:
+    """The altitude of home at times (N,) as it was set last, or will be first [m]."""
+    for name, field, instead in (
+        ("home_position", "alt", ""),
+        (_LOCAL, "ref_alt", "the origin of its own map"),
+        (_GLOBAL, "alt", "where it began"),
+    ):
+        for topic in topics.get(name, [])[:1]:
+            known = np.isfinite(topic.data[field])
+            if not known.any():
+                continue
+            if instead:
+                streams.notes.append(f"its log has no home_position: heights are above {instead}")
+            set_us, alt = topic.data["timestamp"][known], topic.data[field][known]
+            if name == _GLOBAL:
+                set_us, alt = set_us[:1], alt[:1]
+            return partial(_as_set_last, set_us, alt)
+    return lambda times_us: np.zeros(len(times_us))
+
+
+def _as_set_last(set_us: Any, values: Any, times_us: Any) -> Any:
+    last = np.searchsorted(set_us, times_us, side="right") - 1
+    return values[np.maximum(last, 0)]
 
 
 def _offset_s(topics: Mapping[str, list[Any]]) -> float:

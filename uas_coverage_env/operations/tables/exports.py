@@ -1,14 +1,12 @@
 """What exports write, and what vehicles do when something fails: tables for the docs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from uas_coverage_env.operations import ENDINGS, FIRMWARES
 from uas_coverage_env.operations.failures import FAILURES
 from uas_coverage_env.operations.formats.parameters import PARAMETERS, Named
 from uas_coverage_env.operations.homeward import RETRACE, RETURN
-
-Table = tuple[tuple[str, ...], Sequence[tuple[str, ...]]]
-"""Head and rows."""
+from uas_coverage_env.operations.tables import Table
 
 
 def exported_files() -> Table:

@@ -1,9 +1,8 @@
 """Tables of pages on what readers make of files: roles, words, plans, kinds of a town."""
 
-from collections.abc import Sequence
-
 from uas_coverage_env.operations.qgc_plan import ITEMS
 from uas_coverage_env.operations.roles import ROLES, SOLID_WORDS, UNSAID
+from uas_coverage_env.operations.tables import Table
 from uas_coverage_env.operations.tags import (
     BUILDING,
     GUESSED_M,
@@ -12,8 +11,6 @@ from uas_coverage_env.operations.tags import (
     MET_TALL,
     STANDING,
 )
-
-Table = tuple[tuple[str, ...], Sequence[tuple[str, ...]]]
 
 
 def area_roles() -> Table:

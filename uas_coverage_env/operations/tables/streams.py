@@ -1,15 +1,11 @@
 """What a stream does about what goes wrong, and what it sets and reads: tables for the docs."""
 
-from collections.abc import Sequence
-
 from uas_coverage_env.operations.stream import StreamOptions
 from uas_coverage_env.operations.stream.autopilots import AUTOPILOTS
 from uas_coverage_env.operations.stream.failsafes import SETTINGS
 from uas_coverage_env.operations.stream.giving_up import REACTIONS
 from uas_coverage_env.operations.stream.troubles import TROUBLES
-
-Table = tuple[tuple[str, ...], Sequence[tuple[str, ...]]]
-"""Head and rows."""
+from uas_coverage_env.operations.tables import Table
 
 
 def stream_troubles() -> Table:
