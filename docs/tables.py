@@ -40,6 +40,11 @@ from uas_coverage_env.flight.registry import (
     PlannerDescription,
     describe_planners,
 )
+from uas_coverage_env.operations.stream import StreamOptions
+from uas_coverage_env.operations.stream.autopilots import AUTOPILOTS
+from uas_coverage_env.operations.stream.failsafes import SETTINGS
+from uas_coverage_env.operations.stream.giving_up import REACTIONS
+from uas_coverage_env.operations.stream.troubles import TROUBLES
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -338,6 +343,48 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
+def stream_troubles() -> str:
+    """What slows a stream down, and what comes of it."""
+    options = StreamOptions()
+    rows = [
+        (
+            trouble.when.format(silent_s=options.silent_s),
+            "all slow down and stand" if trouble.stops else "all slow down as far as needed",
+            trouble.then,
+        )
+        for trouble in TROUBLES.values()
+    ]
+    return table(("a vehicle is", "the stream", "the vehicle"), rows)
+
+
+def stream_failsafes() -> str:
+    """Parameters that a stream sets before vehicles arm."""
+    rows = []
+    for setting in SETTINGS:
+        names = " or ".join(f"`{one.name}`" for one in setting.names)
+        values = sorted({setting.value, setting.otherwise})
+        rows.append((setting.autopilot, names, " or ".join(f"{v:g}" for v in values), setting.why))
+    return table(("autopilot", "parameter", "set to", "so that"), rows)
+
+
+def stream_reactions() -> str:
+    """What `--on-abort` may be."""
+    rows = [(f"`{name}`", one.words, one.ends) for name, one in REACTIONS.items()]
+    return table(("`--on-abort`", "each is told to", "how that ends"), rows)
+
+
+def stream_limits() -> str:
+    """Parameters of vehicles that a stream reads."""
+    rows = [
+        (
+            one.name,
+            ", ".join(" or ".join(f"`{n.name}`" for n in names) for names in one.limits.values()),
+        )
+        for one in AUTOPILOTS.values()
+    ]
+    return table(("autopilot", "what is read"), rows)
+
+
 PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
@@ -356,6 +403,10 @@ PARTS: dict[str, Callable[[], str]] = {
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
     "planners": planners,
+    "stream_troubles": stream_troubles,
+    "stream_failsafes": stream_failsafes,
+    "stream_reactions": stream_reactions,
+    "stream_limits": stream_limits,
 }
 
 

@@ -11,6 +11,7 @@ import math
 import os
 import socket
 from importlib import import_module
+from itertools import pairwise
 
 os.environ.setdefault("MAVLINK20", "1")
 
@@ -439,7 +440,7 @@ class SimulatedVehicle:
         """How far it may fly on until it has to turn or stand; at least some metres."""
         places = [self._wish, *(place for place, _ in reversed(self._way[-20:]))]
         left, first = 0.0, None
-        for one, other in zip(places, places[1:], strict=False):
+        for one, other in pairwise(places):
             leg = other - one
             if abs(leg) > 0.5:
                 turn = 0.0 if first is None else abs(cmath.phase(leg / first))

@@ -1,5 +1,7 @@
 """The documented example, streamed to vehicles that fly as ArduPilot's simulator was seen to."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -52,7 +54,7 @@ def off_and_room_m(flight, uas, vehicle):
     flown = np.array(vehicle.path)[:, 1:]
     flown = flown[flown[:, 2] < -4.0]
     around = Surroundings(flight.scenario, uas)
-    rooms = [around.room(a, b).contact_m for a, b in zip(flown, flown[1:], strict=False)]
+    rooms = [around.room(a, b).contact_m for a, b in pairwise(flown)]
     return KDTree(path_m).query(flown)[0], min(rooms)
 
 

@@ -157,8 +157,7 @@ class Companion:
         home_m, return_m = plan.place_m(plan.last_s), self._limits[name].return_m
         places_m = plan.places_at_m(np.arange(plan.first_s, plan.last_s, 2.0))
         return all(
-            self._around.goes_straight_home(name, place_m, home_m, return_m)
-            for place_m in places_m
+            self._around.goes_straight_home(name, place_m, home_m, return_m) for place_m in places_m
         )
 
     def _stream(self) -> None:
@@ -224,11 +223,12 @@ class Companion:
                 if self._back[name].is_there:
                     del self._back[name]
 
-    def _allowed_rate(
-        self, now_s: float, rate: float
-    ) -> tuple[float, bool, tuple[str, str], str]:
-        """How fast plan time may pass; whether all have to stand; which trouble it is, and whose,
-        and what the user reads."""
+    def _allowed_rate(self, now_s: float, rate: float) -> tuple[float, bool, tuple[str, str], str]:
+        """How fast plan time may pass.
+
+        Returns:
+            That; whether all have to stand; which trouble it is and whose; what the user reads.
+        """
         late = _HURRY_PER_S * max(self.late_s, 0.0) if self._may_hurry else 0.0
         allowed, trouble, said = min(1.0 + late, self._pace.at(self.plan_s)), "", ""
         whose = ""

@@ -107,9 +107,7 @@ class GivingUp:
         flying = [
             link
             for link in self._fleet
-            if link.armed
-            and link.name not in landing
-            and (link.takes_targets or link.mode is None)
+            if link.armed and link.name not in landing and (link.takes_targets or link.mode is None)
         ]
         self._fleet.held_m = {}
         # before they are heard again, which may be what has failed
