@@ -119,7 +119,8 @@ class SimulatedVehicle:
 
     autopilot = mav.MAV_AUTOPILOT_ARDUPILOTMEGA
     manual, guided, land, hold, home = STABILIZE, GUIDED, LAND, BRAKE, SMART_RTL
-    forgets = whole = ()
+    forgets: tuple[str, ...] = ()
+    whole: tuple[str, ...] = ()
 
     def __init__(
         self,

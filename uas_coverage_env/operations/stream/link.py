@@ -120,8 +120,8 @@ class VehicleLink:
             self.texts.append(message.text)
             self._has_warned = True
         elif kind == "COMMAND_ACK" and message.command == _ARM:
-            if message.result not in _ACCEPTED and not self._has_warned:
-                self.texts.append(f"refuses to arm (MAV_RESULT {message.result})")
+            refused = message.result not in _ACCEPTED and not self._has_warned
+            self.texts += [f"refuses to arm (MAV_RESULT {message.result})"] * refused
 
     def _meet(self, heartbeat: Any) -> None:
         if heartbeat.autopilot not in AUTOPILOTS:
