@@ -255,7 +255,7 @@ def test_a_vehicle_whose_failsafes_cannot_be_set_is_not_armed(flight, how, reaso
     loop.vehicles[1].forgets = how.get("forgets", ())
     ended, _ = loop.fly()
     assert ended.reason.startswith(f"uas_2 {reason}")
-    assert ended.done == "no vehicle is armed"
+    assert ended.done == "no vehicle was told anything"
     assert [vehicle.armings for vehicle in loop.vehicles] == [0, 0]
 
 
@@ -362,7 +362,7 @@ def test_a_vehicle_whose_checks_fail_is_named_at_once_and_none_is_armed(flight):
     assert loop.says("uas_2 says: PreArm: Battery 1 below minimum arming voltage") < 10.0
     assert ended.reason.startswith("uas_2 does not pass its checks before arming")
     assert ended.reason.endswith("PreArm: Battery 1 below minimum arming voltage")
-    assert ended.done == "no vehicle is armed"
+    assert ended.done == "no vehicle was told anything"
     assert [vehicle.armings for vehicle in loop.vehicles] == [0, 0]
 
 
@@ -383,8 +383,20 @@ def test_a_vehicle_that_is_elsewhere_is_not_armed(flight):
     loop.vehicles[1].place_m = np.array([150.0, 150.0, 0.0])
     ended, _ = loop.fly()
     assert ended.reason == "uas_2 is 95 m from its start; put it there"
-    assert ended.done == "no vehicle is armed"
+    assert ended.done == "no vehicle was told anything"
     assert not any(vehicle.armings for vehicle in loop.vehicles)
+
+
+def test_a_vehicle_that_flies_already_is_left_alone_and_no_other_is_armed(flight):
+    loop = Loopback(flight)
+    other = loop.vehicles[1]
+    other.armed, other.mode, other.place_m = True, GUIDED, np.array([*STARTS_M[1][:2], -20.0])
+    ended, _ = loop.fly()
+    assert ended.reason == "uas_2 is flying or armed; stream begins on the ground"
+    assert ended.done == "no vehicle was told anything"
+    assert other.mode == GUIDED
+    assert other.set_to == []
+    assert loop.vehicles[0].armings == 0
 
 
 def test_an_autopilot_with_other_modes_is_refused(flight):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream.fleet import Fleet, GivenUpError
-from uas_coverage_env.operations.stream.giving_up import GivingUp
+from uas_coverage_env.operations.stream.giving_up import NOTHING_TOLD, GivingUp
 from uas_coverage_env.operations.stream.limits import Limits
 from uas_coverage_env.operations.stream.link import VehicleLink
 from uas_coverage_env.operations.stream.pace import Pace
@@ -106,6 +106,7 @@ class Companion:
         self._landing: set[str] = set()
         self._back: dict[str, WayBack] = {}
         self._failsafes = Failsafes(fleet)
+        self._has_told = False
         self.plan_s = min(plan.first_s for plan in plans.values())
         self.late_s, self._rate_per_s, self._off_path_m = 0.0, 0.0, 0.0
 
@@ -133,6 +134,8 @@ class Companion:
         return Ended(reason, self.late_s, done)
 
     def _give_up(self) -> str:
+        if not self._has_told:  # whatever flies is flown by somebody else
+            return NOTHING_TOLD
         homes_m = {name: plan.place_m(plan.last_s) for name, plan in self._plans.items()}
         giving_up = GivingUp(
             self._fleet, self._around, self._limits, homes_m, self._options.reaction
@@ -150,6 +153,7 @@ class Companion:
         self._check(self._pace, self._limits)
         straight = {name: self._goes_straight_home(name) for name in self._plans}
         self._failsafes.set(straight, patience_s)
+        self._has_told = True
         take_off(fleet, starts_m, patience_s)
 
     def _goes_straight_home(self, name: str) -> bool:

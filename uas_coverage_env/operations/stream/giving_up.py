@@ -38,6 +38,7 @@ class Reaction(NamedTuple):
     ends: str
 
 
+NOTHING_TOLD = "no vehicle was told anything"
 _ENDS_HOME = "lands at home; the command ends when all have landed"
 REACTIONS = {
     "home": Reaction(
@@ -121,8 +122,7 @@ class GivingUp:
 
     def _in_words(self) -> str:
         if not self._told:
-            flew = any(link.armed for link in self._fleet)
-            return "no vehicle was told anything" if flew else "no vehicle is armed"
+            return NOTHING_TOLD
         groups: dict[str, list[str]] = {}
         for name, words in self._told.items():
             groups.setdefault(words, []).append(name)
