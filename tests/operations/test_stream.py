@@ -469,7 +469,7 @@ def test_a_plan_that_vehicles_cannot_follow_is_refused_with_the_command_that_pla
         loop.fly()
     line = str(refused.value)
     assert "more than the vehicles are set to (2.5 m/s² and 10 m/s)" in line
-    assert "uas-coverage import ... --flown-by autopilot --speed 10, or load the .param" in line
+    assert "uas-coverage import ... --flown-by autopilot --speed 9, or load the .param" in line
     assert not any(vehicle.armings for vehicle in loop.vehicles)
     asked = float(line.rsplit("--late ", 1)[1])
     allowed = Loopback(fast, late=0.01 * asked)

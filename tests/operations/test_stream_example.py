@@ -28,7 +28,7 @@ def planned(folder, *options):
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
     folder = tmp_path_factory.mktemp("town")
-    return planned(folder, "--flown-by", "autopilot", "--speed", "10")
+    return planned(folder, "--flown-by", "autopilot", "--speed", "9")
 
 
 def streamed(flight, *hows):
@@ -86,5 +86,5 @@ def test_a_link_that_is_cut_beside_the_zone_leads_nobody_into_it(flight):
 
 def test_a_plan_that_no_autopilot_can_follow_is_refused(tmp_path):
     flight = planned(tmp_path)
-    with pytest.raises(InputError, match=r"import \.\.\. --flown-by autopilot --speed 10"):
+    with pytest.raises(InputError, match=r"import \.\.\. --flown-by autopilot --speed 9"):
         streamed(flight, {}, {})

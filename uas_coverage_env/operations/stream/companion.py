@@ -29,12 +29,12 @@ from uas_coverage_env.operations.stream.troubles import TROUBLES
 
 FloatArray = NDArray[np.float64]
 
-_DELAY_S = 0.5
+_DELAY_S = 0.2
 """What is reported may be so old, and what is sent may be followed so much later."""
 _LEAD_S = 0.5
 """Velocities are sent so far ahead: GUIDED takes no accelerations, and follows so much later."""
-_TRAILS_M = 1.5
-"""GUIDED trails an accelerating target by so much."""
+_TRAILS_M = 1.0
+"""GUIDED trails an accelerating target, or is beside it, by so much."""
 _SAME_M = 1.0
 _LOOKS_S = np.arange(-100, 21) / 10.0
 _NOW = 100
@@ -42,6 +42,7 @@ _NOW = 100
 _BRAKES_SHARE = 0.8
 _HURRY_PER_S = 0.3
 _STANDS = 0.02
+_TELLS_BELOW = 0.8
 _TELL_EVERY_S = 10.0
 _LANDING_S = 180.0
 
@@ -167,7 +168,7 @@ class Companion:
     def _stream(self) -> None:
         """Targets until the last one begins to land."""
         rate, before_s, stood_since_s, told_s = 0.0, self._fleet.now_s(), None, -np.inf
-        said = ("", "")
+        said, said_s = ("", ""), -np.inf
         for now_s in self._fleet.ticks():
             passed_s, before_s = now_s - before_s, now_s
             self._see_who_is_away(now_s, rate, passed_s)
@@ -176,9 +177,12 @@ class Companion:
             self._rate_per_s = (rate - before) / max(passed_s, 1e-3)
             self.plan_s += rate * passed_s
             self.late_s += (1.0 - rate) * passed_s
-            if why and about != said:
+            is_new = about != said and (stops or now_s > said_s + _TELL_EVERY_S)
+            if why and is_new:
                 self._fleet.tell(why)
-            said = about
+                said, said_s = about, now_s
+            elif stops or not why:
+                said = about
             if stops and rate < _STANDS:
                 stood_since_s = now_s if stood_since_s is None else stood_since_s
                 if now_s > stood_since_s + self._options.patience_s:
@@ -238,11 +242,11 @@ class Companion:
         whose = ""
         for link, plan in self._flown():
             found, share, more = self._trouble(link, plan, now_s, rate)
-            if found and (TROUBLES[found].stops or share < allowed):
+            allowed = min(allowed, share)
+            if found:
                 if not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops:
                     trouble, whose = found, link.name
                     said = TROUBLES[found].says.format(name=whose, more=more)
-                allowed = 0.0 if TROUBLES[found].stops else min(allowed, share)
         return allowed, allowed == 0.0, (trouble, whose), said
 
     def _trouble(
@@ -263,9 +267,10 @@ class Companion:
             self._around.stops_in_m(link.name, link.place_m, link.velocity_mps, limits) <= 0.0
         ):
             return "unclear", 0.0, ""
-        over_m = max(self._behind_m(link.place_m, plan, rate), self._off_path_m)
-        share = min(max(2.0 - 2.0 * over_m / self._options.lag_m, 0.0), 1.0)
-        return ("behind" if share < 1.0 else ""), share, ""
+        behind_m = self._behind_m(link.place_m, plan, rate)
+        over_m = max(behind_m, self._off_path_m - _TRAILS_M)
+        share = min(max(1.0 - over_m / self._options.lag_m, 0.0), 1.0)
+        return ("behind" if share < _TELLS_BELOW else ""), share, ""
 
     def _behind_m(self, place_m: FloatArray, plan: Timeline, rate: float) -> float:
         """How far a vehicle is behind along its path, beyond what is to be expected [m].
