@@ -38,7 +38,7 @@ STARTS_M = (60.0, 60.0, -1.0), (60.0, 120.0, -1.0)
 @pytest.fixture(scope="module")
 def flight():
     waypoints = [waypoint((160.0, east, -20.0)) for east in (60.0, 120.0)]
-    by = Execution(flown_by="autopilot", speed_mps=10.0)
+    by = Execution(flown_by="autopilot", speed_mps=9.0)
     wall = box("wall", (80.0, 150.0, -40.0), (199.0, 154.0, 0.0))
     scenario = meadow(STARTS_M, waypoints=waypoints, obstacles=[wall]).model_copy(
         update={"place": HERE, "execution": by}

@@ -243,10 +243,9 @@ class Companion:
         for link, plan in self._flown():
             found, share, more = self._trouble(link, plan, now_s, rate)
             allowed = min(allowed, share)
-            if found:
-                if not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops:
-                    trouble, whose = found, link.name
-                    said = TROUBLES[found].says.format(name=whose, more=more)
+            if found and (not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops):
+                trouble, whose = found, link.name
+                said = TROUBLES[found].says.format(name=whose, more=more)
         return allowed, allowed == 0.0, (trouble, whose), said
 
     def _trouble(
