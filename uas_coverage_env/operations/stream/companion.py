@@ -242,7 +242,8 @@ class Companion:
         whose = ""
         for link, plan in self._flown():
             found, share, more = self._trouble(link, plan, now_s, rate)
-            allowed = min(allowed, share)
+            if share < 1.0:
+                allowed = min(allowed, share)
             if found and (not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops):
                 trouble, whose = found, link.name
                 said = TROUBLES[found].says.format(name=whose, more=more)
