@@ -41,6 +41,7 @@ _NOW = 100
 """Where on a path a vehicle may be: times from its place on; row of that."""
 _BRAKES_SHARE = 0.8
 _HURRY_PER_S = 0.3
+_RECOVERS_PER_S = 0.15
 _STANDS = 0.02
 _TELLS_BELOW = 0.8
 _TELL_EVERY_S = 10.0
@@ -107,7 +108,7 @@ class Companion:
         self._landing: set[str] = set()
         self._back: dict[str, WayBack] = {}
         self._failsafes = Failsafes(fleet)
-        self._has_told = False
+        self._has_told = self._recovers = False
         self.plan_s = min(plan.first_s for plan in plans.values())
         self.late_s, self._rate_per_s, self._off_path_m = 0.0, 0.0, 0.0
 
@@ -210,6 +211,9 @@ class Companion:
         fall, _ = self._pace.change(self.plan_s, rate, _BRAKES_SHARE)
         _, rise = self._pace.change(self.plan_s, rate)
         most = self._pace.at(self.plan_s)
+        self._recovers = allowed < 0.9 * min(most, 1.0) or (self._recovers and rate < 0.95 * most)
+        if self._recovers:  # it may have to brake again at once, where the plan does
+            rise = min(rise, _RECOVERS_PER_S)
         rate = min(max(allowed, rate + fall * passed_s), rate + rise * passed_s, most)
         return 0.0 if allowed == 0.0 and rate < _STANDS else max(rate, 0.0)
 
@@ -289,7 +293,8 @@ class Companion:
 
     def _send(self, rate: float) -> bool:
         """Send the targets of now; whether any vehicle still flies by them."""
-        ahead = max(rate + _LEAD_S * self._rate_per_s, 0.0)
+        ahead_s = self.plan_s + rate * _LEAD_S
+        ahead = max(min(rate + _LEAD_S * self._rate_per_s, self._pace.at(ahead_s)), 0.0)
         for link, plan in list(self._flown()):
             at_end = self.plan_s >= plan.last_s and link.off_m(plan.place_m(plan.last_s)) < 1.5
             back = self._back.get(link.name)
@@ -300,7 +305,7 @@ class Companion:
                 if link.takes_targets and back.place_m is not None:
                     link.go(back.place_m, back.velocity_mps)
             elif link.takes_targets:
-                velocity_mps = ahead * plan.velocity_mps(self.plan_s + rate * _LEAD_S)
+                velocity_mps = ahead * plan.velocity_mps(ahead_s)
                 link.go(plan.place_m(self.plan_s), velocity_mps)
         for name in self._landing:
             link = self._fleet.links[name]
