@@ -26,8 +26,8 @@ from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import LocalFrame, read_log
-from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream import StreamOptions, stream_flight, timeline_of
+from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.scenario import Execution, Place
 
 HERE = Place(latitude_deg=47.0, longitude_deg=8.0)
@@ -38,7 +38,7 @@ STARTS_M = (60.0, 60.0, -1.0), (60.0, 120.0, -1.0)
 @pytest.fixture(scope="module")
 def flight():
     waypoints = [waypoint((160.0, east, -20.0)) for east in (60.0, 120.0)]
-    by = Execution(flown_by="autopilot", speed_mps=10.0)
+    by = Execution(flown_by="autopilot", speed_mps=9.0)
     wall = box("wall", (80.0, 150.0, -40.0), (199.0, 154.0, 0.0))
     scenario = meadow(STARTS_M, waypoints=waypoints, obstacles=[wall]).model_copy(
         update={"place": HERE, "execution": by}
@@ -67,9 +67,7 @@ class Loopback:
         """Fly, and let vehicles fly on alone for a while after the stream has ended."""
         addresses = {f"uas_{n + 1}": one.address for n, one in enumerate(self.vehicles)}
         try:
-            return stream_flight(
-                self.flight, HERE, addresses, self.options, self.clock, self.tell
-            )
+            return stream_flight(self.flight, HERE, addresses, self.options, self.clock, self.tell)
         finally:
             self.ended_s = self.clock.now_s()
             for _ in range(round(10.0 * then_s)):
@@ -204,7 +202,9 @@ def test_vehicles_whose_companion_is_killed_fly_home_the_way_they_came(flight, n
 
 def test_px4_without_a_companion_returns_as_it_was_set_to_before_it_armed(flight):
     how = {"cut": (24.0, np.inf)}
-    loop = Loopback(flight, kinds=(SimulatedPX4, SimulatedPX4), vehicles=(how, how), patience_s=10.0)
+    loop = Loopback(
+        flight, kinds=(SimulatedPX4, SimulatedPX4), vehicles=(how, how), patience_s=10.0
+    )
     loop.fly(then_s=120.0)
     for u, vehicle in enumerate(loop.vehicles):
         assert vehicle.modes[-1] == vehicle.home
@@ -255,7 +255,7 @@ def test_a_vehicle_whose_failsafes_cannot_be_set_is_not_armed(flight, how, reaso
     loop.vehicles[1].forgets = how.get("forgets", ())
     ended, _ = loop.fly()
     assert ended.reason.startswith(f"uas_2 {reason}")
-    assert ended.done == "no vehicle is armed"
+    assert ended.done == "no vehicle was told anything"
     assert [vehicle.armings for vehicle in loop.vehicles] == [0, 0]
 
 
@@ -362,7 +362,7 @@ def test_a_vehicle_whose_checks_fail_is_named_at_once_and_none_is_armed(flight):
     assert loop.says("uas_2 says: PreArm: Battery 1 below minimum arming voltage") < 10.0
     assert ended.reason.startswith("uas_2 does not pass its checks before arming")
     assert ended.reason.endswith("PreArm: Battery 1 below minimum arming voltage")
-    assert ended.done == "no vehicle is armed"
+    assert ended.done == "no vehicle was told anything"
     assert [vehicle.armings for vehicle in loop.vehicles] == [0, 0]
 
 
@@ -370,7 +370,8 @@ def test_where_one_does_not_arm_the_others_are_armed_once_at_most_and_disarmed(f
     loop = Loopback(flight, vehicles=({}, {"balks": "Throttle too high"}))
     ended, _ = loop.fly()
     assert loop.says("uas_2 says: Arm: Throttle too high") < 10.0
-    assert "uas_2 does not arm" in ended.reason
+    assert ended.reason.startswith("uas_2 does not arm")
+    assert ended.reason.endswith(": Arm: Throttle too high")
     assert ended.done == "uas_1: told to disarm"
     assert [vehicle.armings for vehicle in loop.vehicles] == [1, 0]
     assert not loop.vehicles[0].armed
@@ -382,8 +383,20 @@ def test_a_vehicle_that_is_elsewhere_is_not_armed(flight):
     loop.vehicles[1].place_m = np.array([150.0, 150.0, 0.0])
     ended, _ = loop.fly()
     assert ended.reason == "uas_2 is 95 m from its start; put it there"
-    assert ended.done == "no vehicle is armed"
+    assert ended.done == "no vehicle was told anything"
     assert not any(vehicle.armings for vehicle in loop.vehicles)
+
+
+def test_a_vehicle_that_flies_already_is_left_alone_and_no_other_is_armed(flight):
+    loop = Loopback(flight)
+    other = loop.vehicles[1]
+    other.armed, other.mode, other.place_m = True, GUIDED, np.array([*STARTS_M[1][:2], -20.0])
+    ended, _ = loop.fly()
+    assert ended.reason == "uas_2 is flying or armed; stream begins on the ground"
+    assert ended.done == "no vehicle was told anything"
+    assert other.mode == GUIDED
+    assert other.set_to == []
+    assert loop.vehicles[0].armings == 0
 
 
 def test_an_autopilot_with_other_modes_is_refused(flight):
@@ -456,7 +469,7 @@ def test_a_plan_that_vehicles_cannot_follow_is_refused_with_the_command_that_pla
         loop.fly()
     line = str(refused.value)
     assert "more than the vehicles are set to (2.5 m/s² and 10 m/s)" in line
-    assert "uas-coverage import ... --flown-by autopilot --speed 10, or load the .param" in line
+    assert "uas-coverage import ... --flown-by autopilot --speed 9, or load the .param" in line
     assert not any(vehicle.armings for vehicle in loop.vehicles)
     asked = float(line.rsplit("--late ", 1)[1])
     allowed = Loopback(fast, late=0.01 * asked)

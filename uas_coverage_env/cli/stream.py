@@ -25,7 +25,9 @@ def stream(
     ],
     lag: Annotated[
         float,
-        typer.Option(help="Behind, or off its path, by so much, m, a UAS lets all come to a stand."),
+        typer.Option(
+            help="Behind, or off its path, by so much, m, a UAS lets all come to a stand."
+        ),
     ] = 5.0,
     patience: Annotated[
         float, typer.Option(help="Seconds that all may stand before the stream is given up.")

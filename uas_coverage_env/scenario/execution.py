@@ -9,7 +9,7 @@ from uas_coverage_env.vehicle import VehicleParams
 
 
 class Execution(StrictModel):
-    """How an autopilot will fly the mission: by straight legs, from a file for each UAS, or streamed.
+    """How an autopilot will fly the mission: by straight legs, from files or streamed.
 
     Planners that know it plan long straight legs, from rest to rest, as an autopilot flies them, so
     that the file takes as long as the flight. The simulation does not change.

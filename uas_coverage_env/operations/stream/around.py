@@ -87,9 +87,7 @@ class Around:
         return self.is_clear(name, place_m, ground_m, others_m)
 
 
-def stopping_place_m(
-    place_m: FloatArray, velocity_mps: FloatArray, limits: Limits
-) -> FloatArray:
+def stopping_place_m(place_m: FloatArray, velocity_mps: FloatArray, limits: Limits) -> FloatArray:
     """(3,) where a UAS comes to rest, straight on, if its link is cut now [m]."""
     speed_mps = math.hypot(*velocity_mps)
     if speed_mps < 1e-6:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream.fleet import Fleet, GivenUpError
-from uas_coverage_env.operations.stream.giving_up import GivingUp
+from uas_coverage_env.operations.stream.giving_up import NOTHING_TOLD, GivingUp
 from uas_coverage_env.operations.stream.limits import Limits
 from uas_coverage_env.operations.stream.link import VehicleLink
 from uas_coverage_env.operations.stream.pace import Pace
@@ -29,19 +29,21 @@ from uas_coverage_env.operations.stream.troubles import TROUBLES
 
 FloatArray = NDArray[np.float64]
 
-_DELAY_S = 0.5
+_DELAY_S = 0.2
 """What is reported may be so old, and what is sent may be followed so much later."""
 _LEAD_S = 0.5
 """Velocities are sent so far ahead: GUIDED takes no accelerations, and follows so much later."""
-_TRAILS_M = 1.5
-"""GUIDED trails an accelerating target by so much."""
+_TRAILS_M = 1.0
+"""GUIDED trails an accelerating target, or is beside it, by so much."""
 _SAME_M = 1.0
 _LOOKS_S = np.arange(-100, 21) / 10.0
 _NOW = 100
 """Where on a path a vehicle may be: times from its place on; row of that."""
 _BRAKES_SHARE = 0.8
 _HURRY_PER_S = 0.3
+_RECOVERS_PER_S = 0.15
 _STANDS = 0.02
+_TELLS_BELOW = 0.8
 _TELL_EVERY_S = 10.0
 _LANDING_S = 180.0
 
@@ -106,6 +108,7 @@ class Companion:
         self._landing: set[str] = set()
         self._back: dict[str, WayBack] = {}
         self._failsafes = Failsafes(fleet)
+        self._has_told = self._recovers = False
         self.plan_s = min(plan.first_s for plan in plans.values())
         self.late_s, self._rate_per_s, self._off_path_m = 0.0, 0.0, 0.0
 
@@ -133,6 +136,8 @@ class Companion:
         return Ended(reason, self.late_s, done)
 
     def _give_up(self) -> str:
+        if not self._has_told:  # whatever flies is flown by somebody else
+            return NOTHING_TOLD
         homes_m = {name: plan.place_m(plan.last_s) for name, plan in self._plans.items()}
         giving_up = GivingUp(
             self._fleet, self._around, self._limits, homes_m, self._options.reaction
@@ -150,6 +155,7 @@ class Companion:
         self._check(self._pace, self._limits)
         straight = {name: self._goes_straight_home(name) for name in self._plans}
         self._failsafes.set(straight, patience_s)
+        self._has_told = True
         take_off(fleet, starts_m, patience_s)
 
     def _goes_straight_home(self, name: str) -> bool:
@@ -157,14 +163,13 @@ class Companion:
         home_m, return_m = plan.place_m(plan.last_s), self._limits[name].return_m
         places_m = plan.places_at_m(np.arange(plan.first_s, plan.last_s, 2.0))
         return all(
-            self._around.goes_straight_home(name, place_m, home_m, return_m)
-            for place_m in places_m
+            self._around.goes_straight_home(name, place_m, home_m, return_m) for place_m in places_m
         )
 
     def _stream(self) -> None:
         """Targets until the last one begins to land."""
         rate, before_s, stood_since_s, told_s = 0.0, self._fleet.now_s(), None, -np.inf
-        said = ("", "")
+        said, said_s = ("", ""), -np.inf
         for now_s in self._fleet.ticks():
             passed_s, before_s = now_s - before_s, now_s
             self._see_who_is_away(now_s, rate, passed_s)
@@ -173,9 +178,12 @@ class Companion:
             self._rate_per_s = (rate - before) / max(passed_s, 1e-3)
             self.plan_s += rate * passed_s
             self.late_s += (1.0 - rate) * passed_s
-            if why and about != said:
+            is_new = about != said and (stops or now_s > said_s + _TELL_EVERY_S)
+            if why and is_new:
                 self._fleet.tell(why)
-            said = about
+                said, said_s = about, now_s
+            elif stops or not why:
+                said = about
             if stops and rate < _STANDS:
                 stood_since_s = now_s if stood_since_s is None else stood_since_s
                 if now_s > stood_since_s + self._options.patience_s:
@@ -203,6 +211,9 @@ class Companion:
         fall, _ = self._pace.change(self.plan_s, rate, _BRAKES_SHARE)
         _, rise = self._pace.change(self.plan_s, rate)
         most = self._pace.at(self.plan_s)
+        self._recovers = allowed < 0.9 * min(most, 1.0) or (self._recovers and rate < 0.95 * most)
+        if self._recovers:  # it may have to brake again at once, where the plan does
+            rise = min(rise, _RECOVERS_PER_S)
         rate = min(max(allowed, rate + fall * passed_s), rate + rise * passed_s, most)
         return 0.0 if allowed == 0.0 and rate < _STANDS else max(rate, 0.0)
 
@@ -224,21 +235,22 @@ class Companion:
                 if self._back[name].is_there:
                     del self._back[name]
 
-    def _allowed_rate(
-        self, now_s: float, rate: float
-    ) -> tuple[float, bool, tuple[str, str], str]:
-        """How fast plan time may pass; whether all have to stand; which trouble it is, and whose,
-        and what the user reads."""
+    def _allowed_rate(self, now_s: float, rate: float) -> tuple[float, bool, tuple[str, str], str]:
+        """How fast plan time may pass.
+
+        Returns:
+            That; whether all have to stand; which trouble it is and whose; what the user reads.
+        """
         late = _HURRY_PER_S * max(self.late_s, 0.0) if self._may_hurry else 0.0
         allowed, trouble, said = min(1.0 + late, self._pace.at(self.plan_s)), "", ""
         whose = ""
         for link, plan in self._flown():
             found, share, more = self._trouble(link, plan, now_s, rate)
-            if found and (TROUBLES[found].stops or share < allowed):
-                if not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops:
-                    trouble, whose = found, link.name
-                    said = TROUBLES[found].says.format(name=whose, more=more)
-                allowed = 0.0 if TROUBLES[found].stops else min(allowed, share)
+            if share < 1.0:
+                allowed = min(allowed, share)
+            if found and (not trouble or TROUBLES[found].stops > TROUBLES[trouble].stops):
+                trouble, whose = found, link.name
+                said = TROUBLES[found].says.format(name=whose, more=more)
         return allowed, allowed == 0.0, (trouble, whose), said
 
     def _trouble(
@@ -259,9 +271,10 @@ class Companion:
             self._around.stops_in_m(link.name, link.place_m, link.velocity_mps, limits) <= 0.0
         ):
             return "unclear", 0.0, ""
-        over_m = max(self._behind_m(link.place_m, plan, rate), self._off_path_m)
-        share = min(max(2.0 - 2.0 * over_m / self._options.lag_m, 0.0), 1.0)
-        return ("behind" if share < 1.0 else ""), share, ""
+        behind_m = self._behind_m(link.place_m, plan, rate)
+        over_m = max(behind_m, self._off_path_m - _TRAILS_M)
+        share = min(max(1.0 - over_m / self._options.lag_m, 0.0), 1.0)
+        return ("behind" if share < _TELLS_BELOW else ""), share, ""
 
     def _behind_m(self, place_m: FloatArray, plan: Timeline, rate: float) -> float:
         """How far a vehicle is behind along its path, beyond what is to be expected [m].
@@ -280,7 +293,8 @@ class Companion:
 
     def _send(self, rate: float) -> bool:
         """Send the targets of now; whether any vehicle still flies by them."""
-        ahead = max(rate + _LEAD_S * self._rate_per_s, 0.0)
+        ahead_s = self.plan_s + rate * _LEAD_S
+        ahead = max(min(rate + _LEAD_S * self._rate_per_s, self._pace.at(ahead_s)), 0.0)
         for link, plan in list(self._flown()):
             at_end = self.plan_s >= plan.last_s and link.off_m(plan.place_m(plan.last_s)) < 1.5
             back = self._back.get(link.name)
@@ -291,7 +305,7 @@ class Companion:
                 if link.takes_targets and back.place_m is not None:
                     link.go(back.place_m, back.velocity_mps)
             elif link.takes_targets:
-                velocity_mps = ahead * plan.velocity_mps(self.plan_s + rate * _LEAD_S)
+                velocity_mps = ahead * plan.velocity_mps(ahead_s)
                 link.go(plan.place_m(self.plan_s), velocity_mps)
         for name in self._landing:
             link = self._fleet.links[name]

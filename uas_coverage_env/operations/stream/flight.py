@@ -19,7 +19,7 @@ from uas_coverage_env.operations.stream.fleet import Fleet
 from uas_coverage_env.operations.stream.giving_up import REACTIONS
 from uas_coverage_env.operations.stream.limits import Limits
 from uas_coverage_env.operations.stream.link import VehicleLink, check_address
-from uas_coverage_env.operations.stream.pace import Pace
+from uas_coverage_env.operations.stream.pace import SHARE, Pace
 from uas_coverage_env.operations.stream.timeline import Timeline, timeline_of
 from uas_coverage_env.scenario import Place, Scenario
 
@@ -123,8 +123,8 @@ def _check_pace(
     raise InputError(
         f"the plan needs more than the vehicles are set to ({weakest:g} m/s²{speed}): it would "
         f"take {late_s:.0f} s ({share:.0f} %) longer; plan it for them: uas-coverage import ... "
-        f"--flown-by autopilot --speed {slowest:g}{load if speed else ''}; or allow it: --late "
-        f"{math.ceil(share)}"
+        f"--flown-by autopilot --speed {SHARE * slowest:.3g}{load if speed else ''}; or allow it: "
+        f"--late {math.ceil(share)}"
     )
 
 

@@ -38,6 +38,7 @@ class Reaction(NamedTuple):
     ends: str
 
 
+NOTHING_TOLD = "no vehicle was told anything"
 _ENDS_HOME = "lands at home; the command ends when all have landed"
 REACTIONS = {
     "home": Reaction(
@@ -107,9 +108,7 @@ class GivingUp:
         flying = [
             link
             for link in self._fleet
-            if link.armed
-            and link.name not in landing
-            and (link.takes_targets or link.mode is None)
+            if link.armed and link.name not in landing and (link.takes_targets or link.mode is None)
         ]
         self._fleet.held_m = {}
         # before they are heard again, which may be what has failed
@@ -123,8 +122,7 @@ class GivingUp:
 
     def _in_words(self) -> str:
         if not self._told:
-            flew = any(link.armed for link in self._fleet)
-            return "no vehicle was told anything" if flew else "no vehicle is armed"
+            return NOTHING_TOLD
         groups: dict[str, list[str]] = {}
         for name, words in self._told.items():
             groups.setdefault(words, []).append(name)

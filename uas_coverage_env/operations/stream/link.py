@@ -70,6 +70,7 @@ class VehicleLink:
         self.is_ready: bool | None = None
         self.parameters: dict[str, float] = {}
         self.texts: list[str] = []
+        self._has_warned = False
         self._system: int | None = None
         self._link = _connected(name, address)
 
@@ -117,9 +118,10 @@ class VehicleLink:
             self.parameters[message.param_id] = value
         elif kind == "STATUSTEXT" and message.severity <= _WARNING:
             self.texts.append(message.text)
-        elif kind == "COMMAND_ACK" and message.result not in _ACCEPTED:
-            if message.command == _ARM:
-                self.texts.append(f"refuses to arm (MAV_RESULT {message.result})")
+            self._has_warned = True
+        elif kind == "COMMAND_ACK" and message.command == _ARM:
+            refused = message.result not in _ACCEPTED and not self._has_warned
+            self.texts += [f"refuses to arm (MAV_RESULT {message.result})"] * refused
 
     def _meet(self, heartbeat: Any) -> None:
         if heartbeat.autopilot not in AUTOPILOTS:

@@ -24,7 +24,8 @@ FloatArray = NDArray[np.float64]
 
 STEP_S = 0.1
 SHARE = 0.9
-"""Of its accelerations that a vehicle is asked for; the rest is for wind and what it is behind."""
+"""Of its accelerations that a vehicle is asked for, and of its speed to make up for what it is
+late; the rest is for wind, and for what it is behind."""
 _FASTEST, _SLOWEST = 1.5, 0.05
 _RATE_PER_S = 0.5
 _SLOWER = (1.0, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1, 0.05)
@@ -52,7 +53,8 @@ class _Motion:
         by, tiny = self.limits, 1e-9
         climbs = self._climb > 0.0
         upright = np.where(climbs, by.up_mps, by.down_mps) / np.maximum(np.abs(self._climb), tiny)
-        speed = np.minimum(by.speed_mps / np.maximum(self.level_mps, tiny), upright)
+        most = np.maximum(SHARE * by.speed_mps, np.minimum(self.level_mps, by.speed_mps))
+        speed = np.minimum(most / np.maximum(self.level_mps, tiny), upright)
         turning = SHARE * by.acceleration_mps2 / np.maximum(self._total, tiny)
         heaving = SHARE * by.vertical_mps2 / np.maximum(np.abs(self._up), tiny)
         return np.minimum.reduce([speed**2, turning, heaving, np.full(len(speed), _FASTEST**2)])

@@ -186,9 +186,7 @@ def take_off(fleet: Fleet, starts_m: Mapping[str, FloatArray], patience_s: float
     fleet.until(
         lambda link: _height_m(link) > -float(starts_m[link.name][2]) - _UP_WITHIN_M,
         lambda link: (
-            None
-            if link.autopilot.is_streamed_to
-            else link.take_off(-float(starts_m[link.name][2]))
+            None if link.autopilot.is_streamed_to else link.take_off(-float(starts_m[link.name][2]))
         ),
         patience_s,
         "does not take off",
