@@ -23,7 +23,7 @@ def field(low_m, high_m, places, start=START, **fields):
     return mission([(place, 5.0) for place in places], [start], geofence=fence, **fields)
 
 
-def rule(scenario, detour=1.25, routed=True):
+def rule(scenario, detour=1.5, routed=True):
     brief = MissionBrief.of(scenario)
     return ReturnRule(brief, detour, Ways(brief) if routed else None)
 
@@ -56,7 +56,7 @@ def test_a_way_round_a_wall_counts_and_not_the_straight_one_through_it():
     here, only = np.array(START), np.ones(1, bool)
     round_it = due_s(rule(scenario).dod_return("uas_1", here, only))
     straight = due_s(rule(scenario, routed=False).dod_return("uas_1", here, only))
-    assert round_it > straight + 1.25 * 2.0 * 100.0 / 12.0
+    assert round_it > straight + 1.5 * 2.0 * 100.0 / 12.0
 
 
 def test_the_more_is_covered_near_by_the_earlier_a_uas_returns():

@@ -317,3 +317,37 @@ def test_a_loop_that_takes_over_in_mid_manoeuvre_keeps_the_limits(name, dt_s):
         tilt, speed = largest_of_handed_over_flights(record, commands, forgets)
         assert tilt <= limits.tilt_max_rad * (1.0 + tolerated), forgets
         assert speed <= limits.v_xy_max_mps * (1.0 + tolerated), forgets
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    name=names,
+    dt_s=steps_s,
+    tilt=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 2.0 * math.pi)),
+    rate=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 2.0 * math.pi)),
+    velocity=st.tuples(st.floats(0.0, 0.9), st.floats(0.0, 2.0 * math.pi)),
+    course=st.floats(0.0, 2.0 * math.pi),
+)
+def test_a_loop_that_takes_over_keeps_the_tilt_wherever_torques_on_both_axes_can(
+    name, dt_s, tilt, rate, velocity, course
+):
+    limits, vehicle = load(name).limits, record_of(name, dt_s)
+    x, reference, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
+    for (size, angle), first, bound in (
+        (velocity, VX, limits.v_xy_max_mps),
+        (tilt, PHI, limits.tilt_max_rad),
+        (rate, WX, limits.rate_max_radps),
+    ):
+        x[first : first + 2] = size * bound * np.array([math.cos(angle), math.sin(angle)])
+    # a plan that leads here has a step to follow that keeps the limit
+    free = x[PHI : THETA + 1] + dt_s * x[WX : WY + 1]
+    most = 0.5 * dt_s**2 * limits.angular_acceleration_xy_max_radps2
+    kept = np.linalg.norm(free - np.clip(free, -most, most)) <= 0.999 * limits.tilt_max_rad
+    if not kept:
+        return
+    reseed_reference(vehicle, x, reference)
+    north, east = limits.v_xy_max_mps * math.cos(course), limits.v_xy_max_mps * math.sin(course)
+    for _ in range(10):
+        velocity_climb_wrench(vehicle, x, reference, north, east, 0.0, u)
+        lpv_step(vehicle, x, u, x)
+        assert math.hypot(x[PHI], x[THETA]) <= 1.0101 * limits.tilt_max_rad

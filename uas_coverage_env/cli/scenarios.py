@@ -88,7 +88,8 @@ def check(
     A picture that this command has made is drawn anew.
     """
     scenario = loaded(file)
-    for warning in _not_to_be_covered(scenario):
+    access = Access(MissionBrief.of(scenario))
+    for warning in _closed_off(scenario, access):
         sys.stderr.write(f"warning: {warning}\n")
     path = picture_file or Path(f"{scenario.name}.png")
     if path.exists() and not overwrite and not _drawn_by_us(path):
@@ -110,38 +111,49 @@ def check(
     out.print(f"[bold]{scenario.name}[/] is valid", highlight=False)
     for line in _lines(scenario):
         out.print(line, markup=False)
+    for line in _far(scenario, access):
+        out.print(f"charge     {line}", markup=False)
     out.print(f"drawn in {path}", markup=False)
 
 
-def _not_to_be_covered(scenario: Scenario) -> Iterator[str]:
-    """Waypoints without a way to them, and those beyond every charge; a line for each of both."""
-    brief = MissionBrief.of(scenario)
-    access, errands = Access(brief), Errands(brief)
-    closed, far = {}, {}
-    for w in sorted(set(range(len(scenario.waypoints))) - set(out_of_reach(scenario, 0.0))):
-        carriers = np.flatnonzero(brief.can_cover[:, w])
-        able = carriers[access.has_way[carriers, w]]
-        if len(carriers) and not len(able):
+def _closed_off(scenario: Scenario, access: Access) -> Iterator[str]:
+    """That waypoints have no way to them, and why; in a line."""
+    closed = {}
+    for w in _coverable(scenario):
+        carriers = np.flatnonzero(scenario.can_cover[:, w])
+        if not access.has_way[carriers, w].any():
             closed[w] = access.why_closed(int(carriers[0]), w)
-        elif len(able):
-            best = max((errands.from_start(u, w) for u in able.tolist()), key=lambda e: e.spare_s)
-            if best.spare_s < 0.0:
-                far[w] = too_long(best)
-    of = f"of {len(scenario.waypoints)} waypoints"
     if closed:
         yield (
-            f"{len(closed)} {of} have no way to them: {_named(list(closed))}; "
-            f"{_first(list(closed.values()))}. Routes keep {ROUTE_MARGIN_M:g} m more than the safe "
-            f"distances: widen the gaps, or move or take away what is closed off"
+            f"{len(closed)} of {len(scenario.waypoints)} waypoints have no way to them: "
+            f"{_named(list(closed), _NAMED_IN_WARNINGS)}; {_first(list(closed.values()))}. Routes "
+            f"keep {ROUTE_MARGIN_M:g} m more than the safe distances: widen the gaps, or move or "
+            f"take away what is closed off"
         )
+
+
+def _far(scenario: Scenario, access: Access) -> Iterator[str]:
+    """That waypoints are beyond every charge; in a line."""
+    errands, far = Errands(MissionBrief.of(scenario)), {}
+    for w in _coverable(scenario):
+        able = np.flatnonzero(scenario.can_cover[:, w] & access.has_way[:, w]).tolist()
+        best = max((errands.from_start(u, w) for u in able), key=lambda e: e.spare_s, default=None)
+        if best is not None and best.spare_s < 0.0:
+            far[w] = too_long(best)
     if far:
         yield (
-            f"{len(far)} {of} are out of reach: {_named(list(far))}; {_first(list(far.values()))}. "
-            f"Move them, charge the UAS, or start nearer"
+            f"{len(far)} of {len(scenario.waypoints)} waypoints are out of reach: "
+            f"{_named(list(far), _NAMED_IN_WARNINGS)}; {_first(list(far.values()))}"
         )
 
 
-def _named(waypoints: Sequence[int], most: int = _NAMED_IN_WARNINGS) -> str:
+def _coverable(scenario: Scenario) -> list[int]:
+    """Waypoints with room in them that some UAS carries the sensor for; others are warned of."""
+    carried = np.flatnonzero(scenario.can_cover.any(axis=0)).tolist()
+    return sorted(set(carried) - set(out_of_reach(scenario, 0.0)))
+
+
+def _named(waypoints: Sequence[int], most: int) -> str:
     """The first waypoints by their index, and how many more there are."""
     names = ", ".join(f"waypoints[{index}]" for index in waypoints[:most])
     return names + (f" and {len(waypoints) - most} more" if len(waypoints) > most else "")

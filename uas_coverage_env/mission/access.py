@@ -119,5 +119,6 @@ def _kinds(arena, row, places_m, home_m):
     kinds = np.empty(len(places_m), np.int64)
     for p in range(len(places_m)):
         x0, y0, z0 = places_m[p, 0], places_m[p, 1], places_m[p, 2]
-        kinds[p] = route(arena, row, x0, y0, z0, home_m[0], home_m[1], home_m[2])[3]
+        _, _, _, kind = route(arena, row, x0, y0, z0, home_m[0], home_m[1], home_m[2])
+        kinds[p] = kind
     return kinds

@@ -44,6 +44,7 @@ _BLOCKS = -GOVERNOR_BLOCK  # as a mask: to whole blocks
 _TINY = 1e-12
 _ROUNDING = 1e-9  # relative
 _FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant, say, goes on
+_TOLERATED = 1.01  # times a bound: no violation yet
 _SWEEPS = 8  # of cyclic projections
 _INSIDE = 0.999  # of a bound: projections on the bound itself would end outside of the others
 _HALVES = math.sqrt(0.5)  # of a norm for each of two axes
@@ -132,6 +133,38 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
     reference[1] += share * de
 
 
+@rare_kernel
+def _keep_tilt(vehicle, x, north, east, u):
+    """More torque where limited angular accelerations would let the tilt beyond its bound.
+
+    Wrenches may use the limit of angular acceleration on both axes at once, the loop keeps its norm
+    within it. Where it takes over from a plan in mid-manoeuvre, that may not suffice to stop the
+    tilt in time: then as much more as it takes, up to what each axis has.
+    """
+    dt = vehicle.dt_s
+    per = 0.5 * dt * dt
+    free_n, free_e = -x[THETA] - dt * x[WY], x[PHI] + dt * x[WX]
+    n0, e0 = free_n + per * north, free_e + per * east
+    tolerated = _TOLERATED * vehicle.tilt_max_rad
+    if n0 * n0 + e0 * e0 <= tolerated * tolerated:
+        return
+    alpha, inertia = vehicle.alpha_xy_max_radps2, vehicle.inertia_kgm2
+    most_n = min(alpha, vehicle.torque_max_Nm[1] / inertia[1])
+    most_e = min(alpha, vehicle.torque_max_Nm[0] / inertia[0])
+    dn = min(max(-free_n / per, -most_n), most_n) - north
+    de = min(max(-free_e / per, -most_e), most_e) - east
+    a = per * per * (dn * dn + de * de)
+    if a < _TINY:
+        return
+    b = per * (n0 * dn + e0 * de)
+    c = n0 * n0 + e0 * e0 - vehicle.tilt_max_rad * vehicle.tilt_max_rad
+    share = 1.0
+    if b * b >= a * c:
+        share = min(max((-b - math.sqrt(b * b - a * c)) / a, 0.0), 1.0)
+    u[TAU_X] = inertia[0] * (east + share * de)
+    u[TAU_Y] = -inertia[1] * (north + share * dn)
+
+
 @kernel
 def _track(vehicle, x, reference, u):
     """Roll and pitch torques that track the reference."""
@@ -145,6 +178,8 @@ def _track(vehicle, x, reference, u):
     share = _within_limit(north, east, vehicle.alpha_xy_max_radps2)
     u[TAU_X] = vehicle.inertia_kgm2[0] * share * east
     u[TAU_Y] = -vehicle.inertia_kgm2[1] * share * north
+    if share < 1.0:
+        _keep_tilt(vehicle, x, share * north, share * east, u)
 
 
 @kernel

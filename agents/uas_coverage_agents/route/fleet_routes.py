@@ -61,7 +61,7 @@ class FleetRoutes:
         self._samples, self._changes = samples, changes
         self.view, self._missions = WorldView(brief), MissionMaker(brief)
         self._guided, self._handover = GuidedFlight(brief), Handover(brief)
-        self._has_way: BoolArray = Access(brief).has_way.any(axis=0)
+        self._has_way: BoolArray = np.asarray(Access(brief).has_way.any(axis=0))
         self.by_guidance = False
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._workspace, self._record = route_workspace(), no_record()

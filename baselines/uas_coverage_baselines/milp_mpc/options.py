@@ -142,7 +142,7 @@ class ModeOptions(OcpOptions):
         description="D_r,max: the way home by an open waypoint, or the vehicle file's return_rule",
     )
     return_detour: float = Field(
-        default=1.25,
+        default=1.5,
         ge=1.0,
         le=20.0,
         description="D_r,max over the quickest way to a waypoint and home (rule waypoints)",

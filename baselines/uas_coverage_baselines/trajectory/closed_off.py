@@ -40,7 +40,7 @@ def closed_off(fleet: Fleet, uas: int, x: FloatArray, route: IntArray) -> IntArr
 
     if flies(route) or not flies(route[:0]):
         return route[:0]
-    rest = route[fleet.access.has_way[uas, route]]
+    rest, low = route[fleet.access.has_way[uas, route]], 0
     for _ in range(_MOST):
         if not len(rest) or (len(rest) < len(route) and flies(rest)):
             break

@@ -134,6 +134,12 @@ class MissionPlan:
     cost_s: float
     troubles: Mapping[int, str]
 
+    def given_up(self, fleet: Fleet) -> dict[int, str]:
+        """Waypoints that are left out, and why in a few words."""
+        closed = np.flatnonzero(fleet.closed_off.any(axis=0)).tolist()
+        left_out = dict.fromkeys(self.order.left_out.tolist(), "its order leaves it out")
+        return left_out | dict.fromkeys(closed, "no flight was found that visits it")
+
     def thought_of(self, swarm: SwarmState, planned: Mapping[int, Planned]) -> NDArray[np.bool_]:
         """(W,) waypoints that are visited, now or with a later pack, or were left out.
 

@@ -68,7 +68,7 @@ class Trajectory:
         self.options = options or TrajectoryOptions()
         self.last_decision: Decision | None = None
         self.mission_plan: MissionPlan | None = None
-        self._has_acted = False
+        self._has_acted, self.given_up = False, dict[int, str]()
         self._in_wind = InWind(self.options.margin_m)
         self._repeats: Repeats | None = None
 
@@ -85,7 +85,7 @@ class Trajectory:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts; one that may be under way, when it goes on."""
         if self._in_wind.takes(brief, order_effort(self.options, len(brief.uas)), seed):
-            self._has_acted, self.mission_plan = False, None
+            self._has_acted, self.given_up = False, {}
             return
         repeats = self._repeats if self._has_acted and seed == self._seed else None
         if repeats is not None and repeats.goes_on(brief):
@@ -96,7 +96,7 @@ class Trajectory:
         self._has_acted = False
         self._brief, self._seed = brief, seed
         self._by_legs: LegMission | None = None
-        self.mission_plan = None
+        self.mission_plan, self.given_up = None, {}
         if brief.execution is not None:
             effort = order_effort(self.options, len(brief.uas))
             self._by_legs = LegMission(brief, self.options.orders, effort, seed)
@@ -141,16 +141,6 @@ class Trajectory:
         self._planned, self._order = dict(before.planned), before.order
         self._safeguard.backups.update(before.backups)
         self._make_plan(swarm, Movers.seen(self._brief, swarm, self._silent))
-
-    @property
-    def given_up(self) -> dict[int, str]:
-        """Waypoints that are left out, and why in a few words."""
-        if self.mission_plan is None:
-            return {}
-        left_out = self.mission_plan.order.left_out.tolist()
-        closed = np.flatnonzero(self._fleet.closed_off.any(axis=0)).tolist()
-        given_up = dict.fromkeys(left_out, "its order leaves it out")
-        return given_up | dict.fromkeys(closed, "no flight was found that visits it")
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
@@ -407,6 +397,7 @@ class Trajectory:
             self._is_handed_over = True
             plan = found(self._waiting.barred)
         self.mission_plan, self._planned = plan, dict(plan.planned)
+        self.given_up = plan.given_up(self._fleet)
         self._planned_at, self._seen = swarm.step, movers
         self._silent_then, self._blocked = self._silent, opens > 0
         self._may_fly = flying.copy()
