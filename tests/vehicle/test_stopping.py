@@ -9,7 +9,7 @@ from small_worlds import meadow
 
 from uas_coverage_env.autopilot.lookahead import fly_and_brake
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VY, VZ, load_vehicle
+from uas_coverage_env.vehicle import DOD, VX, VY, VZ, load_vehicle
 from uas_coverage_env.vehicle.stopping import AT_REST_MPS, stopping_of
 from uas_coverage_env.world import GoTo, Velocity
 
@@ -61,6 +61,7 @@ def test_whatever_was_flown_braking_ends_within_the_time_that_is_stated(vehicle,
             heading = rng.uniform(0.0, 2.0 * np.pi)
             north_mps, east_mps = top_mps * math.cos(heading), top_mps * math.sin(heading)
             command = Velocity(north_mps, east_mps, float(rng.uniform(5.0, 45.0)))
+        state.x[0, DOD] = 0.0
         world.step({"uas_1": command})
         brake = world.arena.rules[0].brake
         fly_and_brake(world.arena, 0, state.x[0], state.reference[0], brake, False, path_m)
@@ -69,14 +70,12 @@ def test_whatever_was_flown_braking_ends_within_the_time_that_is_stated(vehicle,
     assert 0.5 * stated_s < longest_s <= stated_s
 
 
-def test_a_vehicle_that_leans_slowly_or_little_or_has_little_lift_takes_longer_to_stop():
+def test_a_vehicle_that_leans_slowly_or_has_little_lift_takes_longer_to_stop():
     taxi = stopping_of(load_vehicle(AIR_TAXI), 1.0)
     slow = stopping_of(with_limits(AIR_TAXI, angular_acceleration_xy_max_radps2=0.05), 1.0)
-    flat = stopping_of(with_limits(AIR_TAXI, tilt_max_rad=0.15), 1.0)
     weak = stopping_of(with_limits(AIR_TAXI, lift_min_N=-100.0), 1.0)
     assert slow.time_s > taxi.time_s + 2.0
     assert slow.way_m > taxi.way_m + 30.0
-    assert flat.time_s > 1.5 * taxi.time_s
     assert weak.time_s == pytest.approx(5.0 * 900.0 / 100.0)
 
 
