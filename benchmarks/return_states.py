@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from uas_coverage_env import GoTo, Scenario, World, generate_scenario
 from uas_coverage_env.autopilot import has_to_return, seconds_home, seconds_to_keep
 from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import DOD, VehicleParams, load_vehicle
+from uas_coverage_env.vehicle import DOD, VehicleParams, Z, load_vehicle
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world import CONSUMPTION, CONTACT_NAMES, LANDED, Command, Velocity
 
@@ -103,7 +103,7 @@ def _put_anywhere(world: World, rng: np.random.Generator, larger: float) -> None
 
 def _any_velocity(world: World, rng: np.random.Generator, speed_mps: float) -> Velocity:
     heading = rng.uniform(0.0, 2.0 * np.pi)
-    altitude_m = -float(world.state.x[0, 2])
+    altitude_m = -float(world.state.x[0, Z])
     return Velocity(speed_mps * math.cos(heading), speed_mps * math.sin(heading), altitude_m)
 
 

@@ -29,6 +29,9 @@ from uas_coverage_env.compiled.kernels import allocating_kernel, kernel, stack_a
 from uas_coverage_env.geometry import cylinder_clearance
 from uas_coverage_env.world.commands import CLIMB
 
+_ROOM, _NORTH, _EAST, _DOWN = range(4)
+"""Of the best flight so far: its room [m] and its velocity [m/s]."""
+
 _TURNS = 12
 _HELD_S = (8.0, 3.0)
 _SHARES = (1.0, 0.35, 0.1)
@@ -125,12 +128,12 @@ def _write_flight(arena, i, heading_rad, turn, climb, share, command):
 
 @kernel
 def _keep_better(arena, state, i, command, tail_m, best):
-    """Keep a flight if it has more room than the best so far: (4,) room [m], velocity [m/s]."""
+    """Keep a flight if it has more room than the best so far, in the columns _ROOM to _DOWN."""
     room_m = _room_m(arena, state.step[0], i, tail_m)
-    if room_m > best[0]:
-        best[0] = room_m
+    if room_m > best[_ROOM]:
+        best[_ROOM] = room_m
         for axis in range(3):
-            best[1 + axis] = command.values[axis]
+            best[_NORTH + axis] = command.values[axis]
 
 
 @kernel
@@ -189,15 +192,15 @@ def evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m)
         return False
     tail_m = np.empty(path_m.shape)
     best = stack_array(4)
-    best[0] = _room_m(arena, state.step[0], i, path_m)
-    best[1] = best[2] = best[3] = 0.0
+    best[_ROOM] = _room_m(arena, state.step[0], i, path_m)
+    best[_NORTH] = best[_EAST] = best[_DOWN] = 0.0
     _look_far(
         arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best
     )  # fmt: skip
-    if best[0] < 0.0:
+    if best[_ROOM] < 0.0:
         _look_near(
             arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best
         )  # fmt: skip
-    write_command(command, CLIMB, best[1], best[2], best[3])
+    write_command(command, CLIMB, best[_NORTH], best[_EAST], best[_DOWN])
     _is_provable(arena, state, i, command, nonlinear, path_m, committed_m)
     return True

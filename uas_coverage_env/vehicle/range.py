@@ -126,7 +126,7 @@ _TURNS = 1.5
 
 _QUICK_S = 4.5
 """The shipped vehicles lean over, stop from full speed and level out in less: with more, a flight
-home takes longer by the difference."""
+home takes longer by the difference, as often as a turn by the time for that."""
 
 _MARGIN_S, _MARGIN_SHARE = 4.0, 0.1
 _OBSTRUCTED_S = 5.0
@@ -155,7 +155,7 @@ def seconds_to_land(vehicle, way_m, towards_mps, height_m, roof_m, before_m, aft
     most_mps2 = vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad)
     turn_s = _TURNS * turn_mps / most_mps2
     leaning_s = 2.0 * math.sqrt(vehicle.tilt_max_rad / vehicle.alpha_xy_max_radps2)
-    turn_s += max(vehicle.v_xy_max_mps / most_mps2 + leaning_s - _QUICK_S, 0.0)
+    turn_s += _TURNS * max(vehicle.v_xy_max_mps / most_mps2 + leaning_s - _QUICK_S, 0.0)
     speeds = Speeds(vehicle.v_xy_max_mps, vehicle.v_up_max_mps, vehicle.v_down_max_mps)
     up_m, down_m = max(-height_m, 0.0), max(height_m, 0.0)
     seconds = flight_seconds(CALIBRATED, speeds, turn_s, way_m, up_m, down_m)
