@@ -84,6 +84,18 @@ def test_a_link_that_is_cut_beside_the_zone_leads_nobody_into_it(flight):
         assert off_and_room_m(flight, u, vehicle)[1] > 2.0
 
 
+def test_a_mission_is_planned_at_the_speed_that_the_autopilot_is_set_to(flight):
+    vehicles = flight.scenario.vehicles
+    assert [vehicle.limits.v_xy_max_mps for vehicle in vehicles] == [9.0, 9.0]
+    assert max(timeline_of(flight, u).fastest_mps for u in range(2)) < 9.1
+
+
+def test_a_speed_without_an_autopilot_is_refused(tmp_path, capsys):
+    asked = ["import", "karhula", "--speed", "9", "--out", str(tmp_path / "town.toml")]
+    assert main(asked) == 2
+    assert "add --flown-by autopilot" in capsys.readouterr().err
+
+
 def test_a_plan_that_no_autopilot_can_follow_is_refused(tmp_path):
     flight = planned(tmp_path)
     with pytest.raises(InputError, match=r"import \.\.\. --flown-by autopilot --speed 9"):

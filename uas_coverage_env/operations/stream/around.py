@@ -34,7 +34,6 @@ class Around:
         self._index = {name: everyone.index(name) for name in names}
         self._rooms = {name: Surroundings(scenario, u) for name, u in self._index.items()}
         self._scenario = scenario
-        self._floor_m = [-hull.vertices_m[:, 2].min() for hull in scenario.hulls]
 
     def kept_m(self, one: str, other: str) -> float:
         """Distance that two UAS keep, level or upright [m]."""
