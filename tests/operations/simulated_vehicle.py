@@ -16,6 +16,7 @@ from itertools import pairwise
 os.environ.setdefault("MAVLINK20", "1")
 
 import numpy as np
+from simulated_motion import BRAKES_MPS2, STEP_S, ShapedMotion, towards
 
 # by its name, as in `autopilot_logs.py`: its 30 000 generated lines take type checkers seconds
 mav = import_module("pymavlink.dialects.v20.ardupilotmega")
@@ -49,58 +50,11 @@ RENAMED = {
     "SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0),
 }
 """By 4.7: name and factor."""
-PX4_PARAMETERS = {
-    "COM_OBL_RC_ACT": 0,
-    "COM_OF_LOSS_T": 1.0,
-    "MPC_XY_VEL_MAX": 12.0,
-    "MPC_Z_VEL_MAX_UP": 3.0,
-    "MPC_Z_VEL_MAX_DN": 1.5,
-    "MPC_ACC_HOR": 3.0,
-    "RTL_RETURN_ALT": 30.0,
-}
 PILOTED = (STABILIZE, LOITER, BRAKE)
 """Modes in which FS_OPTIONS 16 lets nothing happen where the ground station is lost."""
 
-_JERK, _JERK_Z, _STEP_S = 5.0, 5.0, 0.05
-_BRAKES_MPS2 = 7.5
-_TILT_MPS2 = 9.81 * math.tan(math.radians(30.0))
-_DRAG = {"+": (0.222, 0.0344), "s500": (0.254, 0.0)}
-"""Of the simulator's frames: drag, per m/s [m/s²] and per (m/s)²; "+" was seen to make 10.0 m/s."""
-_CORNER = 0.7
 
-
-def _towards(error, gain, most):
-    """A speed that closes a gap within an acceleration: `sqrt_controller`."""
-    size = abs(error)
-    if size < 1e-9:
-        return 0.0 * error
-    linear = most / gain**2
-    if size > linear:
-        speed = math.sqrt(2.0 * most * (size - 0.5 * linear))
-    else:
-        speed = gain * size
-    return error * (min(speed, size / _STEP_S) / size)
-
-
-def _limited(vector, most):
-    size = abs(vector)
-    return vector if size <= most else vector * (most / size)
-
-
-def _in_corner(velocity, accel, most):
-    """Cross-track acceleration goes first: `limit_accel_corner_xy`."""
-    if not abs(velocity):
-        return _limited(accel, most)
-    along = velocity / abs(velocity)
-    turned = accel * along.conjugate()
-    if abs(turned.real) <= abs(turned.imag):
-        return _limited(accel, most)
-    cross = max(-_CORNER * most, min(_CORNER * most, turned.imag))
-    rest = math.sqrt(most**2 - cross**2)
-    return complex(max(-rest, min(rest, turned.real)), cross) * along
-
-
-class SimulatedVehicle:
+class SimulatedVehicle(ShapedMotion):
     """An ArduCopter.
 
     Args:
@@ -139,7 +93,7 @@ class SimulatedVehicle:
         parameters=None,
     ):
         self._frame, self._home_m = frame, np.array([*home_m[:2], 0.0])
-        self._drag, self._slow, self._cut, self._taken = _DRAG[drag], slow, cut, taken
+        self._cut, self._taken = cut, taken
         self._pilot_mps, self._low_s = complex(*pilot_mps), low_s
         self._refuses, self._balks, self._new_names = refuses, balks, new_names
         self.parameters = self._defaults() | (parameters or {})
@@ -149,10 +103,8 @@ class SimulatedVehicle:
         self.set_to = []
         self._armed_s, self._station_s, self._updated_s = 0.0, np.inf, -np.inf
         self._is_lost, self._was_low, self._was_taken = False, False, False
-        self._place, self._height, self._velocity, self._climb = complex(*home_m[:2]), 0.0, 0j, 0.0
-        self._thrust = 0j
+        super().__init__(complex(*home_m[:2]), drag, slow)
         self._crumbs, self._way = [(self._place, 0.0)], []
-        self._stand()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._socket.setblocking(False)
@@ -198,8 +150,8 @@ class SimulatedVehicle:
 
     def step(self, dt_s):
         self._hear()
-        for _ in range(max(1, round(dt_s / _STEP_S))):
-            self.time_s += _STEP_S
+        for _ in range(max(1, round(dt_s / STEP_S))):
+            self.time_s += STEP_S
             self._fail()
             if self.armed:
                 self._move()
@@ -290,13 +242,6 @@ class SimulatedVehicle:
                 home = complex(*self._home_m[:2])
                 self._way = [(home, height), (self._place, height)]
 
-    def _stand(self):
-        self._flies = "stand"
-        self._target, self._target_height = self._place, self._height
-        self._ahead, self._ahead_up, self._climbs_to = 0j, 0.0, 0.0
-        self._wish, self._wish_mps, self._wish_mps2 = self._place, self._velocity, 0j
-        self._wish_up, self._wish_climb, self._wish_climb2 = self._height, self._climb, 0.0
-
     # What it does by itself
 
     def _fail(self):
@@ -332,25 +277,7 @@ class SimulatedVehicle:
 
     def _move(self):
         self._shape()
-        drag, quadratic = self._drag
-        error = self._wish - self._place
-        wanted = self._wish_mps2 + 2.0 * (self._wish_mps - self._velocity + error)
-        against = self._velocity * (drag + quadratic * abs(self._velocity))
-        tilted = _limited(wanted + against, _TILT_MPS2)
-        self._is_limited = abs(wanted + against) > _TILT_MPS2
-        self._thrust += (tilted - self._thrust) * min(1.0, _STEP_S / 0.15)
-        self._velocity += (self._thrust - against) * _STEP_S
-        if self._slow[0] <= self.time_s < self._slow[1]:
-            slower = max(1.0, abs(self._velocity) - 4.0 * _STEP_S)
-            self._velocity = _limited(self._velocity, slower)
-        self._place += self._velocity * _STEP_S
-        climb = self._wish_climb + 2.0 * (self._wish_up - self._height)
-        self._climb += (climb - self._climb) * min(1.0, _STEP_S / 0.2)
-        self._height += self._climb * _STEP_S
-        if self._height <= 0.0:
-            self._height, self._climb, self._velocity = 0.0, 0.0, 0j
-            if self._flies == "land":
-                self.armed = False
+        self._follow()
         near, height = self._crumbs[-1]
         is_new = abs(near - self._place) > 2.0 or abs(height - self._height) > 2.0
         if is_new and self.mode != SMART_RTL:
@@ -363,8 +290,8 @@ class SimulatedVehicle:
             if self.time_s - self._updated_s > max(self._of("GUID_TIMEOUT"), 0.1):
                 self._ahead, self._ahead_up = 0j, 0.0
             self._to_target()
-            self._target += self._ahead * _STEP_S
-            self._target_height += self._ahead_up * _STEP_S
+            self._target += self._ahead * STEP_S
+            self._target_height += self._ahead_up * STEP_S
         elif self.mode == self.guided and self._flies == "take-off":
             self._wish_to(0j, most_mps2, self._climbs_to)
         elif self.mode in (RTL, SMART_RTL, LAND):
@@ -372,53 +299,8 @@ class SimulatedVehicle:
         elif self.mode == LOITER:
             self._wish_to(self._pilot_mps, most_mps2, self._target_height)
         else:
-            stops = _BRAKES_MPS2 if self.mode == BRAKE else most_mps2
+            stops = BRAKES_MPS2 if self.mode == BRAKE else most_mps2
             self._wish_to(0j, stops, self._target_height)
-
-    def _to_target(self):
-        """`shape_pos_vel_accel_xy` and the same for the height."""
-        accel = 0.01 * self._of("WPNAV_ACCEL")
-        gain = 0.5 * _JERK / accel
-        speed = _limited(
-            _towards(self._target - self._wish, gain, 0.5 * accel), 0.01 * self._of("WPNAV_SPEED")
-        )
-        self._speed_up(speed + self._ahead, accel)
-        self._climb_up(self._target_height, self._ahead_up)
-
-    def _wish_to(self, velocity, accel, height):
-        self._speed_up(velocity, accel)
-        self._climb_up(height, 0.0)
-
-    def _speed_up(self, speed, accel):
-        gap = speed - self._wish_mps
-        wanted = _in_corner(speed, _towards(gap, _JERK / accel, _JERK), accel)
-        self._wish_mps2 += _limited(wanted - self._wish_mps2, _JERK * _STEP_S)
-        step, faster = self._wish_mps * _STEP_S, self._wish_mps2 * _STEP_S
-        if getattr(self, "_is_limited", False) and abs(self._thrust):
-            # no wish runs away from a vehicle that cannot follow
-            along = self._thrust / abs(self._thrust)
-            behind = ((self._wish - self._place) * along.conjugate()).real
-            slower = ((self._wish_mps - self._velocity) * along.conjugate()).real
-            ahead = (step * along.conjugate()).real
-            if behind > 0.0 and ahead > 0.0:
-                step -= along * ahead
-            gain = (faster * along.conjugate()).real
-            if slower > 0.0 and gain > 0.0:
-                faster -= along * gain
-        self._wish += step
-        self._wish_mps += faster
-
-    def _climb_up(self, height, ahead):
-        accel = 0.01 * self._of("WPNAV_ACCEL_Z")
-        up, down = 0.01 * self._of("WPNAV_SPEED_UP"), 0.01 * self._of("WPNAV_SPEED_DN")
-        speed = _towards(height - self._wish_up, 0.5 * _JERK_Z / accel, 0.5 * accel)
-        speed = max(-down, min(up, speed)) + ahead
-        gap = speed - self._wish_climb
-        wanted = max(-accel, min(accel, _towards(gap, _JERK_Z / accel, _JERK_Z)))
-        change = _JERK_Z * _STEP_S
-        self._wish_climb2 += max(-change, min(change, wanted - self._wish_climb2))
-        self._wish_up += self._wish_climb * _STEP_S
-        self._wish_climb += self._wish_climb2 * _STEP_S
 
     def _go_home(self, accel):
         while self._way:
@@ -433,7 +315,7 @@ class SimulatedVehicle:
             self._wish_to(toward * speed, accel, height)
             return
         self._flies = "land"
-        self._speed_up(_towards(0j, 1.0, accel), accel)
+        self._speed_up(towards(0j, 1.0, accel), accel)
         rate = -0.5 if self._height < 10.0 else -1.5
         self._climb_up(self._wish_up, rate)
 
@@ -484,85 +366,6 @@ class SimulatedVehicle:
     def _say(self, message):
         if self._peer is not None and not self.is_cut:
             self._socket.sendto(message.pack(self._link), self._peer)
-
-
-class SimulatedPX4(SimulatedVehicle):
-    """A PX4 as its documentation has it: OFFBOARD lives on a stream of targets.
-
-    It enters that mode only after more than a second of targets, no two of them half a second or
-    more apart, and leaves it by itself where none comes for COM_OF_LOSS_T, to do what
-    COM_OBL_RC_ACT says. It takes off by targets. In the stretch of time `deaf` it hears nothing.
-    """
-
-    autopilot = mav.MAV_AUTOPILOT_PX4
-    manual, guided, land, hold = 3 << 16, 6 << 16, 4 << 16 | 6 << 24, 4 << 16 | 3 << 24
-    home = 4 << 16 | 5 << 24
-    whole = ("COM_OBL_RC_ACT",)
-
-    def __init__(self, frame, home_m, deaf=(0.0, 0.0), **how):
-        super().__init__(frame, home_m, **how)
-        self._deaf, self._first_s, self._last_s = deaf, np.inf, -np.inf
-        self.denied = 0
-
-    def _defaults(self):
-        return dict(PX4_PARAMETERS)
-
-    def _of(self, name):
-        here = {"WPNAV_SPEED": "MPC_XY_VEL_MAX", "WPNAV_ACCEL": "MPC_ACC_HOR"}.get(name)
-        return PARAMETERS[name] if here is None else 100.0 * self.parameters[here]
-
-    def step(self, dt_s):
-        super().step(dt_s)
-        lost_s = self.parameters["COM_OF_LOSS_T"]
-        if self.mode == self.guided and self.time_s - self._last_s > lost_s + 0.05:
-            act = int(self.parameters["COM_OBL_RC_ACT"])
-            self._enter({3: self.home, 4: self.land}.get(act, self.hold))
-
-    def _coded(self, name, value):
-        if name not in self.whole:
-            return value
-        return float(np.array([int(value)], np.int32).view(np.float32)[0])
-
-    def _enter(self, mode):
-        super()._enter(mode)
-        if mode == self.home and not self._way:
-            home = complex(*self._home_m[:2])
-            self._way = [(home, self._height), (self._place, self._height)]
-
-    def _shape(self):
-        if self.mode in (self.home, self.land):
-            self._go_home(2.5)
-        else:
-            super()._shape()
-
-    def _obey(self, message):
-        if self._deaf[0] <= self.time_s < self._deaf[1]:
-            return
-        kind = message.get_type()
-        if kind == "PARAM_SET" and message.param_id in self.whole:
-            whole = np.array([message.param_value], np.float32).view(np.int32)[0]
-            self.parameters[message.param_id] = int(whole)
-            self._tell_parameter(message.param_id)
-            return
-        if kind == "SET_POSITION_TARGET_GLOBAL_INT":
-            assert message.coordinate_frame in (5, 6, 11)
-            if self.time_s - self._last_s >= 0.5:
-                self._first_s = self.time_s
-            self._last_s = self.time_s
-        super()._obey(message)
-
-    def _command(self, message):
-        if message.command != mav.MAV_CMD_NAV_TAKEOFF:
-            super()._command(message)
-
-    def _may_enter(self, message):
-        mode = int(message.param2) << 16 | int(message.param3) << 24
-        is_streamed = self.time_s - self._last_s < 0.5 and self.time_s - self._first_s > 1.0
-        if mode == self.guided and not is_streamed:
-            self.denied += 1
-            return False
-        self._enter(mode)
-        return True
 
 
 class DrivenClock:
