@@ -1,4 +1,4 @@
-"""A wrench may lead beyond the vehicle's limits: what that costs a learner, and nobody else."""
+"""A wrench may lead beyond the vehicle's limits: what that costs a learner, and no other player."""
 
 import dataclasses
 

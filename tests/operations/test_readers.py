@@ -242,7 +242,7 @@ def test_what_kml_only_points_at_is_named_and_refused_where_it_says_no_fly(tag):
     link = "<{0}><name>{1}</name><Link><href>more.kml</href></Link></{0}>"
     assert f"left out: 1 {tag} 'more'" in kept(kml(link.format(tag, "more")))[1]
     said = refusal(kml(link.format(tag, "no-fly zones")))
-    assert f"says no_fly, but a {tag}, which is not read" in said
+    assert f"says no_fly, but it is a {tag}, which is not read" in said
 
 
 def test_a_model_of_a_building_is_refused():

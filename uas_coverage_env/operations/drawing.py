@@ -235,7 +235,7 @@ def _obstacle(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]
         ]
         if what == OTHER and not given:
             raise InputError(
-                f"{source}: is an obstacle by {meaning.said_by}, but a {part.kind}; draw a "
+                f"{source}: is an obstacle by {meaning.said_by}, but it is a {part.kind}; draw a "
                 f"polygon, or give {'radius_m' if part.shape == 'point' else 'width'}"
             )
         places = _degrees(source, part.positions)
@@ -268,7 +268,7 @@ def _refused(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     if meaning.role == "home":
         raise InputError(f"{source}: {said}, but it is a {part.kind}; draw a point")
     if part.shape == "nothing":
-        what = f"a {part.kind}, which is not read" if feature.what else "it has no place"
+        what = f"it is a {part.kind}, which is not read" if feature.what else "it has no place"
         raise InputError(f"{source}: {said}, but {what}; draw a polygon, or remove it")
     outlines = _outlines(feature, part, around=meaning.role == "no_fly")
     if not outlines:

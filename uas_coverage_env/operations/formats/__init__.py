@@ -100,4 +100,4 @@ ENDINGS: Mapping[str, tuple[str, str, str]] = {
         "the flown samples in degrees, of which sortie they are, charge, voltage and current",
     ),
 }
-"""Of the files of all formats -> the formats that write them, for whom, and what they hold."""
+"""Of the files of all formats -> the formats that write them, the reader, and what they hold."""

@@ -2,7 +2,7 @@
 
 In a plan, time keeps UAS apart. So there is one plan time for all of them. It passes at the rate
 that all can follow (`pace`), more slowly as one falls behind, and comes to a stand where one is not
-heard, is flown by somebody else, or has to come back to its path: always so slowly that every
+heard, is flown by a pilot, or has to come back to its path: always so slowly that every
 vehicle comes to rest on its path. If that lasts, or on Ctrl-C, the stream is given up in a defined
 way (`giving_up`).
 """
@@ -136,7 +136,7 @@ class Companion:
         return Ended(reason, self.late_s, done)
 
     def _give_up(self) -> str:
-        if not self._has_told:  # whatever flies is flown by somebody else
+        if not self._has_told:  # what flies already is another's
             return NOTHING_TOLD
         homes_m = {name: plan.place_m(plan.last_s) for name, plan in self._plans.items()}
         giving_up = GivingUp(

@@ -1,4 +1,4 @@
-"""What a vehicle does once nobody tells it anything: parameters that are set before it arms.
+"""What a vehicle does without its companion: parameters that are set before it arms.
 
 The table decides, and `docs/streaming.md` shows it.
 """

@@ -48,7 +48,7 @@ class VehicleLink:
         velocity_mps: (3,) as it says [m/s].
         is_ready: Whether its checks before arming pass; None: it has not said.
         parameters: What it has said of its parameters, by name.
-        texts: Warnings that it has said and nobody has taken yet.
+        texts: Warnings of its that have not been read yet.
 
     Args:
         name: The UAS that it flies.

@@ -10,7 +10,7 @@ from uas_coverage_env.operations.tables import Table
 
 
 def exported_files() -> Table:
-    """What an export writes, and for whom."""
+    """What an export writes, and what reads it."""
     rows = [
         (f"`{ending}`", ", ".join(f"`{kind}`" for kind in formats.split(", ")), whom, holds)
         for ending, (formats, whom, holds) in ENDINGS.items()
