@@ -91,6 +91,7 @@ QUICK = {
     "operations/test_leg_model.py": "",
     "operations/test_stream.py": "only test_nothing_arms_unless_somebody_agrees",
     "operations/test_layers.py": "",
+    "operations/test_operations_tables.py": "",
     "operations/test_logs.py": (
         "only test_telemetry_holds_places_attitude_and_charge "
         "test_a_data_flash_log_holds_places_attitude_and_charge"

@@ -43,7 +43,9 @@ def test_the_village_is_covered_in_time_and_every_uas_comes_home(village):
     assert summary["violations"] == []
     assert summary["breaches"] == 0
     assert summary["steps"] <= 270, "255 when this was written"
-    assert summary["energy_Wh"] <= 25.5, "24.4 when this was written"
+    # 24.4 while UAS 2 returned by the fence's far corner; with the default horizon both rules take
+    # 213 steps, and 21.2 Wh
+    assert summary["energy_Wh"] <= 27.0, "26.2 when this was written"
 
 
 @pytest.mark.slow

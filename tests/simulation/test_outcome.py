@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from uas_coverage_env.world.outcome import NOTHING, OUTCOME_DTYPE
+from uas_coverage_env.world.outcome import NONE, NOTHING, OUTCOME_DTYPE
 
 COUNTER = """
 import numpy as np
@@ -34,7 +34,9 @@ def test_a_field_that_is_added_to_the_record_begins_each_step_at_zero():
     subprocess.run([sys.executable, "-c", COUNTER], check=True, env=environment)
 
 
-def test_a_step_begins_with_nothing_near():
+def test_a_step_begins_without_a_contact_and_with_nothing_near():
+    assert NOTHING["contact"] == NONE
+    assert NOTHING["contact_with"] == -1
     far = {name for name in OUTCOME_DTYPE.names if NOTHING[name].dtype.kind == "f"
            and np.isinf(NOTHING[name]).all()}  # fmt: skip
     assert far == {"obstacle_clearance_m", "separation_m", "fence_clearance_m"}

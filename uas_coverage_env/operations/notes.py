@@ -141,10 +141,12 @@ def standing_notes(standing: Sequence[Standing], town: Town) -> list[str]:
     for kind, words in _STANDING.items():
         guessed = [not thing.known for thing in standing if thing.kind == kind]
         if guessed:
-            notes.append(
-                f"{len(guessed)} {words}, the heights of {sum(guessed)} of them guessed from "
-                f"their kind"
-            )
+            if len(guessed) == 1:
+                many, how = f"1 {kind.replace('_', ' ')}", "its height guessed from its kind"
+            else:
+                many = f"{len(guessed)} {words}"
+                how = f"the heights of {sum(guessed)} of them guessed from their kind"
+            notes.append(f"{many}, {how}" if any(guessed) else many)
     if town.incomplete:
         notes.append(
             f"{town.incomplete} outlines in the area lack corners in the file and are "

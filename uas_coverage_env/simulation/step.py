@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.belief import believed_wrench, expect, learn
 from uas_coverage_env.autopilot.control import command_wrench
@@ -42,6 +44,8 @@ from uas_coverage_env.world.state import FLYING, LOST, STATE, as_felt, as_sensed
 
 ACCEPTED = -1
 
+_WORDS = NOTHING.view(np.int64)
+
 
 @kernel
 def first_invalid(arena, state, commands):
@@ -67,8 +71,11 @@ def first_invalid(arena, state, commands):
 @inlined_kernel
 def begin_step(state, commands, outcome):
     """An outcome in which nothing has happened yet, with the commands as they were given."""
+    # by words, since a record that is assigned leaves whatever it likes between its fields
+    words = outcome.view(np.int64)
     for i in range(commands.shape[0]):
-        outcome[i] = NOTHING[0]
+        for k in range(_WORDS.shape[0]):
+            words[i * _WORDS.shape[0] + k] = _WORDS[k]
         event = outcome[i]
         event.flew = state.status[i] == FLYING
         for k in range(3):

@@ -72,5 +72,6 @@ OUTCOME_DTYPE = record_dtype(
 
 NOTHING = np.zeros(1, OUTCOME_DTYPE)
 """(1,) what a step begins with: nothing has happened, and nothing is near."""
+NOTHING["contact_with"] = -1
 for _distance in ("obstacle_clearance_m", "separation_m", "fence_clearance_m"):
     NOTHING[_distance] = np.inf
