@@ -1,7 +1,5 @@
 """What happened to each UAS in one step."""
 
-import numpy as np
-
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.vehicle import N_DEVIATIONS, N_INPUTS
 from uas_coverage_env.world.commands import COMMAND_DTYPE
@@ -69,9 +67,3 @@ OUTCOME_DTYPE = record_dtype(
     ]
 )
 """One UAS and one step; of a UAS that did not fly, all but the distances is zero."""
-
-NOTHING = np.zeros(1, OUTCOME_DTYPE)
-"""(1,) what a step begins with: nothing has happened, and nothing is near."""
-NOTHING["contact_with"] = -1
-for _distance in ("obstacle_clearance_m", "separation_m", "fence_clearance_m"):
-    NOTHING[_distance] = np.inf
