@@ -14,8 +14,7 @@ from numba import njit
 from rich.table import Table
 
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.array_views import rows_view, slice_view
-from uas_coverage_env.compiled.views import lane_view
+from uas_coverage_env.compiled.views import lane_view, rows_view, slice_view
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.act import acting_of, write_commands
 from uas_coverage_env.env.actions.velocity import VELOCITY

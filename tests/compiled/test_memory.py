@@ -10,7 +10,14 @@ from typing_extensions import TypeAliasType
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.slots import Slots
-from uas_coverage_env.compiled.views import Layout, copy_arrays, lane_view, pool_view
+from uas_coverage_env.compiled.views import (
+    Layout,
+    copy_arrays,
+    lane_view,
+    pool_view,
+    record_view,
+    rows_view,
+)
 
 S = TypeVar("S", bound=np.generic)
 NESTED = np.ndarray[tuple[Any, ...], np.dtype[S]]
@@ -43,6 +50,7 @@ BOTH = Layout(DEPOT, VISIT)
 views = BOTH.views
 depot_at = pool_view(DEPOT)
 visit_of = lane_view(VISIT, sized_by=DEPOT)
+boxes_at = record_view(BOX_DTYPE)
 
 
 def depot(n_boxes: int, n_people: int, seed: int = 0) -> Depot:
@@ -81,6 +89,22 @@ def add_lane(pool, visits, lane, s):
 @kernel
 def copy_in_kernel(source, target):
     copy_arrays(source, target)
+
+
+@kernel
+def fill_boxes(words, first, n):
+    boxes = boxes_at(words, first, n)
+    for b in range(boxes.shape[0]):
+        boxes[b].side_m = 0.5 * b
+        boxes[b].n += 10 + b
+    return boxes[n - 1].n
+
+
+@kernel
+def double_rows(array, row, n):
+    rows = rows_view(array, row, (n, 4))
+    for k in range(n):
+        rows[k, 3] *= 2.0
 
 
 def test_new_arrays_have_the_declared_types_and_shapes():
@@ -167,6 +191,25 @@ def test_a_kernel_copies_all_arrays_and_nothing_else():
     for mine, its, before in zip(target, source, other, strict=True):
         np.testing.assert_array_equal(mine, its)
         assert not np.shares_memory(mine, before)
+
+
+def test_records_lie_in_the_words_that_begin_at_an_index():
+    words = np.zeros(12, np.uint64)
+    words[6] = 5
+    assert fill_boxes(words, 5, 3) == 12
+    boxes = words[5:11].view(BOX_DTYPE)
+    assert boxes["n"].tolist() == [15, 11, 12]
+    assert boxes["side_m"].tolist() == [0.0, 0.5, 1.0]
+    assert not words[:5].any()
+    assert not words[11:].any()
+
+
+def test_rows_are_seen_in_another_shape_and_written_through():
+    array = np.arange(24.0).reshape(4, 3, 2)
+    double_rows(array, 1, 3)
+    expected = np.arange(24.0)
+    expected[[9, 13, 17]] *= 2.0
+    assert array.ravel().tolist() == expected.tolist()
 
 
 def test_indices_are_limited_by_the_size_that_they_are_declared_with():

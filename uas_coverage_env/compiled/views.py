@@ -1,12 +1,13 @@
-"""Views of declared arrays (`memory.py`) for kernels: at addresses, into a pool, of a lane.
+"""Arrays for kernels that lie in the memory of others: views, which own nothing.
 
-They own nothing: the caller keeps the arrays alive for as long, and a view must not leave compiled
-code.
+Whoever makes one keeps the memory for as long; it must not leave compiled code. The functions made
+here are for kernels, with NUMBA_DISABLE_JIT=1 and on a GPU too; they have to be bound to a name of
+a module, since numba takes no attributes of objects.
 """
 
 import ctypes
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -14,39 +15,97 @@ import numpy as np
 from numba import typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
+from numba.np import numpy_support
+from numba.np.arrayobj import make_array, np_cfarray
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.array_views import view_of
-from uas_coverage_env.compiled.kernels import COMPILED
+from uas_coverage_env.compiled.kernels import COMPILED, inlined_kernel
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
-
-
-def _pointer(builder: Any, pointer: Any, n_bytes: Any) -> Any:
-    """A pointer, moved on by a number of bytes."""
-    byte = cgutils.voidptr_t
-    return builder.bitcast(builder.gep(builder.bitcast(pointer, byte), [n_bytes]), pointer.type)
-
-
-def _views(context: Any, builder: Any, memory: Memory, starts: list, sizes: Mapping) -> Any:
-    """The declaration, its arrays views at these pointers with sizes that are LLVM values."""
-    views = []
-    for field, start in zip(memory.fields, starts, strict=True):
-        view_type = field.numba_type()
-        element = context.get_data_type(view_type.dtype)
-        shape = [
-            sizes[axis] if isinstance(axis, str) else context.get_constant(types.intp, axis)
-            for axis in field.axes
-        ]
-        itemsize = context.get_constant(types.intp, context.get_abi_sizeof(element))
-        views.append(view_of(builder, context, view_type, start, shape, itemsize))
-    return context.make_tuple(builder, memory.numba_type(), views)
 
 
 def _in_kernels(typed: Callable[..., Any], plain: Callable[..., Any]) -> Callable[..., Any]:
     """What kernels call: generated code, or with NUMBA_DISABLE_JIT=1 plain Python."""
     made: Any = intrinsic(typed) if COMPILED else plain
     return made
+
+
+def _array_at(typing_context, address, shape, dtype):
+    """The C-contiguous array at an address (int64)."""
+    array = types.Array(dtype.dtype, len(shape), "C")
+
+    def generate(context, builder, signature, arguments):
+        start = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
+        return np_cfarray(context, builder, array(types.voidptr, shape), [start, arguments[1]])
+
+    return array(types.int64, shape, dtype), generate
+
+
+def _rows_of(dtype: np.dtype | None) -> Callable[..., Any]:
+    """See `rows_view` and `record_view`."""
+
+    def plain(array: NDArray[Any], row: int, shape: int | tuple[int, ...]) -> NDArray[Any]:
+        kind, size = dtype or array.dtype, int(np.prod(shape))
+        of_bytes = array[row:].reshape(-1).view(np.uint8)
+        return of_bytes[: size * kind.itemsize].view(kind).reshape(shape)
+
+    def typed(typing_context, array, row, shape):
+        if not isinstance(array, types.Array) or array.layout != "C":
+            return None
+        kind = array.dtype if dtype is None else numpy_support.from_dtype(dtype)
+        n_axes = len(shape) if isinstance(shape, types.BaseTuple) else 1
+        view = types.Array(kind, n_axes, "C", readonly=not array.mutable)
+
+        def generate(context, builder, signature, arguments):
+            whole = context.make_array(array)(context, builder, arguments[0])
+            first = context.cast(builder, arguments[1], row, types.intp)
+            n_bytes = builder.mul(first, builder.extract_value(whole.strides, 0))
+            start = builder.bitcast(whole.data, context.get_value_type(types.voidptr))
+            start = builder.gep(start, [n_bytes])
+            return np_cfarray(context, builder, view(types.voidptr, shape), [start, arguments[2]])
+
+        return view(array, row, shape), generate
+
+    return _in_kernels(typed, plain)
+
+
+rows_view = _rows_of(None)
+"""(array, row, shape) -> the elements of a C-contiguous array from a row on, in another shape.
+
+The array has any number of axes; the row is an index along its first one, and the elements of the
+shape have to lie in the array. A shape of one axis may be a number.
+"""
+
+slice_view = rows_view
+"""(array, first, n) -> n elements of an array of one axis."""
+
+
+def record_view(dtype: np.dtype) -> Callable[[NDArray[np.uint64], Any, Any], NDArray[Any]]:
+    """A function for kernels, (words, first, n) -> (n,) records that lie in an array of words.
+
+    `words` is C-contiguous, of numbers of eight bytes; the first record begins with the word of
+    index `first`. What is written to the records is written to the words.
+
+    Args:
+        dtype: Of the records.
+    """
+    return _rows_of(dtype)
+
+
+def _kernel_of(arguments: str, result: str, known: dict[str, Any]) -> Any:
+    """A kernel of one line that names one array after the other: numba has no loop for them."""
+    known |= {"rows": rows_view, "array_at": intrinsic(_array_at)}
+    exec(f"def view({arguments}):\n    return {result}", known)  # made of declarations alone
+    return inlined_kernel(known["view"])
+
+
+def _declared(memory: Memory, arrays: Iterable[str], known: dict[str, Any]) -> str:
+    """The text of a declaration with arrays that are texts; `known` gets what it names."""
+    known[name := f"declaration_{len(known)}"] = memory.declaration
+    return f"{name}({', '.join(arrays)})"
+
+
+def _shape(field: Field, sizes: Mapping[Any, str]) -> str:
+    return f"({''.join(f'{size}, ' for size in field.shape(sizes))})"
 
 
 class Layout:
@@ -57,8 +116,7 @@ class Layout:
 
     Attributes:
         size: How many numbers `addresses_of` returns; more may follow them in the same array.
-        views: In a kernel, the declarations as a tuple: `arena, state = layout.views(at)`; to be
-            bound to a name of the module first, since numba takes no attributes of objects.
+        views: In a kernel, the declarations as a tuple: `arena, state = views(at)`.
     """
 
     def __init__(self, *memories: Memory) -> None:
@@ -66,7 +124,7 @@ class Layout:
         self.names = tuple(dict.fromkeys(name for memory in memories for name in memory.names))
         self._n_fields = sum(len(memory.fields) for memory in memories)
         self.size = self._n_fields + len(self.names)
-        self.views = _in_kernels(self._typed_views, self._plain_views)
+        self.views: Any = self._compiled_views() if COMPILED else self._plain_views
 
     def addresses_of(self, *missions: tuple) -> NDArray[np.int64]:
         """Where arrays lie, then their sizes; they have to stay there.
@@ -83,6 +141,19 @@ class Layout:
         addresses = [array.ctypes.data for arrays in missions for array in arrays]
         return np.array([*addresses, *(sizes[name] for name in self.names)], dtype=np.int64)
 
+    def _compiled_views(self) -> Any:
+        sizes = {name: f"at[{self._n_fields + k}]" for k, name in enumerate(self.names)}
+        known: dict[str, Any] = {}
+        made, k = [], 0
+        for memory in self.memories:
+            arrays = []
+            for field in memory.fields:
+                known[f"dtype_{k}"] = field.dtype
+                arrays.append(f"array_at(at[{k}], {_shape(field, sizes)}, dtype_{k})")
+                k += 1
+            made.append(_declared(memory, arrays, known))
+        return _kernel_of("at", f"({', '.join(made)},)", known)
+
     def _plain_views(self, at: NDArray[np.int64]) -> tuple[Any, ...]:
         sizes = dict(zip(self.names, at[self._n_fields : self.size].tolist(), strict=True))
         addresses = iter(at[: self._n_fields].tolist())
@@ -90,28 +161,6 @@ class Layout:
             memory.made_of({f.name: _at_address(next(addresses), f, sizes) for f in memory.fields})
             for memory in self.memories
         )
-
-    def _typed_views(self, typing_context, at):
-        result = types.Tuple([memory.numba_type() for memory in self.memories])
-
-        def generate(context, builder, signature, arguments):
-            given = make_array(at)(context, builder, arguments[0])
-            numbers = [
-                builder.load(builder.gep(given.data, [context.get_constant(types.intp, k)]))
-                for k in range(self.size)
-            ]
-            sizes = dict(zip(self.names, numbers[self._n_fields :], strict=True))
-            addresses = iter(numbers)
-            made = []
-            for memory in self.memories:
-                starts = []
-                for field in memory.fields:
-                    element = context.get_data_type(field.numba_type().dtype)
-                    starts.append(builder.inttoptr(next(addresses), element.as_pointer()))
-                made.append(_views(context, builder, memory, starts, sizes))
-            return context.make_tuple(builder, result, made)
-
-        return result(at), generate
 
 
 def _at_address(address: int, field: Field, sizes: Mapping[str, int]) -> NDArray[Any]:
@@ -123,24 +172,14 @@ def _at_address(address: int, field: Field, sizes: Mapping[str, int]) -> NDArray
 
 def pool_view(memory: Memory[T]) -> Callable[[Pool, Any], T]:
     """A function for kernels, (pool, s) -> the declaration of mission s, views into the pool."""
-
-    def typed(typing_context, pool, s):
-        def generate(context, builder, signature, arguments):
-            flat, first, sizes = _unpacked(context, builder, pool, arguments[0])
-            at = context.cast(builder, arguments[1], s, types.intp)
-            starts = [
-                builder.gep(array.data, [_element(context, builder, first, at, f)])
-                for f, array in enumerate(flat)
-            ]
-            known = {
-                name: _element(context, builder, sizes, at, k)
-                for k, name in enumerate(memory.names)
-            }
-            return _views(context, builder, memory, starts, known)
-
-        return memory.numba_type()(pool, s), generate
-
-    return _in_kernels(typed, memory.mission)
+    if not COMPILED:
+        return memory.mission
+    known: dict[str, Any] = {}
+    arrays = [
+        f"rows(pool.arrays.{field.name}, pool.first[s, {f}], {_shape(field, _sizes(memory))})"
+        for f, field in enumerate(memory.fields)
+    ]
+    return _kernel_of("pool, s", _declared(memory, arrays, known), known)
 
 
 def lane_view(memory: Memory[T], sized_by: Memory) -> Callable[[T, Any, Pool, Any], T]:
@@ -165,55 +204,20 @@ def lane_view(memory: Memory[T], sized_by: Memory) -> Callable[[T, Any, Pool, An
         known = dict(zip(sized_by.names, pool.sizes[s].tolist(), strict=True))
         return memory.lane(lanes, lane, known)
 
-    def typed(typing_context, lanes, lane, pool, s):
-        def generate(context, builder, signature, arguments):
-            given_lanes, given_lane, given_pool, given_s = arguments
-            parts = cgutils.unpack_tuple(builder, given_lanes)
-            arrays = [
-                make_array(array_type)(context, builder, part)
-                for array_type, part in zip(lanes, parts, strict=True)
-            ]
-            at = context.cast(builder, given_lane, lane, types.intp)
-            mission = context.cast(builder, given_s, s, types.intp)
-            _, _, sizes = _unpacked(context, builder, pool, given_pool)
-            known = {
-                name: _element(context, builder, sizes, mission, k)
-                for k, name in enumerate(sized_by.names)
-            }
-            starts = []
-            for field, array in zip(memory.fields, arrays, strict=True):
-                stride = cgutils.unpack_tuple(builder, array.strides)[0]
-                starts.append(_pointer(builder, array.data, builder.mul(at, stride)))
-                shape = cgutils.unpack_tuple(builder, array.shape)[1:]
-                for axis, size in zip(field.axes, shape, strict=True):
-                    if isinstance(axis, str):
-                        known.setdefault(axis, size)
-            return _views(context, builder, memory, starts, known)
-
-        return memory.numba_type()(lanes, lane, pool, s), generate
-
-    return _in_kernels(typed, plain)
+    if not COMPILED:
+        return plain
+    known: dict[str, Any] = {}
+    arrays = []
+    for field in memory.fields:
+        lanes = {axis: f"lanes.{field.name}.shape[{k + 1}]" for k, axis in enumerate(field.axes)}
+        shape = _shape(field, lanes | _sizes(sized_by))
+        arrays.append(f"rows(lanes.{field.name}, lane, {shape})")
+    return _kernel_of("lanes, lane, pool, s", _declared(memory, arrays, known), known)
 
 
-def _unpacked(context: Any, builder: Any, pool: Any, value: Any) -> tuple[list[Any], Any, Any]:
-    """The flat arrays of a pool, and its two tables."""
-    arrays, first, sizes = cgutils.unpack_tuple(builder, value)
-    flat = [
-        make_array(array_type)(context, builder, array)
-        for array_type, array in zip(pool[0], cgutils.unpack_tuple(builder, arrays), strict=True)
-    ]
-    tables = [
-        make_array(table_type)(context, builder, table)
-        for table_type, table in ((pool[1], first), (pool[2], sizes))
-    ]
-    return flat, tables[0], tables[1]
-
-
-def _element(context: Any, builder: Any, table: Any, row: Any, column: int) -> Any:
-    """An element of a C-contiguous table of intp."""
-    width = cgutils.unpack_tuple(builder, table.shape)[1]
-    at = builder.add(builder.mul(row, width), context.get_constant(types.intp, column))
-    return builder.load(builder.gep(table.data, [at]))
+def _sizes(memory: Memory) -> dict[str, str]:
+    """The text of each size of mission s of a pool."""
+    return {name: f"pool.sizes[s, {k}]" for k, name in enumerate(memory.names)}
 
 
 def _copied(typing_context, source, target):

@@ -12,10 +12,10 @@ import numpy as np
 from numba import typeof, types
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel
 from uas_coverage_env.compiled.random import counted
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.disturbances.wind import blow
 from uas_coverage_env.vehicle import LIFT, N_DEVIATIONS, TAU_Z, clip_wrench
 from uas_coverage_env.world.arena import ARENA

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.disturbances.act import check_and_clip, clear
 from uas_coverage_env.disturbances.wind import blow
 from uas_coverage_env.world.state import FLYING

@@ -10,7 +10,6 @@ from numba.np import numpy_support
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import write_brake
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
@@ -176,12 +175,11 @@ def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
             kind are already written there.
     """
     which = acting.call[WHICH]
-    size = learners.asked.shape[1]
     if on_gpu is not None and which == _OWN:
         return
     for i in range(scratch.commands.shape[0]):
         begin_command(tables, learners, scratch, acting, i)
-        values = slice_view(scratch.values, i * size, size)
+        values = scratch.values[i]
         command = scratch.commands[i]
         if rarely(which == _OWN):
             if on_gpu is None and state.status[i] == FLYING:

@@ -7,7 +7,6 @@ import numpy as np
 from numba import prange, types
 from numba.np.ufunc import get_thread_id
 
-from uas_coverage_env.compiled.array_views import rows_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
@@ -18,7 +17,7 @@ from uas_coverage_env.compiled.kernels import (
     rarely,
 )
 from uas_coverage_env.compiled.random import counted
-from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view
+from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view, rows_view
 from uas_coverage_env.disturbances.act import begin_random
 from uas_coverage_env.env.act import acting_of, first_not_finite
 from uas_coverage_env.env.actions.velocity import VELOCITY

@@ -2,8 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.act import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
     CONTACT,

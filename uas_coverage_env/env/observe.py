@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.memory import (
     BLOCK_ADDRESS,
     BLOCK_COLUMN,

@@ -7,10 +7,10 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.memory import (
     FIRST_TERM,
     LEARNERS,

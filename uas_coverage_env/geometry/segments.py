@@ -7,7 +7,6 @@ Loops go over views of a hull's own rows: of their indices the compiler knows th
 
 import math
 
-from uas_coverage_env.compiled.array_views import rows_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 
 _SURE_M = 1e-6
@@ -30,8 +29,8 @@ def signed_distance(normals, offsets_m, first, last, x, y, z):
     Returns:
         [m], negative inside.
     """
-    faces = rows_view(normals, first, (last - first, 3))
-    away_m = rows_view(offsets_m, first, (last - first,))
+    faces = normals[first:last]
+    away_m = offsets_m[first:last]
     largest = -math.inf
     for h in range(away_m.shape[0]):
         distance = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
@@ -65,8 +64,8 @@ def segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     dx = x1 - x0
     dy = y1 - y0
     dz = z1 - z0
-    faces = rows_view(normals, first, (last - first, 3))
-    away_m = rows_view(offsets_m, first, (last - first,))
+    faces = normals[first:last]
+    away_m = offsets_m[first:last]
     n_faces = away_m.shape[0]
     height = -math.inf
     slope = 0.0
@@ -118,8 +117,8 @@ def segment_meets(normals, offsets_m, first, last, inflation_m, x0, y0, z0, x1, 
     Returns:
         True where some point of the segment is closer than `inflation_m`.
     """
-    faces = rows_view(normals, first, (last - first, 3))
-    away_m = rows_view(offsets_m, first, (last - first,))
+    faces = normals[first:last]
+    away_m = offsets_m[first:last]
     enters = 0.0
     leaves = 1.0
     for h in range(away_m.shape[0]):

@@ -5,9 +5,8 @@ import math
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.belief import believed_wrench, expect, learn
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.array_views import slice_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, rarely
-from uas_coverage_env.compiled.views import Layout
+from uas_coverage_env.compiled.views import Layout, slice_view
 from uas_coverage_env.disturbances.act import disturb
 from uas_coverage_env.vehicle import (
     DOD,

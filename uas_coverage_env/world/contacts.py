@@ -2,7 +2,6 @@
 
 import math
 
-from uas_coverage_env.compiled.array_views import rows_view
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
 from uas_coverage_env.geometry import (
     cylinder_clearance,
@@ -38,8 +37,8 @@ from uas_coverage_env.world.state import FLYING
 @kernel
 def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     """A lower bound of the clearance of a segment: the face that both ends are farthest from."""
-    faces = rows_view(normals, first, (last - first, 3))
-    away_m = rows_view(offsets_m, first, (last - first,))
+    faces = normals[first:last]
+    away_m = offsets_m[first:last]
     largest = -math.inf
     for h in range(away_m.shape[0]):
         n0 = faces[h, 0]
