@@ -23,6 +23,7 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
+from scipy.optimize import linprog
 from scipy.sparse import csr_matrix
 
 from uas_coverage_env import Flight, load_planner, rollout
@@ -32,7 +33,6 @@ from uas_coverage_env.bound.legs import Legs, straight_directions
 from uas_coverage_env.bound.prices import WITHIN, Prices
 from uas_coverage_env.bound.turning import Motion, Turning, motion_of
 from uas_coverage_env.flight import energy_Wh
-from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY
 
@@ -171,7 +171,9 @@ def in_a_row(
         place = place + np.einsum("i,aix->ax", motion.position, x) + motion.input_m * inputs
         x = np.einsum("ij,ajx->aix", motion.A, x) + motion.B[None, :, None] * inputs[:, None]
     allowed = [(None, None)] * (8 + 2 * n) + [(0.0, None)] * (2 * n)
-    found = linprog(cost, csr_matrix(np.vstack(rows)), np.concatenate(bounds), bounds=allowed)
+    found = linprog(  # pyrefly: ignore[no-matching-overload] # of sparse matrices
+        cost, csr_matrix(np.vstack(rows)), np.concatenate(bounds), bounds=allowed
+    )
     return prices.step * n + float(found.fun) if found.success else math.inf
 
 

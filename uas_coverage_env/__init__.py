@@ -4,10 +4,13 @@ Importing the package registers the environments with Gymnasium and PettingZoo, 
 names are imported when they are first asked for, from where `__init__.pyi` says.
 """
 
-import lazy_loader
+from uas_coverage_env.program import ctrl_c_ends_the_program
 
-from uas_coverage_env.registration import register_environments
+with ctrl_c_ends_the_program():
+    import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+    from uas_coverage_env.registration import register_environments
 
-register_environments()
+    __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+    register_environments()

@@ -2,6 +2,6 @@
 
 import sys
 
-from uas_coverage_command import main
+from uas_coverage_env.program import main
 
 sys.exit(main())

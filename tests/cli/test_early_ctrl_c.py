@@ -25,18 +25,23 @@ sys.meta_path.insert(0, Interrupts())
 """
 
 
-def command():
+def installed():
+    """The command as an installer writes it."""
     module, _, function = PROJECT["scripts"]["uas-coverage"].partition(":")
-    script = f"import sys; from {module} import {function}; sys.exit({function}())"
-    return [sys.executable, "-c", script]
+    named = "sys.argv[0] = '/usr/bin/uas-coverage'"
+    return ["-c", f"import sys; {named}; from {module} import {function}; sys.exit({function}())"]
 
 
-def interrupted(folder, name):
-    """The command in a process of its own that gets SIGINT where it imports a module."""
+FORMS = {"installed": installed(), "module": ["-m", "uas_coverage_env"]}
+
+
+def interrupted(folder, name, command):
+    """A process of its own that gets SIGINT where it imports a module."""
     (folder / "sitecustomize.py").write_text(INTERRUPTED_AT.format(name=name))
+    paths = filter(None, (str(folder), os.environ.get("PYTHONPATH", "")))
     return subprocess.run(
-        [*command(), "planners"],
-        env={**os.environ, "PYTHONPATH": str(folder)},
+        [sys.executable, *command],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
         # as a shell starts it, also where the tests run in the background
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         capture_output=True,
@@ -44,15 +49,24 @@ def interrupted(folder, name):
     )
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     "name", ["lazy_loader", "numpy", "gymnasium.core", "pettingzoo", "typer", "rich.console"]
 )
-def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_word(tmp_path, name):
-    ended = interrupted(tmp_path, name)
+def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_word(tmp_path, name, form):
+    ended = interrupted(tmp_path, name, [*FORMS[form], "planners"])
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
 
 
+def test_ctrl_c_while_another_program_imports_the_package_is_python_s_own(tmp_path):
+    catches = "try:\n import uas_coverage_env\nexcept KeyboardInterrupt:\n print('caught')"
+    ended = interrupted(tmp_path, "pettingzoo", ["-c", catches])
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "caught\n", "")
+
+
 def test_ctrl_c_while_a_command_is_imported_is_one_line(tmp_path):
-    ended = interrupted(tmp_path, "uas_coverage_env.cli.planners")
+    ended = interrupted(
+        tmp_path, "uas_coverage_env.cli.planners", [*FORMS["installed"], "planners"]
+    )
     assert ended.returncode == 1
     assert ended.stderr == "error: stopped by hand; what was finished before is kept\n"

@@ -4,7 +4,6 @@ from typing import Literal
 import pytest
 from pydantic import Field
 
-from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import (
     PlannerOptions,
@@ -14,6 +13,7 @@ from uas_coverage_env.flight import (
     registry,
     rollout,
 )
+from uas_coverage_env.plugins.installed import entry_points
 
 
 class TunedOptions(PlannerOptions):

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import linprog
 from scipy.spatial import Delaunay
 
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.geometry.linear_programs import linprog
 
 EXAMPLES = settings(max_examples=60, deadline=None, derandomize=True)
 BOX = [[x, y, z] for x in (-2.0, 8.0) for y in (3.0, 5.0) for z in (0.0, -7.0)]

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import linprog
 
 from uas_coverage_env.geometry import (
     ConvexPolytope,
@@ -15,7 +16,6 @@ from uas_coverage_env.geometry import (
     segment_meets,
     signed_distance,
 )
-from uas_coverage_env.geometry.linear_programs import linprog
 
 EXAMPLES = settings(max_examples=150, deadline=None, derandomize=True)
 POINT = arrays(np.float64, 3, elements=st.floats(-15, 15))

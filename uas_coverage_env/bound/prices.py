@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import linprog
 
-from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
 from uas_coverage_env.vehicle.battery import (
     BatterySegment,
@@ -187,7 +187,7 @@ def _minorant(vehicle: VehicleParams, ranges: _Ranges, dod_max: float) -> _Minor
     cost = np.zeros(_VERTICAL + len(slabs))
     cost[_BASE], cost[_HORIZONTAL] = -1.0, -ranges.likely_N
     positive = (0.0, None)
-    found = linprog(
+    found: Any = linprog(
         cost, np.array(rows), powers_W, bounds=[(None, None)] + [positive] * (len(cost) - 1)
     )
     if not found.success or found.x[_BASE] <= 0.0:

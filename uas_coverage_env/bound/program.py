@@ -11,10 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 from scipy.sparse import coo_matrix, csr_array, csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
-
-from uas_coverage_env.geometry.linear_programs import linprog
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -204,7 +203,7 @@ class Program:
         bounds[n_basic - len(self._cuts) :, 1] = np.inf
         if further is not None:
             bounds[n_basic + 2 * len(further.around) :, 1] = further.unpaid
-        found = linprog(
+        found = linprog(  # pyrefly: ignore[no-matching-overload] # of sparse matrices
             cost,
             A_ub=self._inequalities(triples, len(cost)),
             b_ub=[self._most, *(-2.0 * cut.routes for cut in self._cuts)],

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from uas_coverage_env.bound.prices import WITHIN, Prices
-from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.vehicle.governor import horizontal_axis
 
@@ -209,7 +209,7 @@ def _reach_m(motion: Motion, at_rest: bool = False) -> FloatArray:
         allowed = [(0.0, 0.0) if at_rest else (None, None)] * _N_STATES + [
             (-motion.largest_input, motion.largest_input)
         ] * n
-        found = linprog(-gained, np.vstack(rows), bounds, bounds=allowed)
+        found: Any = linprog(-gained, np.vstack(rows), bounds, bounds=allowed)
         reach.append(-float(found.fun))
     return np.array(reach)
 
@@ -294,7 +294,7 @@ class _Window:
             cost -= self._per_m * (direction @ np.einsum("i,aix->ax", motion.potential, states[k]))
         allowed = [(0.0, 0.0) if at_rest else (None, None)] * inputs_from
         allowed += [(None, None)] * (2 * n) + [(0.0, None)] * n
-        found = linprog(cost, np.vstack(rows), np.concatenate(bounds), bounds=allowed)
+        found: Any = linprog(cost, np.vstack(rows), np.concatenate(bounds), bounds=allowed)
         if not found.success:
             raise ValueError(f"no bound of a turn was found ({found.message})")
         return prices.step * n + float(found.fun)

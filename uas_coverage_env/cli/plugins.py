@@ -10,8 +10,8 @@ from typing import Any, NoReturn
 
 from uas_coverage_env.cli.lazy import CommandEntry
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.files.installed import entry_points
-from uas_coverage_env.files.users_code import described
+from uas_coverage_env.plugins.installed import entry_points
+from uas_coverage_env.plugins.users_code import described
 
 GROUP = "uas_coverage.commands"
 

@@ -15,7 +15,7 @@ from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
 from uas_coverage_env.compiled.kernels import COMPILED
-from uas_coverage_env.files.users_code import described, place_of_function
+from uas_coverage_env.plugins.users_code import described, place_of_function
 
 
 class Signature:

@@ -19,12 +19,12 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from uas_coverage_env.files.installed import entry_points
-from uas_coverage_env.files.named_objects import object_named
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import did_you_mean, meant
-from uas_coverage_env.files.users_code import described
 from uas_coverage_env.flight.planner import Planner, PlannerOptions, check_planner
+from uas_coverage_env.plugins.installed import entry_points
+from uas_coverage_env.plugins.named_objects import object_named
+from uas_coverage_env.plugins.users_code import described
 
 GROUP = "uas_coverage.planners"
 KINDS = "uas_coverage.planner_kinds"

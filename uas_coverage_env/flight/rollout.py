@@ -16,9 +16,7 @@ from uas_coverage_env.disturbances import Disturbance
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.files.errors import PlannerError
-from uas_coverage_env.files.installed import version_of
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.files.users_code import described, place_of
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.left_open import left_open
@@ -27,6 +25,8 @@ from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.mission import MissionBrief, Relaunch
+from uas_coverage_env.plugins.installed import version_of
+from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
 from uas_coverage_env.vehicle import Z

@@ -12,10 +12,10 @@ from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.files.users_code import described
 from uas_coverage_env.flight import PlannerError, load_planner, rollout
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.leaderboard.sweep import Entry
+from uas_coverage_env.plugins.users_code import described
 
 Backend = Literal["process", "ray"]
 

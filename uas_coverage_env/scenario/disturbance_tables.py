@@ -5,9 +5,9 @@ from typing import Annotated, Any
 
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
-from uas_coverage_env.files.installed import entry_points
 from uas_coverage_env.files.strict_toml import StrictModel, parse
-from uas_coverage_env.files.users_code import described
+from uas_coverage_env.plugins.installed import entry_points
+from uas_coverage_env.plugins.users_code import described
 
 GROUP = "uas_coverage.disturbances"
 

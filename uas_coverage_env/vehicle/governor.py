@@ -7,13 +7,13 @@ why the tests below, which look at one axis, certify norms over two.
 """
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
+from scipy.optimize import linprog
 
-from uas_coverage_env.geometry.linear_programs import linprog
 from uas_coverage_env.vehicle.layout import TAU_Y, THETA, VX, WY, X
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
@@ -126,7 +126,7 @@ def _predicted(
 def _is_implied(row: FloatArray, known: FloatArray) -> bool:
     """Whether the known rows alone keep |a · s + b r| within its bound, by a linear program."""
     scaled = known[:, :BOUND] / known[:, BOUND:]
-    result = linprog(
+    result: Any = linprog(
         -row[:BOUND] / row[BOUND],
         A_ub=np.vstack([scaled, -scaled]),
         b_ub=np.ones(2 * len(scaled)),

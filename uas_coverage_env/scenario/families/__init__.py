@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.files.installed import entry_points
-from uas_coverage_env.files.users_code import described
+from uas_coverage_env.plugins.installed import entry_points
+from uas_coverage_env.plugins.users_code import described
 from uas_coverage_env.scenario.families.courtyards import courtyards
 from uas_coverage_env.scenario.families.irregular import irregular
 from uas_coverage_env.scenario.families.low_charge import low_charge, with_charge_for

@@ -3,10 +3,10 @@
 from typing import Any
 
 from uas_coverage_baselines.milp_mpc.model.ocp import Block
-from uas_coverage_env.files.installed import entry_points
-from uas_coverage_env.files.named_objects import object_named
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.files.users_code import described
+from uas_coverage_env.plugins.installed import entry_points
+from uas_coverage_env.plugins.named_objects import object_named
+from uas_coverage_env.plugins.users_code import described
 
 GROUP = "uas_coverage.blocks"
 """The entry-point group in which packages announce blocks by name."""

@@ -5,7 +5,7 @@ from importlib import metadata
 
 import pytest
 
-from uas_coverage_env.files.installed import entry_points, version_of
+from uas_coverage_env.plugins.installed import entry_points, version_of
 
 GROUP = "uas_coverage.test_installed"
 

@@ -1,0 +1,1 @@
+"""What others install or name, and what went wrong in it."""
