@@ -51,6 +51,7 @@ class MissionMaker:
         legs, x = self._legs, swarm.x
         n_uas = len(x)
         battery_s = (self._uas["dod_max"] - x[:, DOD]) / self._uas["dod_per_s"]
+        left_s = np.minimum(battery_s, self._until_s - swarm.time_s)
         here_home_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
         here_home_s = np.where(swarm.departed, _LEGS * here_home_s + TRAJECTORY.landing_s, 0.0)
         return Mission(
@@ -63,8 +64,7 @@ class MissionMaker:
             velocity=np.ascontiguousarray(x[:, VX : VY + 1]) / self._speed_mps,
             from_s=_LEGS * np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)]),
             here_home_s=here_home_s,
-            budget_s=np.minimum(battery_s, self._until_s - swarm.time_s)
-            - TRAJECTORY_RESERVE.kept_s,
+            budget_s=left_s - TRAJECTORY_RESERVE.kept_s,
             may=works & (swarm.status == FLYING),
             late=late.copy(),
             unit_s=self._unit_s,
