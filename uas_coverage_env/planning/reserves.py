@@ -58,9 +58,9 @@ TOUR_RESERVE = Reserve(kept_s=30.0, spare_s=10.0)
 """Of `tour`: what return mode asks for beyond the way home at full speed. Chosen by hand."""
 
 TOUR_SCARCE_RESERVE = Reserve(kept_s=20.0, spare_s=3.0)
-"""Of `tour` once charge does not suffice for all. On missions of the family `low-charge`,
-`benchmarks/missions.py` showed 23 to 52 % covered instead of 0 to 13 % (0.3.0); which lower
-reserves were tried is not recorded."""
+"""Of `tour` once charge does not suffice for all. With it and other changes of 0.3.0 it covered
+23 to 52 % instead of 0 to 13 % of missions of the family `low-charge`; the command and what else
+was tried are not recorded."""
 
 BY_LEGS_RESERVE = Reserve(kept_s=30.0)
 """Of `LegMission`: that of `tour`. Chosen by hand; without `spare_s`, as its plans are not made
@@ -72,11 +72,12 @@ hand; `benchmarks/trajectory.py` shows what charge is left."""
 
 ORDER_GUIDE_RESERVE = Reserve(kept_s=25.0)
 """Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and `BRAKING_S`
-hold back. Chosen by hand."""
+hold back for braking and landing. Chosen by hand."""
 
 BRAKING_S = 16.0
-"""Of `milp-mpc`: braking to a hover where a plan ends, and turning home [s]. Fitted, as of commit
-ae77fbc4, to what braking took; the command is not recorded."""
+"""Of `milp-mpc`: braking to a hover where a plan ends, and turning home [s]. Twice the 8 s of its
+first version, in which braking did not fit; the command is not recorded. What it is enough for:
+`tests/milp_mpc/test_battery_reserve.py`."""
 
 ROUTE_HOME_RESERVE = Reserve(kept_s=30.0)
 """Of UAS that `milp-mpc` flies home along a route: others may be in the way. Chosen by hand."""

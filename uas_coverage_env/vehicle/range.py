@@ -1,7 +1,8 @@
 """How long a flight takes, and what it takes from the battery: one model for every estimate.
 
 What estimates differ in is a `TravelTimeModel`. The calibrated one is `CALIBRATED`; others stand
-with what uses them, those of planners in `planning.reserves`; why they differ: docs/range_method.md.
+with what uses them, those of planners in `planning.reserves` (why they differ:
+docs/range_method.md).
 """
 
 import math
