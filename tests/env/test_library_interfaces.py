@@ -63,10 +63,14 @@ def make_vec(num_envs=2, **settings) -> Any:
 
 
 def test_codes_have_the_names_that_files_and_records_use():
-    assert tuple(kind.name.lower() for kind in ContactKind) == CONTACT_NAMES
-    assert tuple(status.name.lower() for status in UasStatus if status >= 0) == STATUS_NAMES
-    kinds = tuple(kind.name.lower().replace("_", "") for kind in CommandKind)
-    assert kinds == KIND_NAMES
+    assert STATUS_NAMES == ("flying", "landed", "lost", "swapping")
+    assert CONTACT_NAMES == (
+        "none", "obstacle", "moving_obstacle", "uas", "geofence", "battery", "fault", "limits",
+    )  # fmt: skip
+    assert KIND_NAMES == ("velocity", "acceleration", "wrench", "goto", "climb")
+    for codes, names in ((UasStatus, STATUS_NAMES), (ContactKind, CONTACT_NAMES)):
+        assert [codes[name.upper()] for name in names] == list(range(len(names)))
+    assert [*CommandKind] == list(range(len(KIND_NAMES)))
 
 
 @pytest.mark.parametrize("action", ["velocity", "waypoint"])

@@ -6,9 +6,13 @@ from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
-from uas_coverage_env.vehicle.range import RETURN_MODE, Speeds, flight_seconds
+from uas_coverage_env.vehicle.range import SpeedLimits, TravelTimeModel, flight_seconds
 from uas_coverage_env.world.coverage import can_cover
 from uas_coverage_env.world.state import CONSUMPTION, FLYING, WIND
+
+RETURN_MODE = TravelTimeModel(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.0)
+"""On the way home a UAS turns, climbs, and is held up by others. Chosen by hand;
+`benchmarks/returns.py` shows what it costs. Recorded flights and trained policies depend on it."""
 
 _CLOCK_RESERVE_S = 30.0
 
@@ -36,7 +40,7 @@ def seconds_home(arena, i, x):
     """Time [s] that UAS i is given to fly home and land, held up by others (`RETURN_MODE`)."""
     uas = arena.uas[i]
     altitude_m = max(-x[Z] + uas.home_m[2], 0.0)
-    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     way_m = path_length_home_m(arena, i, x)
     return flight_seconds(RETURN_MODE, speeds, 0.0, way_m, 0.0, altitude_m)
 

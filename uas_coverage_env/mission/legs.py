@@ -26,9 +26,9 @@ from uas_coverage_env.autopilot.belief import (
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.leg_model import Autopilot
+from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle.range import (
-    ROUTED,
-    Speeds,
+    SpeedLimits,
     flight_seconds,
     level_seconds,
     speeds_of,
@@ -135,7 +135,7 @@ class Legs:
         """The level speed of a UAS over ground, straight from a place to another [m/s]."""
         return float(self._level_mps(self._speeds[self.kind[uas]], start_m[None], end_m[None])[0])
 
-    def _level_mps(self, speeds: Speeds, start_m: FloatArray, end_m: FloatArray) -> FloatArray:
+    def _level_mps(self, speeds: SpeedLimits, start_m: FloatArray, end_m: FloatArray) -> FloatArray:
         """(N,) level speeds over ground from N places to others."""
         if self._wind is None:
             return np.full(len(start_m), speeds.level_mps)
@@ -172,7 +172,7 @@ class Legs:
             _legs_s(self.arena, target, here, start, no_credit, speeds, level_mps, _OCTAGON)[0]
         )
 
-    def _between(self, speeds: Speeds) -> FloatArray:
+    def _between(self, speeds: SpeedLimits) -> FloatArray:
         n = len(self.waypoints_m)
         straight = np.empty((n, n))
         for rows in np.array_split(np.arange(n), max(n * n // _AT_ONCE, 1)):
@@ -222,7 +222,7 @@ def _straight_s(
     start_m: FloatArray,
     end_m: FloatArray,
     credit_m: FloatArray,
-    speeds: Speeds,
+    speeds: SpeedLimits,
     level_mps: FloatArray,
 ) -> FloatArray:
     away = end_m - start_m
@@ -274,6 +274,6 @@ def _legs_s(arena, targets, start_m, end_m, credit_m, speeds, level_mps, octagon
                     top = min(top, -obstacle.roof_m)
             up = max(up, z0 - top)
             down = max(down, z1 - top - credit_m[i])
-        flown = Speeds(level_mps[i], speeds.climb_mps, speeds.descent_mps)
+        flown = SpeedLimits(level_mps[i], speeds.climb_mps, speeds.descent_mps)
         result[i] = flight_seconds(ROUTED, flown, 0.0, length_m, up, down)
     return result

@@ -1,7 +1,8 @@
 """How long a flight takes, and what it takes from the battery: one model for every estimate.
 
-What estimates differ in is declared here, as one `Pace` each. The calibrated one is `CALIBRATED`;
-why others remain: docs/range.md.
+What estimates differ in is a `TravelTimeModel`. The calibrated one is `CALIBRATED`; others stand
+with what uses them, those of planners in `planning.reserves` (why they differ:
+docs/range_method.md).
 """
 
 import math
@@ -15,15 +16,15 @@ from uas_coverage_env.vehicle.derived import steady_current_A
 from uas_coverage_env.vehicle.params import VehicleParams
 
 
-class Speeds(NamedTuple):
-    """The speeds of a vehicle that a `Pace` refers to."""
+class SpeedLimits(NamedTuple):
+    """The speeds of a vehicle that a `TravelTimeModel` refers to."""
 
     level_mps: float
     climb_mps: float
     descent_mps: float
 
 
-class Pace(NamedTuple):
+class TravelTimeModel(NamedTuple):
     """What an estimate of flight time assumes."""
 
     speed_share: float = 1.0
@@ -40,53 +41,23 @@ class Pace(NamedTuple):
     """Added in the end."""
 
 
-CALIBRATED = Pace(level_s=7.0, vertical_s=1.0)
-"""Fitted to flown returns; what `mission.Range` answers."""
-
-RETURN_MODE = Pace(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.0)
-"""Of the world's return mode: on the way home a UAS turns, climbs, and is held up by others."""
-
-OBSERVED = Pace(in_turn=True)
-"""Of the environments' observation."""
-
-LEARNED_LEG = Pace(speed_share=0.8, vertical_s=1.6)
-"""Of `learned-waypoint`: to a waypoint."""
-
-LEARNED_RETURN = Pace(speed_share=0.8, vertical_s=-1.6, landing_s=6.0)
-"""Of `learned-waypoint`: home."""
-
-GENERATED = Pace(speed_share=0.85, landing_s=3.0)
-"""Of generated scenarios, and of the warning of batteries too small; the landing's time is that of
-a take-off, too."""
-
-ROUTED = Pace()
-"""Of `mission.Legs`, which compares routes."""
-
-TOUR = Pace(landing_s=3.0)
-"""Of `tour`: `ROUTED`, and from full speed over the start to rest on it."""
-
-ORDER_GUIDE = Pace(landing_s=4.0)
-"""Of the order that `milp-mpc-guided` follows: `ROUTED`, and coming to rest above the start."""
-
-MILP_RESERVE = Pace(speed_share=0.9, detour=1.1, in_turn=True, landing_s=6.0)
-"""Of the reserve of `milp-mpc`: linear in the place, hence no look at what stands in the way."""
-
-LAWNMOWER = Pace(speed_share=0.8)
-"""Of `lawnmower`: the legs of its runs, straight, at a share of the cruise speed."""
+CALIBRATED = TravelTimeModel(level_s=7.0, vertical_s=1.0)
+"""What `mission.Range` answers. Fitted to flown returns in generated towns of seeds below 1200;
+`benchmarks/returns.py` flies others."""
 
 
-def level_seconds(pace: Pace, speeds: Speeds, way_m: Any) -> Any:
+def level_seconds(model: TravelTimeModel, speeds: SpeedLimits, way_m: Any) -> Any:
     """Time of level flight, numbers or arrays [s]; also compiled, see `flight_seconds`.
 
     Args:
-        pace: What is assumed.
+        model: What is assumed.
         speeds: Of the vehicle.
         way_m: Horizontal length [m].
     """
-    return pace.detour * way_m / (pace.speed_share * speeds.level_mps)
+    return model.detour * way_m / (model.speed_share * speeds.level_mps)
 
 
-def vertical_seconds(speeds: Speeds, up_m: Any, down_m: Any) -> Any:
+def vertical_seconds(speeds: SpeedLimits, up_m: Any, down_m: Any) -> Any:
     """Time of a climb and a descent, numbers or arrays [s]; also compiled, see `flight_seconds`."""
     return up_m / speeds.climb_mps + down_m / speeds.descent_mps
 
@@ -96,29 +67,29 @@ _vertical_seconds = inlined_kernel(vertical_seconds)
 
 
 @inlined_kernel
-def flight_seconds(pace, speeds, turn_s, way_m, up_m, down_m):
+def flight_seconds(model, speeds, turn_s, way_m, up_m, down_m):
     """Time of a flight with level and vertical part [s].
 
     Args:
-        pace: `Pace`, what is assumed.
-        speeds: `Speeds` of the vehicle.
+        model: `TravelTimeModel`, what is assumed.
+        speeds: `SpeedLimits` of the vehicle.
         turn_s: To turn towards the way first [s].
         way_m: Horizontal length [m].
         up_m: To climb, not negative [m].
         down_m: To descend, not negative [m].
     """
-    level_s = _level_seconds(pace, speeds, way_m) + turn_s + pace.level_s
+    level_s = _level_seconds(model, speeds, way_m) + turn_s + model.level_s
     vertical_s = _vertical_seconds(speeds, up_m, down_m)
     if up_m + down_m > 0.0:
-        vertical_s += pace.vertical_s
-    both_s = level_s + vertical_s if pace.in_turn else max(level_s, vertical_s)
-    return both_s + pace.landing_s
+        vertical_s += model.vertical_s
+    both_s = level_s + vertical_s if model.in_turn else max(level_s, vertical_s)
+    return both_s + model.landing_s
 
 
-def speeds_of(vehicle: VehicleParams) -> Speeds:
+def speeds_of(vehicle: VehicleParams) -> SpeedLimits:
     """The largest speeds of a vehicle."""
     limits = vehicle.limits
-    return Speeds(limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps)
+    return SpeedLimits(limits.v_xy_max_mps, limits.v_up_max_mps, limits.v_down_max_mps)
 
 
 _TURNS = 1.5
@@ -156,7 +127,7 @@ def seconds_to_land(vehicle, way_m, towards_mps, height_m, roof_m, before_m, aft
     turn_s = _TURNS * turn_mps / most_mps2
     leaning_s = 2.0 * math.sqrt(vehicle.tilt_max_rad / vehicle.alpha_xy_max_radps2)
     turn_s += _TURNS * max(vehicle.v_xy_max_mps / most_mps2 + leaning_s - _QUICK_S, 0.0)
-    speeds = Speeds(vehicle.v_xy_max_mps, vehicle.v_up_max_mps, vehicle.v_down_max_mps)
+    speeds = SpeedLimits(vehicle.v_xy_max_mps, vehicle.v_up_max_mps, vehicle.v_down_max_mps)
     up_m, down_m = max(-height_m, 0.0), max(height_m, 0.0)
     seconds = flight_seconds(CALIBRATED, speeds, turn_s, way_m, up_m, down_m)
     if roof_m == -math.inf:

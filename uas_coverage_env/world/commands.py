@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import record_dtype
+from uas_coverage_env.world.codes import CommandKind
 
 Mode = Literal["covering", "transit", "return"]
 
-VELOCITY, ACCELERATION, WRENCH, GO_TO, CLIMB = range(5)
-"""Kinds of command. CLIMB (north, east and down velocity) is what the safety filter brakes with,
-without an altitude to hold, so that braking on is the same flight in every step. Planners cannot
-give it; a kind of action can."""
+VELOCITY, ACCELERATION, WRENCH, GO_TO, CLIMB = map(int, CommandKind)
 
-KIND_NAMES = ("velocity", "acceleration", "wrench", "goto", "climb")
+KIND_NAMES = tuple(kind.name.lower().replace("_", "") for kind in CommandKind)
 
 HOME = -1
 """The GO_TO index of a UAS's own start."""

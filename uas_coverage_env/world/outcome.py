@@ -2,14 +2,12 @@
 
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.vehicle import N_DEVIATIONS, N_INPUTS
+from uas_coverage_env.world.codes import ContactKind
 from uas_coverage_env.world.commands import COMMAND_DTYPE
 
-NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY, FAULT, LIMITS = range(8)
-"""What a lost UAS was lost to; a FAULT is an event of the scenario, and no violation."""
+NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY, FAULT, LIMITS = map(int, ContactKind)
 
-CONTACT_NAMES = (
-    "none", "obstacle", "moving_obstacle", "uas", "geofence", "battery", "fault", "limits",
-)  # fmt: skip
+CONTACT_NAMES = tuple(kind.name.lower() for kind in ContactKind)
 
 BREACH_TOLERANCE_M = 1e-9
 """Only what is nearer than a safe distance, or lower than the least height, by more than this is a

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.vehicle import N_STATES, PSI
+from uas_coverage_env.world.codes import UasStatus
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
 from uas_coverage_env.world.events import (
     EVERY,
@@ -19,12 +20,7 @@ from uas_coverage_env.world.events import (
     write_responds,
 )
 
-FLYING, LANDED, LOST, SWAPPING = range(4)
-"""Status of a UAS. Landed and lost are final; one that swaps has landed, and may fly again with a
-fresh battery pack (`world.packs`)."""
-
-ABSENT = -1
-"""Status of a UAS that a mission does not have, in arrays with room for more."""
+ABSENT, FLYING, LANDED, LOST, SWAPPING = map(int, UasStatus)
 
 WIND, SINK, CONSUMPTION, EXPECTED, EXPECTED_DOD = 0, 2, 3, 4, 7
 """Places in `WorldState.belief`: wind north and east [m/s], of which drag and every other steady
@@ -41,7 +37,7 @@ had landed for good at its take-off."""
 
 N_PACK = PACK_OUT + 1
 
-STATUS_NAMES = ("flying", "landed", "lost", "swapping")
+STATUS_NAMES = tuple(status.name.lower() for status in UasStatus if status != ABSENT)
 
 
 class WorldState(NamedTuple):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.env.observation import Feature, Group
-from uas_coverage_env.vehicle.range import LEARNED_LEG
+from uas_coverage_env.planning.reserves import LEARNED_LEG
 
 LAYOUT = "waypoint_v1"
 

@@ -10,8 +10,9 @@ from uas_coverage_agents.waypoint.layout import CRUISE_SHARE
 from uas_coverage_env.autopilot import seconds_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.memory import Memory
+from uas_coverage_env.planning.reserves import LEARNED_LEG, LEARNED_RETURN
 from uas_coverage_env.vehicle import N_STATES, X, Y, Z
-from uas_coverage_env.vehicle.range import LEARNED_LEG, LEARNED_RETURN, Speeds, flight_seconds
+from uas_coverage_env.vehicle.range import SpeedLimits, flight_seconds
 from uas_coverage_env.world import Arena, route
 from uas_coverage_env.world.arena import ARENA
 
@@ -47,7 +48,7 @@ def leg_s(uas, way_m, rise_m, radius_m):
         rise_m: Altitude gained [m].
         radius_m: Of the waypoint at its end [m].
     """
-    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     credit_m = 0.6 * radius_m
     up_m, down_m = max(rise_m - credit_m, 0.0), max(-rise_m - credit_m, 0.0)
     return flight_seconds(LEARNED_LEG, speeds, 0.0, way_m, up_m, down_m)
@@ -56,7 +57,7 @@ def leg_s(uas, way_m, rise_m, radius_m):
 @allocating_kernel
 def home_leg_s(uas, way_m, altitude_m):
     """Time [s] to fly home over way_m, from altitude_m above the start, and land."""
-    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     return flight_seconds(LEARNED_RETURN, speeds, 0.0, way_m, 0.0, altitude_m)
 
 

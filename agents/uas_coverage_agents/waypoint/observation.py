@@ -22,13 +22,13 @@ from uas_coverage_agents.waypoint.layout import (
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
 from uas_coverage_env.autopilot import path_length_home_m
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.planning.reserves import LEARNED_CLOCK_RESERVE
 from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
 from uas_coverage_env.world import FLYING, HOME, route
 
 NO_TARGET = -2
 """Target of a UAS that has none; home is world's HOME, waypoints are their indices."""
 
-_CLOCK_RESERVE_S = 18.0
 _TURN_MPS2 = 3.0
 
 
@@ -77,7 +77,7 @@ def budget_s(arena, state, i):
     uas = arena.uas[i]
     rules = arena.rules[0]
     battery_s = (uas.dod_max - state.x[i, DOD]) / uas.dod_per_s
-    clock_s = (rules.max_steps - state.step[0]) * rules.dt_s - _CLOCK_RESERVE_S
+    clock_s = (rules.max_steps - state.step[0]) * rules.dt_s - LEARNED_CLOCK_RESERVE.kept_s
     return min(battery_s, clock_s)
 
 

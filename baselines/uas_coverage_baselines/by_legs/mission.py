@@ -16,13 +16,11 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_env.mission import Handover, MissionBrief, first_sight
+from uas_coverage_env.planning.reserves import BY_LEGS, BY_LEGS_RESERVE
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import Command, SwarmState
 
 BoolArray = NDArray[np.bool_]
-
-_LANDING_S = 12.0
-_RESERVE_S = 30.0
 
 
 class LegMission:
@@ -79,7 +77,9 @@ class LegMission:
         uas = terrain.arena.uas
         share = 1.0 if brief.conditions is None else brief.conditions.charge_share
         left_s = share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
-        left_s = np.minimum(left_s, brief.max_steps * brief.dt_s - swarm.time_s) - _RESERVE_S
+        left_s = (
+            np.minimum(left_s, brief.max_steps * brief.dt_s - swarm.time_s) - BY_LEGS_RESERVE.kept_s
+        )
         open_ = swarm.uncovered.copy()
         if works.any():
             open_ &= brief.can_cover[works].any(axis=0)
@@ -90,6 +90,6 @@ class LegMission:
             open_waypoints=open_,
             weight=self._weight,
             budget_s=left_s,
-            landing_s=_LANDING_S,
+            landing_s=BY_LEGS.landing_s,
         )
         return replace(task, turn_of_cosine=terrain.legs.turn_of_cosine)  # it stops at corners

@@ -19,8 +19,8 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.vehicle.range import ORDER_GUIDE
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -31,7 +31,6 @@ _MOVES_PER_S = 30_000  # of the decision's time limit, over all threads
 _FIRST_SEARCHES = 3
 _SEARCHED_AGAIN = 60  # waypoints of each route, at most, at every decision
 _WORTH_CHANGING_S = 0.5
-_RESERVE_S = 25.0  # flight time to come home with, as the OCP's reserve asks for
 _WAIT_WHEN_LEFT_S = 60.0  # with less than this still to go, blocked waypoints are waited for
 _WAIT_S = 30.0  # how long is then expected
 _WAITING_M = 100.0  # how far from a blocked waypoint is near enough: what blocks it may set off
@@ -175,7 +174,7 @@ class RouteGuide:
             active,  # a UAS that is not there any more can visit nothing
             open_waypoints=wanted,
             weight=self._weight,
-            budget_s=left_s - _RESERVE_S,
+            budget_s=left_s - ORDER_GUIDE_RESERVE.kept_s,
             landing_s=ORDER_GUIDE.landing_s,
             not_before_s=opens,
         )

@@ -14,8 +14,9 @@ from uas_coverage_env.autopilot.guidance import target_position
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake, moving_slack
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_distance
+from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.vehicle.range import ROUTED, Speeds, flight_seconds
+from uas_coverage_env.vehicle.range import SpeedLimits, flight_seconds
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart, route
 from uas_coverage_env.world.state import WIND
@@ -129,7 +130,7 @@ def _seconds_to(arena, i, task, x, covered, belief):
         speed_mps = ground_speed(
             speed_mps, GUSTS, belief[WIND], belief[WIND + 1], dx / length_m, dy / length_m
         )
-    speeds = Speeds(speed_mps, uas.climb_mps, uas.descent_mps)
+    speeds = SpeedLimits(speed_mps, uas.climb_mps, uas.descent_mps)
     seconds = flight_seconds(ROUTED, speeds, 0.0, left_m, up_m, down_m)
     # what is left for later takes longer than straight flight: no gain in putting it off
     seconds = SLOWER * seconds + task.rest_s[covered]

@@ -18,15 +18,12 @@ from uas_coverage_baselines.routing import (
     improve_trips,
 )
 from uas_coverage_env.mission import MEAN_HEIGHT_M, Legs, MissionBrief
+from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE
 from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.vehicle.range import TOUR
 from uas_coverage_env.world import Arena, SwarmState
 
 FloatArray = NDArray[np.float64]
 
-_RESERVE_S = 30.0  # what the return rule asks for beyond the way home at full speed
-_SPARE_S = 10.0  # left beside it in a new order, so that not every delay upsets the order
-_SCARCE_RESERVE_S, _SCARCE_SPARE_S = 20.0, 3.0  # the same once charge does not suffice for all
 _LATE_S = 6.0  # this far off the schedule, another search is worth its time
 _AGAIN_S = 5.0  # what a search could not mend is searched again after so long
 _PACE = 1.2  # flights take so much longer than their legs, until it is known better
@@ -80,7 +77,7 @@ class Schedule:
         self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
-        self._reserve_s, self._spare_s = _RESERVE_S, _SPARE_S
+        self._reserve = TOUR_RESERVE
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
@@ -105,7 +102,7 @@ class Schedule:
 
     def _keep_less(self) -> None:
         """Use more of the charge: what is left at the end would have covered something."""
-        self._reserve_s, self._spare_s = _SCARCE_RESERVE_S, _SCARCE_SPARE_S
+        self._reserve = TOUR_SCARCE_RESERVE
 
     def go_on(self, view: View, order: Routes) -> None:
         """Search from an order that was flown until the scene became another."""
@@ -186,7 +183,7 @@ class Schedule:
             return True
         if view.time_s < before.time_s + _AGAIN_S:
             return False
-        spare_s = self._budget_s(view) + self._spare_s / self.pace - self._legs_left_s
+        spare_s = self._budget_s(view) + self._reserve.spare_s / self.pace - self._legs_left_s
         too_long = [len(route) and spare_s[u] < 0.0 for u, route in enumerate(self.order.routes)]
         return bool(len(self.order.left_out) or any(too_long))
 
@@ -218,7 +215,7 @@ class Schedule:
         uas = self._arena.uas
         left_s = self._charge_share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
         left_s = np.minimum(left_s, self._until_s - view.time_s)
-        return (left_s - self._reserve_s - self._spare_s) / self.pace
+        return (left_s - self._reserve.kept_s - self._reserve.spare_s) / self.pace
 
     def _legs_left(self, view: View) -> FloatArray:
         """(U,) seconds of legs along each route and home, turns not counted."""

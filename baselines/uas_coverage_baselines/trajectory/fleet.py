@@ -31,6 +31,7 @@ from uas_coverage_baselines.trajectory.retiming import (
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import Access, MissionBrief
+from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
 from uas_coverage_env.vehicle import DOD
 from uas_coverage_env.world import SwarmState
 
@@ -38,8 +39,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
-_LANDING_S = 4.0
-_SPARE_S = 6.0  # of the battery, left in routes
 # where the plant is not the model: what plans keep, and what is left of it to tracking
 _ROOM, _TRACKING_ROOM = 0.03, 0.01  # share of the limits
 _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
@@ -159,7 +158,11 @@ class Fleet:
         barred = moment.barred
         if self.closed_off.any():
             barred = self.closed_off if barred is None else barred | self.closed_off
-        budget_s = self._pace * np.minimum(self.battery_s(moment.x), left_s) - _SPARE_S - less_s
+        budget_s = (
+            self._pace * np.minimum(self.battery_s(moment.x), left_s)
+            - TRAJECTORY_RESERVE.kept_s
+            - less_s
+        )
         return RoutingTask.of(
             self.terrain,
             moment.x,
@@ -167,7 +170,7 @@ class Fleet:
             open_waypoints=moment.uncovered,
             weight=self._weight,
             budget_s=budget_s,
-            landing_s=_LANDING_S,
+            landing_s=TRAJECTORY.landing_s,
             not_before_s=self.brief.dt_s * moment.earliest.astype(float),
             stretch=_LEGS / self._speed_share,
             speed_share=self._speed_share,

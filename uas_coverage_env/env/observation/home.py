@@ -6,9 +6,13 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.relative import close, direction, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M
 from uas_coverage_env.vehicle import X, Y, Z
-from uas_coverage_env.vehicle.range import OBSERVED, Speeds, flight_seconds
+from uas_coverage_env.vehicle.range import SpeedLimits, TravelTimeModel, flight_seconds
 from uas_coverage_env.world import HOME as HOME_TARGET
 from uas_coverage_env.world.routes import shortest_way
+
+OBSERVED = TravelTimeModel(in_turn=True)
+"""Of the observation of `uas_coverage_v0`, at the limits of the vehicle: trained networks read it.
+"""
 
 _FEATURES = (
     Feature("direction", 2, -1, 1, "unit vector of the first leg home past obstacles"),
@@ -33,7 +37,7 @@ def _way_home(arena, state, i):
     z = state.x[i, Z]
     target, x1, y1, z1 = target_position(arena, i, HOME_TARGET)
     leg_x, leg_y, way_m = shortest_way(arena, target, x, y, z, x1, y1, z1)
-    speeds = Speeds(uas.speed_mps, uas.climb_mps, uas.descent_mps)
+    speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     flight_s = flight_seconds(OBSERVED, speeds, 0.0, way_m, 0.0, max(0.0, z1 - z))
     return leg_x, leg_y, way_m, z1 - z, flight_s * uas.dod_per_s
 

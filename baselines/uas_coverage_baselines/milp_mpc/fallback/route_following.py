@@ -25,6 +25,7 @@ from uas_coverage_env.autopilot import guide
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
+from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import (
     DOD,
     VX,
@@ -38,7 +39,6 @@ from uas_coverage_env.vehicle import (
 from uas_coverage_env.world import COMMAND_DTYPE, HOME, SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
-_RESERVE_S = 30.0  # what is to be left at home, since other UAS may be in the way
 _PURSUED_S = (8.0, 4.0, 2.0, 1.0)  # how long the way home is followed before the brakes
 _LONGEST_WAY_S = 900.0
 _NEXT_STEPS = 2  # a decision later it is later by a step, and as far again away
@@ -122,7 +122,7 @@ class RouteFollower:
             for uas, name in enumerate(problem.names)
             if name not in planned and (name not in sent or sent[name].target != HOME)
         }
-        short = sorted((s, uas) for uas, s in left_s.items() if s < _RESERVE_S)
+        short = sorted((s, uas) for uas, s in left_s.items() if s < ROUTE_HOME_RESERVE.kept_s)
         # ways home before any others
         routes = {name: route for name, route in sent.items() if route.target == HOME}
         routes |= {problem.names[uas]: Sent(HOME) for _, uas in short}
@@ -161,7 +161,7 @@ class RouteFollower:
         clock_s = (rules.max_steps - swarm.step) * rules.dt_s
         roughly_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
         left_s = min((most - float(x[DOD])) / per_s, clock_s) - roughly_s
-        if left_s > _RESERVE_S:
+        if left_s > ROUTE_HOME_RESERVE.kept_s:
             return left_s
         steps = int(np.ceil(_LONGEST_WAY_S / rules.dt_s))
         states, _ = self._flown(problem, uas, steps, steps)

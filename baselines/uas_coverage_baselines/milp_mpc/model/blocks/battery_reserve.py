@@ -13,6 +13,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     WayHome,
 )
 from uas_coverage_env.geometry import cylinder_faces
+from uas_coverage_env.planning.reserves import BRAKING_S, MILP_RESERVE
 from uas_coverage_env.vehicle import (
     DELTA_THRUST,
     DOD,
@@ -22,7 +23,6 @@ from uas_coverage_env.vehicle import (
     dod_per_s,
 )
 from uas_coverage_env.vehicle.range import (
-    MILP_RESERVE,
     flight_seconds,
     level_seconds,
     speeds_of,
@@ -31,9 +31,8 @@ from uas_coverage_env.vehicle.range import (
 
 FloatArray = NDArray[np.float64]
 _BATTERY = [DOD, U_TH]
-_ALLOWANCE_S = 16.0  # braking to a hover where the plan ends, and turning
 
-SETTLING_S = _ALLOWANCE_S + MILP_RESERVE.landing_s
+SETTLING_S = BRAKING_S + MILP_RESERVE.landing_s
 """What the reserve holds back beyond the flight home itself [s]."""
 
 
@@ -113,7 +112,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
     way_s = float((_time_faces(problem, uas) @ (x[:3] - _towards_m(problem, uas))).max())
     spent_s = float(x[DOD]) / _rate(problem, uas)
     result = spent_s + way_s - _room_s(problem, uas)
-    return result if allowance else result - _ALLOWANCE_S
+    return result if allowance else result - BRAKING_S
 
 
 def seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
@@ -149,7 +148,7 @@ def _room_s(problem: PlanningProblem, uas: int) -> float:
     full_s = float(problem.dod_max[uas]) / _rate(problem, uas)
     way = _way_home(problem, uas)
     onward_s = 0.0 if way is None else way.onward_s
-    return full_s - MILP_RESERVE.landing_s - _ALLOWANCE_S - onward_s
+    return full_s - MILP_RESERVE.landing_s - BRAKING_S - onward_s
 
 
 def _way_home(problem: PlanningProblem, uas: int) -> WayHome | None:

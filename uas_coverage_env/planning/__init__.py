@@ -1,0 +1,1 @@
+"""What planners and learners share: what they allow for flights, and keep for the way home."""
